@@ -1,0 +1,5 @@
+"""`python -m vsacli` is the command `vsacli`."""
+
+from vsacli.cli import main
+
+main()

@@ -1,0 +1,1 @@
+"""Strict reading of declared YAML documents and CSV tables. Knows files and fields, not robots."""
