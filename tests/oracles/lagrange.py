@@ -1,0 +1,187 @@
+"""Lagrange's equations of a chain, from 4x4 Denavit-Hartenberg matrices; no angular velocity, no recursion.
+
+With the transform T_k of link k and its pseudo-inertia J_k = integral(r r^T dm), r = (x, y, z, 1):
+
+    kinetic energy    1/2 sum_k tr(T_k' J_k T_k'^T)
+    potential energy     -sum_k g^T T_k J_k e_4
+    tau_i = sum_k tr(dT_k/dq_i J_k T_k''^T) - g^T dT_k/dq_i J_k e_4 + D_i q_i'    (Uicker, 1965)
+
+Every matrix is the list of its time derivatives, so the derivatives of tau_i follow from the product rule.
+Matrices have the shape (..., 4, 4): of floats, for many samples at once, or of exact fractions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from oracles.jets import Scalar, circle, leibniz, matrix_product
+from vsacli.robot import Robot
+
+Array = npt.NDArray[Any]
+Derivatives = list[Array]
+
+
+@dataclass(frozen=True)
+class Link:
+    """A joint and its link; `inertia` is the 3x3 tensor about the centre of mass `com`."""
+
+    revolute: bool
+    a: Scalar
+    cos_alpha: Scalar
+    sin_alpha: Scalar
+    mass: Scalar
+    com: Array
+    inertia: Array
+    damping: Scalar
+
+    @property
+    def pseudo_inertia(self) -> Array:
+        """integral(r r^T dm) over the link, r homogeneous."""
+        central = np.trace(self.inertia) / 2 * np.eye(3, dtype=int) - self.inertia
+        moment = self.mass * self.com
+        corner = np.array([[self.mass]])
+        return np.block([[central + np.outer(moment, self.com), moment[:, None]], [moment[None, :], corner]])
+
+    @property
+    def generator(self) -> Array:
+        """Q with dA/dq = Q A for the joint's transform A."""
+        q = np.zeros((4, 4), dtype=int)
+        if self.revolute:
+            q[0, 1], q[1, 0] = -1, 1
+        else:
+            q[2, 3] = 1
+        return q
+
+
+@dataclass(frozen=True)
+class State:
+    """Cosine and sine of the joint's angle, its offset, and the rates q', q'', q''', q''''."""
+
+    cos: Scalar
+    sin: Scalar
+    d: Scalar
+    rates: Sequence[Scalar]
+
+
+class Chain:
+    """A chain at given states; `gravity` is the acceleration in the base frame."""
+
+    def __init__(self, links: Sequence[Link], states: Sequence[State], gravity: Array) -> None:
+        self.links = links
+        self.states = states
+        self.gravity = np.array([*gravity, 0])
+        self.steps = [_transform(link, state) for link, state in zip(links, states, strict=True)]
+        self.poses = self._poses()
+
+    def torques(self, order: int) -> list[Scalar]:
+        """Derivative of the given order, 0 to 2, of the torque of each joint."""
+        return [self._torque(i, order) for i in range(len(self.links))]
+
+    def kinetic_energy(self, order: int) -> Scalar:
+        """Derivative of the given order, 0 to 3."""
+        return sum(
+            leibniz(order, pose[1:], pose[1:], lambda a, b, j=link.pseudo_inertia: _trace(a @ j, b)) / 2
+            for link, pose in zip(self.links, self.poses, strict=True)
+        )
+
+    def potential_energy(self, order: int) -> Scalar:
+        """Derivative of the given order, 0 to 4."""
+        return -sum(
+            self._weight(pose[order], link) for link, pose in zip(self.links, self.poses, strict=True)
+        )
+
+    def _poses(self) -> list[Derivatives]:
+        poses = [self.steps[0]]
+        for step in self.steps[1:]:
+            poses.append(matrix_product(poses[-1], step))
+        return poses
+
+    def _torque(self, i: int, order: int) -> Scalar:
+        total = self.links[i].damping * self.states[i].rates[order]
+        for link, pose, sensitivity in zip(
+            self.links[i:], self.poses[i:], self._sensitivities(i), strict=True
+        ):
+            j = link.pseudo_inertia
+            total = total + leibniz(order, sensitivity, pose[2:], lambda a, b, j=j: _trace(a @ j, b))
+            total = total - self._weight(sensitivity[order], link)
+        return total
+
+    def _sensitivities(self, i: int) -> list[Derivatives]:
+        """Derivatives of dT_k/dq_i for k = i, i + 1, ..."""
+        generator = self.links[i].generator
+        sensitivity = [generator @ step for step in self.steps[i]]
+        if i > 0:
+            sensitivity = matrix_product(self.poses[i - 1], sensitivity)
+        sensitivities = [sensitivity]
+        for step in self.steps[i + 1 :]:
+            sensitivities.append(matrix_product(sensitivities[-1], step))
+        return sensitivities
+
+    def _weight(self, pose: Array, link: Link) -> Scalar:
+        return (pose @ link.pseudo_inertia[:, 3]) @ self.gravity
+
+
+def chain_of(robot: Robot, motion: Sequence[Array]) -> Chain:
+    """The chain of a robot at q, dq, ddq, d3q, d4q, each (samples, joints)."""
+    q, *rates = (np.moveaxis(np.asarray(array), -1, 0) for array in motion)
+    links, states = [], []
+    for index, joint in enumerate(robot.joints):
+        turn, slide = (q[index], 0) if joint.type == "revolute" else (0, q[index])
+        angle = joint.dh.theta + turn + np.zeros_like(q[index])
+        offset = joint.dh.d + slide + np.zeros_like(q[index])
+        states.append(State(np.cos(angle), np.sin(angle), offset, [rate[index] for rate in rates]))
+        links.append(
+            Link(
+                revolute=joint.type == "revolute",
+                a=joint.dh.a,
+                cos_alpha=math.cos(joint.dh.alpha),
+                sin_alpha=math.sin(joint.dh.alpha),
+                mass=joint.link.mass,
+                com=np.array(joint.link.com),
+                inertia=joint.link.inertia.tensor,
+                damping=joint.damping,
+            )
+        )
+    return Chain(links, states, np.array(robot.gravity))
+
+
+def _transform(link: Link, state: State) -> Derivatives:
+    """A = Rz(theta) Tz(d) Tx(a) Rx(alpha) and its four derivatives."""
+    still = [0 * rate for rate in state.rates]
+    cosines, sines = circle(state.cos, state.sin, state.rates if link.revolute else still)
+    offsets = [state.d, *(still if link.revolute else state.rates)]
+    fixed = np.array(
+        [
+            [1, 0, 0, link.a],
+            [0, link.cos_alpha, -link.sin_alpha, 0],
+            [0, link.sin_alpha, link.cos_alpha, 0],
+            [0, 0, 0, 1],
+        ]
+    )
+    return [
+        _screw(c, s, d, int(order == 0)) @ fixed
+        for order, (c, s, d) in enumerate(zip(cosines, sines, offsets, strict=True))
+    ]
+
+
+def _screw(cos: Scalar, sin: Scalar, d: Scalar, one: int) -> Array:
+    """Rz Tz, or a derivative of it, where the constant entry `one` has become 0."""
+    zero = 0 * cos
+    rows = [
+        [cos, -sin, zero, zero],
+        [sin, cos, zero, zero],
+        [zero, zero, zero + one, d],
+        [zero, zero, zero, zero + one],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+def _trace(a: Array, b: Array) -> Scalar:
+    """tr(a b^T) of each matrix."""
+    return (a * b).sum(axis=(-2, -1))

@@ -1,0 +1,54 @@
+"""The rigid chain in the Pinocchio library (Carpentier et al., 2019)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from vsacli.arrays import FloatArray
+from vsacli.robot import DenavitHartenberg, Robot
+
+
+def build(robot: Robot) -> pin.Model:
+    """The model of a robot: one Pinocchio joint a row, which moves before the row's constant transform."""
+    model = pin.Model()
+    model.gravity.linear = np.array(robot.gravity)
+    parent, placement = 0, pin.SE3.Identity()
+    for joint in robot.joints:
+        kind = pin.JointModelRZ() if joint.type == "revolute" else pin.JointModelPZ()
+        parent = model.addJoint(parent, kind, placement, joint.name)
+        placement = _row(joint.dh)
+        body = pin.Inertia(joint.link.mass, np.array(joint.link.com), joint.link.inertia.tensor)
+        model.appendBodyToJoint(parent, body, placement)
+    return model
+
+
+def torques(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+    """tau_e (samples, joints); Pinocchio's recursion knows no damping, so it is added here."""
+    model, damping = build(robot), _damping(robot)
+    data = model.createData()
+    rows = [pin.rnea(model, data, *row).copy() for row in zip(q, dq, ddq, strict=True)]
+    return np.array(rows) + damping * dq
+
+
+def torque_rates(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray, d3q: FloatArray) -> FloatArray:
+    """dtau_e (samples, joints), by the chain rule from Pinocchio's analytical derivatives."""
+    model, damping = build(robot), _damping(robot)
+    data = model.createData()
+    rows = []
+    for q_k, dq_k, ddq_k, d3q_k in zip(q, dq, ddq, d3q, strict=True):
+        by_q, by_dq, by_ddq = pin.computeRNEADerivatives(model, data, q_k, dq_k, ddq_k)
+        mass_matrix = np.triu(by_ddq) + np.triu(by_ddq, 1).T
+        rows.append(by_q @ dq_k + by_dq @ ddq_k + mass_matrix @ d3q_k)
+    return np.array(rows) + damping * ddq
+
+
+def _row(dh: DenavitHartenberg) -> pin.SE3:
+    """Rz(theta) Tz(d) Tx(a) Rx(alpha) at joint variable 0."""
+    about_z = pin.SE3(pin.rpy.rpyToMatrix(0, 0, dh.theta), np.array([0, 0, dh.d]))
+    about_x = pin.SE3(pin.rpy.rpyToMatrix(dh.alpha, 0, 0), np.array([dh.a, 0, 0]))
+    return about_z * about_x
+
+
+def _damping(robot: Robot) -> FloatArray:
+    return np.array([joint.damping for joint in robot.joints])

@@ -1,0 +1,118 @@
+"""The recursion (36)-(60) in exact rational arithmetic: a difference is zero or not, without a tolerance.
+
+The recursion is a polynomial in its inputs. Two different polynomials of degree n agree at a point drawn from
+s values per input with a probability of at most n / s (Schwartz, Zippel), so a few random points decide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+
+import pytest
+from oracles.jets import Jet, Scalar, circle
+from oracles.lagrange import Chain, Link, State
+from oracles.mutants import Mutant, mutants_of
+from oracles.rational import random_chain
+
+from vsacli import newton_euler
+from vsacli.newton_euler import JointState, LinkConstants, recursion
+from vsacli.vector import SymmetricTensor, Vector
+
+type_chains = pytest.mark.parametrize("types", ["R", "P", "RR", "RP", "PR", "PP", "RPR", "RRP"])
+seeds = pytest.mark.parametrize("seed", [1, 2])
+
+Recursion = Callable[..., Sequence[tuple[Scalar, Scalar, Scalar]]]
+RICHEST_CHAIN = ("RPR", 1)
+"""Type and seed of a chain in which every term of every equation is at work."""
+
+MUTANTS = mutants_of(newton_euler, "recursion")
+
+
+def link_constants(link: Link) -> LinkConstants:
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = link.inertia
+    return LinkConstants(
+        revolute=link.revolute,
+        a=link.a,
+        cos_alpha=link.cos_alpha,
+        sin_alpha=link.sin_alpha,
+        mass=link.mass,
+        com=Vector(*link.com),
+        inertia=SymmetricTensor(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz),
+        damping=link.damping,
+    )
+
+
+def joint_state(state: State) -> JointState:
+    dq, ddq, d3q, d4q = state.rates
+    return JointState(state.cos, state.sin, state.d, (dq, ddq, d3q, d4q))
+
+
+def joint_state_jets(link: Link, state: State) -> JointState:
+    """The state with its first two derivatives, along the path whose rates beyond q'''' are zero."""
+    rates = [*state.rates, 0, 0]
+    turning, sliding = (rates, [0, 0]) if link.revolute else ([0, 0], rates)
+    cosines, sines = circle(state.cos, state.sin, turning[:2])
+    dq, ddq, d3q, d4q = (Jet(*rates[order : order + 3]) for order in range(4))
+    return JointState(Jet(*cosines), Jet(*sines), Jet(state.d, *sliding[:2]), (dq, ddq, d3q, d4q))
+
+
+def torques(chain: Chain, run: Recursion = recursion) -> list[tuple[Scalar, ...]]:
+    """(tau_e, dtau_e, ddtau_e) of each joint."""
+    links = [link_constants(link) for link in chain.links]
+    states = [joint_state(state) for state in chain.states]
+    return [tuple(joint) for joint in run(links, states, Vector(*chain.gravity[:3]))]
+
+
+def ladder_gaps(chain: Chain, run: Recursion = recursion) -> list[Scalar]:
+    """d/dt tau_e - dtau_e, d2/dt2 tau_e - ddtau_e and d/dt dtau_e - ddtau_e of each joint."""
+    links = [link_constants(link) for link in chain.links]
+    states = [joint_state_jets(*pair) for pair in zip(chain.links, chain.states, strict=True)]
+    gaps = []
+    for tau, dtau, ddtau in run(links, states, Vector(*chain.gravity[:3])):
+        _, tau_1, tau_2 = tau.derivatives
+        dtau_0, dtau_1, _ = dtau.derivatives
+        gaps += [tau_1 - dtau_0, tau_2 - ddtau.derivatives[0], dtau_1 - ddtau.derivatives[0]]
+    return gaps
+
+
+@cache
+def richest_chain() -> tuple[Chain, list[tuple[Scalar, ...]]]:
+    """The chain that tells mutants apart, and its torques by Lagrange's equations."""
+    chain = random_chain(*RICHEST_CHAIN)
+    return chain, lagrange_torques(chain)
+
+
+def lagrange_torques(chain: Chain) -> list[tuple[Scalar, ...]]:
+    return list(zip(*(chain.torques(order) for order in range(3)), strict=True))
+
+
+@type_chains
+@seeds
+def test_derivatives_of_the_torque_are_its_derivatives(types: str, seed: int) -> None:
+    gaps = ladder_gaps(random_chain(types, seed))
+    assert gaps == [0] * len(gaps)
+
+
+@type_chains
+def test_torques_and_derivatives_satisfy_lagranges_equations(types: str) -> None:
+    chain = random_chain(types, seed=3)
+    assert torques(chain) == lagrange_torques(chain)
+
+
+@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.label)
+def test_every_changed_term_contradicts_lagranges_equations(mutant: Mutant) -> None:
+    chain, expected = richest_chain()
+    assert torques(chain, mutant.load().recursion) != expected
+
+
+@pytest.mark.parametrize(
+    "mutant", [mutant for mutant in MUTANTS if mutant.coefficient], ids=lambda mutant: mutant.label
+)
+def test_every_changed_coefficient_breaks_the_ladder(mutant: Mutant) -> None:
+    chain, _ = richest_chain()
+    assert any(ladder_gaps(chain, mutant.load().recursion))
+
+
+def test_the_binomial_coefficients_of_every_order_are_among_the_changed() -> None:
+    assert {mutant.coefficient for mutant in MUTANTS} == {None, 2, 3, 4, 6}
