@@ -1,0 +1,96 @@
+"""Is a step reachable, regular and within limits? Margins and flags of one joint, over samples."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.flags import Flag
+from vsacli.robot import Joint
+from vsacli.springs import PairSolution
+
+TOUCHING = 1e-9
+"""Relative margin that counts as zero: deflections are good to about 1e-16/margin, so to 1e-7 at this one."""
+
+NEAR_SINGULAR = 0.01
+"""Relative margin to a critical point below which a step is near-singular; the paper's runs stay above 3 %."""
+
+LIMIT_ROUNDING = 1e-9
+"""Relative excess over a limit that is none, so that a motion may run along its limit."""
+
+
+def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    """Relative distance of the stiffness to the nearer end of its corridor; negative outside, NaN if none."""
+    return np.minimum(stiffness - lower, upper - stiffness) / stiffness
+
+
+def reach_flags(stiffness: FloatArray, solution: PairSolution) -> FlagArray:
+    """Bits INFEASIBLE, SINGULAR and NEAR_SINGULAR of the steps of a joint, (samples,)."""
+    gap = margin(stiffness, solution.lower, solution.upper)
+    at_lower = stiffness - solution.lower <= solution.upper - stiffness
+    critical = np.where(at_lower, solution.lower_critical, solution.upper_critical)
+    return (
+        _bit(Flag.INFEASIBLE, ~(gap >= -TOUCHING))
+        | _bit(Flag.SINGULAR, critical & (np.abs(gap) <= TOUCHING))
+        | _bit(Flag.NEAR_SINGULAR, critical & (gap > TOUCHING) & (gap < NEAR_SINGULAR))
+    )
+
+
+class LimitCheck(NamedTuple):
+    """A finite limit of a joint: which result variable must stay in which range.
+
+    Attributes:
+        flag: the bit that says it does not.
+        variable: name of the variable.
+        motor: 1 or 2 if the variable is one of a motor, else None.
+        range: lower and upper bound.
+    """
+
+    flag: Flag
+    variable: str
+    motor: int | None
+    range: tuple[float, float]
+
+
+def limit_checks(joint: Joint) -> list[LimitCheck]:
+    """The limits that a joint has."""
+    limits, actuator = joint.limits, joint.actuator
+    checks = [
+        LimitCheck(Flag.POSITION_LIMIT, "q", None, limits.position),
+        LimitCheck(Flag.VELOCITY_LIMIT, "dq", None, limits.velocity),
+        LimitCheck(Flag.STIFFNESS_LIMIT, "stiffness", None, limits.stiffness),
+    ]
+    for motor, (drive, spring) in enumerate(zip(actuator.motor, actuator.spring, strict=True), start=1):
+        checks += [
+            LimitCheck(Flag.DEFLECTION_LIMIT, "phi", motor, _symmetric(spring.max_deflection)),
+            LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", motor, _symmetric(drive.max_velocity)),
+            LimitCheck(Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor, _symmetric(drive.max_torque)),
+        ]
+    return [check for check in checks if np.isfinite(check.range).any()]
+
+
+def excess(values: FloatArray, bounds: tuple[float, float]) -> FloatArray:
+    """How far values lie outside [lower, upper]; zero or negative inside, NaN for NaN."""
+    return np.maximum(bounds[0] - values, values - bounds[1])
+
+
+def limit_flags(check: LimitCheck, values: FloatArray) -> FlagArray:
+    """The bit of a limit where the values leave its range by more than rounding; NaN does not."""
+    largest = max(abs(bound) for bound in check.range if np.isfinite(bound))
+    return _bit(check.flag, excess(values, check.range) > LIMIT_ROUNDING * largest)
+
+
+def has(flags: FlagArray, bits: Flag) -> BoolArray:
+    """Where any of the bits is set."""
+    hit: BoolArray = (flags & np.uint16(bits)) != 0
+    return hit
+
+
+def _bit(flag: Flag, where: BoolArray) -> FlagArray:
+    return where.astype(np.uint16) * np.uint16(flag)
+
+
+def _symmetric(bound: float) -> tuple[float, float]:
+    return -bound, bound

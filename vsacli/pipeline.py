@@ -1,0 +1,122 @@
+"""Inverse dynamics along a trajectory: the one place that walks over time, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from vsacli.feasibility import has
+from vsacli.flags import Flag
+from vsacli.report import Report
+from vsacli.robot import Robot
+from vsacli.self_check import SelfCheck, ladder, spring_residual
+from vsacli.steps import compute_block
+from vsacli.tally import JointTally
+from vsacli.trajectory import Trajectory
+from vsacli.variables import Block
+
+BLOCK_SAMPLES = 8192
+"""Steps computed at a time: enough to hide the interpreter, few enough to bound the memory."""
+
+
+class Run:
+    """One pass over a trajectory: iterate it for the blocks, then ask it for the report.
+
+    Args:
+        robot: the robot.
+        trajectory: what it is asked to do.
+        stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does.
+        block_samples: steps in a block; results do not depend on it.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        trajectory: Trajectory,
+        *,
+        stop_on_infeasible: bool = False,
+        block_samples: int = BLOCK_SAMPLES,
+    ) -> None:
+        self.robot = robot
+        self.trajectory = trajectory
+        self._stop_on_infeasible = stop_on_infeasible
+        self._block_samples = block_samples
+        self._tallies = [JointTally(joint, index) for index, joint in enumerate(robot.joints)]
+        self._spring_residual = 0.0
+        self._samples = 0
+
+    def __iter__(self) -> Iterator[Block]:
+        for start in range(0, self.trajectory.samples, self._block_samples):
+            stop = min(start + self._block_samples, self.trajectory.samples)
+            block = compute_block(self.robot, self.trajectory.block(start, stop))
+            infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
+            if self._stop_on_infeasible and infeasible.any():
+                block = _shortened(block, int(infeasible.argmax()) + 1)
+                self._add(block)
+                yield block
+                return
+            self._add(block)
+            yield block
+
+    def _add(self, block: Block) -> None:
+        self._samples += len(block.time)
+        self._spring_residual = max(self._spring_residual, spring_residual(self.robot, block))
+        for tally in self._tallies:
+            tally.add(block)
+
+    def report(self) -> Report:
+        """The verdict on the blocks so far, with the self-check of the whole."""
+        return Report(
+            robot=self.robot.name,
+            trajectory=self.trajectory.name,
+            samples=self._samples,
+            duration=self.trajectory.duration,
+            complete=self._samples == self.trajectory.samples,
+            warnings=(*self.robot.warnings, *self.trajectory.warnings),
+            self_check=SelfCheck(self._spring_residual, ladder(self.robot, self.trajectory)),
+            joints=tuple(tally.report() for tally in self._tallies),
+        )
+
+
+@dataclass(frozen=True)
+class Result(Block):
+    """Every variable over the whole trajectory, and the report on it."""
+
+    report: Report = field(kw_only=True)
+    joint_names: tuple[str, ...] = field(kw_only=True)
+
+
+def inverse_dynamics(robot: Robot, trajectory: Trajectory, *, stop_on_infeasible: bool = False) -> Result:
+    """Motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
+
+    Pure: prints nothing, writes nothing.
+
+    Args:
+        robot: the robot, from `load_robot` or built in Python.
+        trajectory: for this robot, from `load_trajectory` or `Trajectory.from_samples`.
+        stop_on_infeasible: end with the first infeasible step.
+
+    Returns:
+        Every variable of `vsacli.variables.Block` over (samples, joints[, 2]); `report` holds the verdict.
+
+    Raises:
+        InputError: the trajectory has another number of joints than the robot.
+    """
+    run = Run(robot, trajectory, stop_on_infeasible=stop_on_infeasible)
+    return Result(**_joined(list(run)), report=run.report(), joint_names=robot.joint_names)
+
+
+def _shortened(block: Block, samples: int) -> Block:
+    return Block(**{name: array[:samples] for name, array in vars(block).items()})
+
+
+def _joined(blocks: list[Block]) -> dict[str, npt.NDArray[Any]]:
+    """Blocks one after the other, samples contiguous."""
+    rows = [{name: np.moveaxis(array, 0, -1) for name, array in vars(block).items()} for block in blocks]
+    return {
+        name: np.moveaxis(np.concatenate([row[name] for row in rows], axis=-1), -1, 0) for name in rows[0]
+    }

@@ -1,0 +1,164 @@
+"""The verdict on a run: one object, rendered as text and as JSON, and stored in the result file."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from vsacli.flags import LIMITS, Flag
+from vsacli.self_check import LADDER_BOUND, SelfCheck
+
+FORMAT = "vsacli-report/1"
+
+VERDICTS = ("ok", "over_limit", "singular", "infeasible", "self_check_failed")
+"""From best to worst; the worst that applies wins."""
+
+COUNTED = {
+    "infeasible": Flag.INFEASIBLE,
+    "singular": Flag.SINGULAR,
+    "near_singular": Flag.NEAR_SINGULAR,
+    "slack": Flag.SLACK,
+    "over_limit": LIMITS,
+}
+"""Kinds of trouble whose steps are counted, and the bits that make them."""
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The worst step of a kind of trouble: when, what value, against which bound.
+
+    `bound` is NaN where the elastic torque itself cannot be carried; `motor` is 1, 2 or None.
+    """
+
+    kind: str
+    time: float
+    value: float
+    bound: float
+    unit: str
+    motor: int | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values; the kind is the key under which they stand."""
+        entry = {"time": self.time, "value": self.value, "bound": self.bound, "unit": self.unit}
+        return entry if self.motor is None else {**entry, "motor": self.motor}
+
+
+@dataclass(frozen=True)
+class JointReport:
+    """What a run found at one joint; torques in N m (N), stiffness in N m/rad (N/m).
+
+    Attributes:
+        name: of the joint.
+        type: "revolute" or "prismatic".
+        steps: how many steps have each kind of trouble.
+        first_time: when each kind that occurs first does, s.
+        worst: the worst step of each kind that occurs; limits one by one.
+        margin: smallest relative margin to an end of the corridor, NaN if a torque cannot be carried.
+        margin_time: when.
+        reachable: the corridor at that time.
+        stiffness: smallest and largest commanded stiffness.
+        peak_tau_e: largest |tau_e|.
+        peak_tau_motor: largest |tau_motor| of motors 1 and 2, over the steps where it exists.
+        start_theta: motor positions at the first step, to which the motors go before the start.
+        torque_step: |tau_motor - tau_spring| at the first step: by how much the torque that holds the motor
+            at rest must jump there.
+        other_preload: whether every infeasible step could be done with the opposite preload.
+    """
+
+    name: str
+    type: str
+    steps: dict[str, int]
+    first_time: dict[str, float]
+    worst: dict[str, Worst]
+    margin: float
+    margin_time: float
+    reachable: tuple[float, float]
+    stiffness: tuple[float, float]
+    peak_tau_e: float
+    peak_tau_motor: tuple[float, float]
+    start_theta: tuple[float, float]
+    torque_step: tuple[float, float]
+    other_preload: bool
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values under the published keys."""
+        return {
+            "name": self.name,
+            "type": self.type,
+            "steps": self.steps,
+            "first_time": self.first_time,
+            "worst": {kind: worst.as_json() for kind, worst in self.worst.items()},
+            "margin": {"min": self.margin, "time": self.margin_time, "reachable": list(self.reachable)},
+            "stiffness": {"min": self.stiffness[0], "max": self.stiffness[1]},
+            "peak": {"tau_e": self.peak_tau_e, "tau_motor": list(self.peak_tau_motor)},
+            "start": {"theta": list(self.start_theta), "torque_step": list(self.torque_step)},
+            "other_preload": self.other_preload,
+        }
+
+
+@dataclass(frozen=True)
+class Report:
+    """The verdict on a run.
+
+    Attributes:
+        robot: name of the robot.
+        trajectory: name of the trajectory.
+        samples: steps computed, both ends included.
+        duration: time from the first to the last step of the trajectory, s.
+        complete: whether every step of the trajectory was computed.
+        warnings: what the user should know of the inputs.
+        self_check: outcome of the self-check.
+        joints: one report a joint.
+    """
+
+    robot: str
+    trajectory: str
+    samples: int
+    duration: float
+    complete: bool
+    self_check: SelfCheck
+    joints: tuple[JointReport, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def verdict(self) -> str:
+        """The worst of `VERDICTS` that applies."""
+        applies = {kind for joint in self.joints for kind, count in joint.steps.items() if count}
+        if not self.self_check.passed:
+            applies.add("self_check_failed")
+        return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values for `json.dumps`; numbers that are not finite become None."""
+        check = self.self_check
+        plain: dict[str, Any] = _finite(
+            {
+                "format": FORMAT,
+                "verdict": self.verdict,
+                "robot": self.robot,
+                "trajectory": self.trajectory,
+                "samples": self.samples,
+                "duration": self.duration,
+                "complete": self.complete,
+                "warnings": list(self.warnings),
+                "self_check": {
+                    "passed": check.passed,
+                    "spring_residual": check.spring_residual,
+                    "ladder": check.ladder,
+                    "bound": LADDER_BOUND,
+                },
+                "joints": [joint.as_json() for joint in self.joints],
+            }
+        )
+        return plain
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {key: _finite(entry) for key, entry in content.items()}
+    if isinstance(content, list):
+        return [_finite(entry) for entry in content]
+    if isinstance(content, float) and not math.isfinite(content):
+        return None
+    return content
