@@ -54,7 +54,7 @@ class FieldProblem:
         return ": ".join([".".join(map(str, self.path)), self.message] if self.path else [self.message])
 
 
-class InvalidRecord(InputError):
+class InvalidRecordError(InputError):
     """A record was built with values it cannot have. A file reader adds file and line to each problem."""
 
     def __init__(self, record: str, fields: Iterable[FieldProblem]) -> None:

@@ -28,7 +28,7 @@ from vsacli.spec.fields import (
     vector,
 )
 from vsacli.spec.source import Source
-from vsacli.springs import LAWS, LAWS_NOT_YET, SpringLaw
+from vsacli.springs import LAWS, SpringLaw
 
 UNBOUNDED = (-math.inf, math.inf)
 INERTIA_ROUNDING = 1e-12
@@ -139,9 +139,7 @@ class Antagonistic:
     """Two motors, each pulling the link through a nonlinear spring of its own."""
 
     motor: tuple[Motor, Motor] = value(Pair(Record(Motor)), "motors 1 and 2; one mapping serves both")
-    spring: tuple[SpringLaw, SpringLaw] = value(
-        Pair(OneOf(LAWS, LAWS_NOT_YET)), "springs 1 and 2; one mapping serves both"
-    )
+    spring: tuple[SpringLaw, SpringLaw] = value(Pair(OneOf(LAWS)), "springs 1 and 2; one mapping serves both")
     preload: str = choice(
         ("positive", "negative"),
         "branch of the deflections: positive has phi_1 up and phi_2 down",
@@ -149,7 +147,23 @@ class Antagonistic:
     )
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        problems = []
+        if all(spring.is_linear for spring in self.spring):
+            reason = (
+                "both are linear: no motion of the motors changes the stiffness (A is singular everywhere)"
+            )
+            problems.append(FieldProblem(("spring",), reason))
+        if self.preload == "negative" and any(spring.pulls_only for spring in self.spring):
+            problems.append(
+                FieldProblem(("preload",), "must be positive: a spring that only pulls cannot push")
+            )
+        check_fields(self, *problems)
+
+    @property
+    def laws(self) -> tuple[SpringLaw, SpringLaw]:
+        """The springs as they act on sides 1 and 2."""
+        first, second = self.spring
+        return first, second.as_second()
 
 
 @dataclass(frozen=True)

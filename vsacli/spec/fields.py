@@ -14,7 +14,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from vsacli.errors import FieldProblem, InvalidRecord
+from vsacli.errors import FieldProblem, InvalidRecordError
+from vsacli.spec.tree import quoted
 from vsacli.suggestions import did_you_mean
 from vsacli.units import Quantity
 
@@ -115,6 +116,13 @@ class Pair(Kind):
 
 
 @dataclass(frozen=True)
+class TableFile(Kind):
+    """Path of a CSV file relative to the document, read as a `vsacli.spec.table.Table` of these columns."""
+
+    columns: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class PerJoint(Kind):
     """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint."""
 
@@ -190,7 +198,7 @@ def check_fields(record: Any, *further: FieldProblem) -> None:
         further: problems the record found by itself, reported together with these.
 
     Raises:
-        InvalidRecord: naming each field whose value it cannot have.
+        InvalidRecordError: naming each field whose value it cannot have.
     """
     problems = [
         problem
@@ -199,7 +207,7 @@ def check_fields(record: Any, *further: FieldProblem) -> None:
         for problem in field_problems(name, field, getattr(record, name))
     ]
     if problems or further:
-        raise InvalidRecord(type(record).__name__, [*problems, *further])
+        raise InvalidRecordError(type(record).__name__, [*problems, *further])
 
 
 def field_problems(name: str, field: Field, content: Any) -> Iterator[FieldProblem]:
@@ -207,7 +215,7 @@ def field_problems(name: str, field: Field, content: Any) -> Iterator[FieldProbl
     match field.kind:
         case Text(identifier=True) if not _IDENTIFIER.fullmatch(content):
             requirement = "letters, digits, _ and -, beginning with a letter or _"
-            yield FieldProblem((name,), f"must be made of {requirement}, not {content!r}")
+            yield FieldProblem((name,), f"must be made of {requirement}, not {quoted(content)}")
         case Choice(options=options, not_yet=not_yet) if content not in options:
             yield FieldProblem((name,), unknown_word(content, options, not_yet))
         case Vector(length=length) if len(content) != length:
@@ -226,7 +234,7 @@ def unknown_word(word: str, options: Iterable[str], not_yet: tuple[str, ...]) ->
     """Why a word is none of the options."""
     if word in not_yet:
         return f"{word!r} is not supported yet"
-    return f"unknown word {word!r}{did_you_mean(word, options)}"
+    return f"unknown word {quoted(word)}{did_you_mean(word, options)}"
 
 
 def repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
@@ -234,7 +242,7 @@ def repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
     seen: set[str] = set()
     for index, word in enumerate(words):
         if word is not None and word in seen:
-            yield index, f"{word!r} is taken by another entry; each needs its own"
+            yield index, f"{quoted(word)} is taken by another entry; each needs its own"
         elif word is not None:
             seen.add(word)
 

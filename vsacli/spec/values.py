@@ -1,0 +1,178 @@
+"""Reading single values: numbers, texts, vectors, intervals and values per joint."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from functools import singledispatch
+from pathlib import Path
+from typing import Any, Final
+
+from vsacli.errors import InputError
+from vsacli.spec import tree
+from vsacli.spec.expression import BOOLEANS, ExpressionError, evaluate
+from vsacli.spec.fields import Choice, Integer, Interval, Kind, Number, PerJoint, TableFile, Text, Vector, declared
+from vsacli.spec.problems import Problems
+from vsacli.spec.table import read_table
+from vsacli.suggestions import did_you_mean
+from vsacli.units import DIMENSIONLESS, Quantity
+
+INVALID: Final = object()
+"""In place of a value that cannot be used; its problem is noted already."""
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What the meaning of a value depends on besides its own text.
+
+    Attributes:
+        problems: receives everything that is wrong.
+        members: name and unit variant of every joint, for PerJoint values.
+        variant: the choice on which units depend here, None while it is unknown.
+    """
+
+    problems: Problems
+    members: Mapping[str, str]
+    variant: str | None = None
+
+    def unit(self, quantity: Quantity) -> str:
+        """Unit of a quantity here; an unknown variant is a problem of its own and must not make others."""
+        return quantity.unit(self.variant) if self.variant else quantity.revolute
+
+    def inside(self, cls: type, node: tree.Mapping) -> Scope:
+        """The scope of the values in a record."""
+        selector = getattr(cls, "unit_variant", None)
+        if selector is None:
+            return self
+        match declared(cls)[selector][0].kind, node.entries.get(selector):
+            case Choice(options=options), tree.Scalar(text=word) if word in options:
+                return dataclasses.replace(self, variant=word)
+        return dataclasses.replace(self, variant=None)
+
+
+@singledispatch
+def read_value(kind: Kind, node: tree.Node, label: str, scope: Scope) -> Any:
+    """Read a value of a kind; INVALID if its problem was noted."""
+    raise NotImplementedError
+
+
+@read_value.register
+def _read_number(kind: Number, node: tree.Node, label: str, scope: Scope) -> Any:
+    return _number(node, scope.unit(kind.unit), label, scope)
+
+
+def _number(node: tree.Node, unit: str, label: str, scope: Scope) -> Any:
+    expected = "a number" if unit == str(DIMENSIONLESS) else f"a number in {unit}"
+    if not isinstance(node, tree.Scalar) or node.is_null:
+        return unexpected(node, expected, label, scope)
+    try:
+        return evaluate(node.text, unit)
+    except ExpressionError as error:
+        return unexpected(node, expected, label, scope, f": {error}")
+
+
+def unexpected(node: tree.Node, expected: str, label: str, scope: Scope, reason: str = "") -> Any:
+    """Note that something else was found, and return INVALID."""
+    scope.problems.add(node.line, f"{label}: expected {expected}, found {node}{reason}")
+    return INVALID
+
+
+@read_value.register
+def _read_integer(_: Integer, node: tree.Node, label: str, scope: Scope) -> Any:
+    value = _number(node, str(DIMENSIONLESS), label, scope)
+    if value is INVALID or value.is_integer():
+        return value if value is INVALID else int(value)
+    return unexpected(node, "a whole number", label, scope)
+
+
+@read_value.register
+def _read_text(_: Text, node: tree.Node, label: str, scope: Scope) -> Any:
+    if not isinstance(node, tree.Scalar) or node.is_null:
+        return unexpected(node, "a text", label, scope)
+    if node.plain and node.text.lower() in BOOLEANS:
+        return unexpected(node, "a text", label, scope, ", a boolean in YAML; put it in quotes")
+    return node.text
+
+
+@read_value.register
+def _read_choice(kind: Choice, node: tree.Node, label: str, scope: Scope) -> Any:
+    if isinstance(node, tree.Scalar) and not node.is_null:
+        return node.text
+    return unexpected(node, f"one of {', '.join(kind.options)}", label, scope)
+
+
+@read_value.register
+def _read_vector(kind: Vector, node: tree.Node, label: str, scope: Scope) -> Any:
+    if not isinstance(node, tree.Sequence):
+        return unexpected(node, f"a list of {kind.length} numbers", label, scope)
+    unit = scope.unit(kind.unit)
+    return all_valid(_number(item, unit, label, scope) for item in node.items)
+
+
+@read_value.register
+def _read_interval(kind: Interval, node: tree.Node, label: str, scope: Scope) -> Any:
+    unit = scope.unit(kind.unit)
+    if isinstance(node, tree.Scalar):
+        upper = _number(node, unit, label, scope)
+        return upper if upper is INVALID else (-math.inf if kind.one_sided else -upper, upper)
+    if isinstance(node, tree.Sequence) and len(node.items) == 2:
+        return all_valid(_number(item, unit, label, scope) for item in node.items)
+    return unexpected(node, "[lower, upper] or one number", label, scope)
+
+
+@read_value.register
+def _read_table_file(kind: TableFile, node: tree.Node, label: str, scope: Scope) -> Any:
+    name = _read_text(Text(), node, label, scope)
+    if name is INVALID:
+        return INVALID
+    try:
+        table = read_table(Path(scope.problems.file).parent / name)
+        if table.columns != kind.columns:
+            expected, found = ",".join(kind.columns), ",".join(table.columns)
+            raise InputError.one(f"expected the header {expected}, found {found}", table.source.path, 1)
+    except InputError as error:
+        scope.problems.include(error)
+        return INVALID
+    return table
+
+
+@read_value.register
+def _read_per_joint(kind: PerJoint, node: tree.Node, label: str, scope: Scope) -> Any:
+    nodes = _one_per_joint(node, label, scope)
+    if nodes is None:
+        return INVALID
+    variants = scope.members.values()
+    return all_valid(
+        _number(item, kind.unit.unit(variant), label, scope)
+        for item, variant in zip(nodes, variants, strict=True)
+    )
+
+
+def _one_per_joint(node: tree.Node, label: str, scope: Scope) -> Collection[tree.Node] | None:
+    names = scope.members
+    match node:
+        case tree.Scalar():
+            return [node] * len(names)
+        case tree.Sequence(items=items) if len(items) != len(names):
+            unexpected(node, f"{len(names)} numbers, one for each joint", label, scope)
+            return None
+        case tree.Sequence(items=items):
+            return items
+        case tree.Mapping(entries=entries, key_lines=key_lines):
+            for unknown in [name for name in entries if name not in names]:
+                message = f"{label}: no joint is called {tree.quoted(unknown)}{did_you_mean(unknown, names)}"
+                scope.problems.add(key_lines[unknown], message)
+            missing = [name for name in names if name not in entries]
+            if missing:
+                scope.problems.add(
+                    node.line, f"{label}: no value for {', '.join(missing)}; each joint needs one"
+                )
+            return [entries[name] for name in names] if entries.keys() == names.keys() else None
+
+
+def all_valid(values: Iterable[Any]) -> Any:
+    """The values as a tuple, or INVALID if one is; each is read, so each problem is noted."""
+    everything = tuple(values)
+    return INVALID if INVALID in everything else everything
