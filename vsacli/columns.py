@@ -1,0 +1,80 @@
+"""Which column of a recorded trajectory is which quantity of which joint."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+
+from vsacli.errors import InputError, Problem
+from vsacli.profiles import POSITION, STIFFNESS, Signal
+from vsacli.suggestions import did_you_mean
+
+TIME = "time"
+SIGNALS = (POSITION, STIFFNESS)
+
+Layout = dict[str, list[int]]
+"""For each quantity that a table has, e.g. `dq`, the index of each joint's column."""
+
+
+def column_layout(
+    header: Sequence[str], joint_names: Sequence[str], wanted: Sequence[Signal], file: str
+) -> Layout:
+    """Where the quantities stand in a table.
+
+    Columns are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one way throughout.
+
+    Args:
+        header: names of all columns, none twice.
+        joint_names: the joints, each of which must have a column of each quantity that any joint has.
+        wanted: signals whose values must be there; their derivatives are optional.
+        file: named in errors.
+
+    Raises:
+        InputError: all that is wrong with the header.
+    """
+    ways = (_columns("{joint}.{name}", joint_names), _columns("{name}{number}", joint_names))
+    used = [way for way in ways if any(column in header for column in _all(way))]
+    way = used[0] if used else ways[0]
+
+    problems = list(_strangers(header, [TIME, *_all(way)], {TIME, *_all(ways[0]), *_all(ways[1])}))
+    if len(used) == len(ways):
+        examples = " and ".join(
+            repr(next(column for column in header if column in _all(way))) for way in ways
+        )
+        problems.append(f"columns are named both by joint and by number ({examples}); use one way")
+    else:
+        problems += _gaps(header, way, {signal.names[0] for signal in wanted})
+    if problems:
+        raise InputError(Problem(file, 1, problem) for problem in problems)
+    return {name: [header.index(column) for column in row] for name, row in way.items() if row[0] in header}
+
+
+def _columns(pattern: str, joint_names: Sequence[str]) -> dict[str, list[str]]:
+    """For each quantity the columns of the joints."""
+    joints = list(enumerate(joint_names, 1))
+    return {
+        name: [pattern.format(name=name, joint=joint, number=number) for number, joint in joints]
+        for signal in SIGNALS
+        for name in signal.names
+    }
+
+
+def _all(way: dict[str, list[str]]) -> list[str]:
+    return [column for columns in way.values() for column in columns]
+
+
+def _strangers(header: Sequence[str], expected: Sequence[str], known: Collection[str]) -> Iterator[str]:
+    meant = [column for column in expected if column not in header]
+    for column in header:
+        if column not in known:
+            yield f"unknown column {column!r}{did_you_mean(column, meant)}"
+
+
+def _gaps(header: Sequence[str], way: dict[str, list[str]], needed: Collection[str]) -> Iterator[str]:
+    if TIME not in header:
+        yield f"there is no column {TIME!r}"
+    for name, columns in way.items():
+        absent = [column for column in columns if column not in header]
+        if absent and name in needed:
+            yield f"there is no column {', '.join(absent)}"
+        elif absent and len(absent) < len(columns):
+            yield f"there is no column {', '.join(absent)}; {name} is given for all joints or for none"

@@ -1,0 +1,189 @@
+"""Courses of position and stiffness over time, in closed form: rest to rest, and constant."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Self
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from vsacli.arrays import FloatArray
+from vsacli.errors import InputError
+from vsacli.times import stretch
+
+DEGREES = range(3, 16, 2)
+"""Degrees that a rest-to-rest polynomial may have."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """What a profile describes: a value, and the derivatives of it that are needed.
+
+    Attributes:
+        names: the value and its derivatives, as in files and in `Motion`.
+        spline_degree: odd degree of the spline through recorded values.
+        positive: whether the value must be positive.
+    """
+
+    names: tuple[str, ...]
+    spline_degree: int
+    positive: bool = False
+
+    @property
+    def orders(self) -> int:
+        """Number of functions in a profile: the value and its derivatives."""
+        return len(self.names)
+
+
+POSITION = Signal(("q", "dq", "ddq", "d3q", "d4q"), spline_degree=5)
+STIFFNESS = Signal(("stiffness", "dstiffness", "ddstiffness"), spline_degree=3, positive=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedForm(ABC):
+    """A profile given by a formula, analytic between the two ends of its span, in s."""
+
+    signal: Signal
+    span: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        first, last = self.span
+        if not (math.isfinite(first) and math.isfinite(last) and first < last):
+            raise InputError.one(f"a profile must last a positive time, not from {first:g} to {last:g} s")
+
+    @property
+    @abstractmethod
+    def joints(self) -> int:
+        """Number of joints."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Nothing: a formula leaves no doubt."""
+        return ()
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """The ends of the span."""
+        return np.array(self.span)
+
+    @abstractmethod
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, joints, samples)."""
+
+    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
+        """The same at the steps start..stop-1, whose times are `time`."""
+        return self.at(time)
+
+    def stretched(self, factor: float) -> Self:
+        """The same course, slower by a factor."""
+        first, last = self.span
+        return replace(self, span=(first, stretch(last, first, factor)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constant(ClosedForm):
+    """The same `value`, one number a joint, all the time."""
+
+    value: tuple[float, ...]
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.value)
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, joints, samples)."""
+        rows = np.zeros((self.signal.orders, self.joints, len(time)))
+        rows[0] = np.array(self.value)[:, None]
+        return rows
+
+
+@dataclass(frozen=True, kw_only=True)
+class RestToRest(ClosedForm):
+    """Polynomial whose derivatives up to (degree-1)/2 vanish at both ends of the span.
+
+    Attributes:
+        degree: odd, 3 to 15.
+        start, end: one value a joint, taken exactly at the ends.
+    """
+
+    degree: int
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.degree not in DEGREES:
+            raise InputError.one(f"the degree must be odd, {DEGREES[0]} to {DEGREES[-1]}, not {self.degree}")
+        if len(self.start) != len(self.end):
+            raise InputError.one(f"start has {len(self.start)} values, end has {len(self.end)}")
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.start)
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, joints, samples)."""
+        first, last = self.span
+        elapsed, remaining = time - first, last - time
+        late = remaining < elapsed
+        start, end = np.array(self.start), np.array(self.end)
+
+        rows = np.empty((self.signal.orders, self.joints, len(time)))
+        rise = _rise(np.minimum(elapsed, remaining) / (last - first), self.degree)
+        np.multiply.outer(end - start, np.where(late, -rise, rise), out=rows[0])
+        rows[0] += np.where(late, end[:, None], start[:, None])
+        for row, rate in zip(rows[1:], _rates(elapsed, remaining, last - first, self.degree), strict=False):
+            np.multiply.outer(end - start, rate, out=row)
+        return rows
+
+
+def _rise(u: FloatArray, degree: int) -> FloatArray:
+    """Rest-to-rest course from 0 at u = 0 to 1 at u = 1: a sum of positive terms, so accurate for small u.
+
+    With m = (degree-1)/2 it is u^(m+1) sum over k = 0..m of binomial(m+k, k) (1-u)^k.
+    """
+    m = (degree - 1) // 2
+    series = polynomial.polyval(1 - u, [math.comb(m + k, k) for k in range(m + 1)])
+    return series * _power(u, m + 1)
+
+
+def _rates(elapsed: FloatArray, remaining: FloatArray, total: float, degree: int) -> Iterator[FloatArray]:
+    """Derivatives 1, 2, ... of that course by time.
+
+    The first is c p^m / T with p = s (1-s), s = elapsed / T, m = (degree-1)/2 and
+    c = degree! / m!^2. Since dp/ds = 1-2s and d(1-2s)/ds = -2, the others are sums of p^i (1-2s)^j as well.
+    """
+    m = (degree - 1) // 2
+    p, slope = elapsed / total * (remaining / total), (remaining - elapsed) / total
+    terms = {(m, 0): math.factorial(degree) / math.factorial(m) ** 2}
+    scale = total
+    while True:
+        rate = np.zeros_like(p)
+        for (i, j), c in terms.items():
+            rate += c / scale * _power(p, i) * _power(slope, j)
+        yield rate
+        terms, scale = _derivative(terms), scale * total
+
+
+def _derivative(terms: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+    """d/ds of the sum of c p^i (1-2s)^j, given and returned as {(i, j): c}."""
+    result: dict[tuple[int, int], float] = defaultdict(float)
+    for (i, j), c in terms.items():
+        if i:
+            result[i - 1, j + 1] += i * c
+        if j:
+            result[i, j - 1] -= 2 * j * c
+    return result
+
+
+def _power(base: FloatArray, exponent: int) -> FloatArray:
+    """base^exponent by multiplication, much faster than `**` on arrays."""
+    return reduce(np.multiply, [base] * exponent, np.ones_like(base))
