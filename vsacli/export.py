@@ -1,0 +1,183 @@
+"""Result file to CSV: torques to send to motor drives, or any other variable."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from vsacli.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.errors import InputError, VsacliError
+from vsacli.store.atomic import AtomicFile, reporting_storage_errors
+from vsacli.store.reader import StoredResult
+from vsacli.variables import Variable, column_names, select_variables
+
+DEFAULT_VARIABLES = ("tau_motor",)
+CELLS = 2**18
+"""Values of a variable held in memory at a time."""
+RATE_TOLERANCE = 1e-6
+"""Relative error of a rate typed with at least six digits, such as 333.3333."""
+STEP_TOLERANCE = 1e-3
+"""Error of stored times, in steps: twice that of times at 1 kHz printed with six decimals."""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Samples of a joint that have no value: the first one's time in s, and how many they are."""
+
+    variable: str
+    joint: str
+    time: float
+    count: int
+
+    def __str__(self) -> str:
+        samples = "1 sample" if self.count == 1 else f"{self.count} samples"
+        return f"{self.joint}.{self.variable} has no value at {samples}, first at t = {self.time:.6g} s"
+
+
+class UndefinedSamplesError(VsacliError):
+    """Samples to be exported have no value; nothing has been written."""
+
+    def __init__(self, path: Path, gaps: Iterable[Gap]) -> None:
+        self.gaps = tuple(gaps)
+        lines = [f"{path}: {gap}" for gap in self.gaps]
+        lines.append(
+            "nothing was exported; mend the steps the report names, or get empty cells with --allow-nan"
+        )
+        super().__init__("\n".join(lines))
+
+
+def export_csv(
+    result: StoredResult,
+    stream: TextIO,
+    variables: Iterable[str] = DEFAULT_VARIABLES,
+    *,
+    rate: float | None = None,
+    allow_nan: bool = False,
+) -> None:
+    """Write time and variables as CSV with a header line; floats read back bit for bit.
+
+    Args:
+        result: an open result file.
+        stream: where to write; a file should be open with newline="".
+        variables: names, exported in declared order.
+        rate: samples per second, the stored rate or a whole fraction of it; all samples by default.
+        allow_nan: leave the cells of undefined samples empty instead of refusing.
+
+    Raises:
+        InputError: a variable is not in the file, or the rate is not possible.
+        UndefinedSamplesError: a sample is NaN and `allow_nan` is false.
+    """
+    selected = select_variables(variables)
+    stride = 1 if rate is None else _stride(result, rate)
+    if not allow_nan:
+        _check_defined(result, selected, stride)
+    headers = [name for variable in selected for name in column_names(variable, result.joint_names)]
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["time", *headers])
+    for start, stop in _spans(result, selected, stride):
+        columns = [result.time[start:stop:stride].tolist()]
+        for variable in selected:
+            columns += _cells(result.read(variable.name, start, stop)[::stride])
+        writer.writerows(zip(*columns, strict=True))
+
+
+def export_csv_file(
+    result: StoredResult,
+    path: str | Path,
+    variables: Iterable[str] = DEFAULT_VARIABLES,
+    *,
+    rate: float | None = None,
+    allow_nan: bool = False,
+    overwrite: bool = False,
+) -> None:
+    """Do `export_csv` into a file that appears only when it is complete.
+
+    Raises:
+        StorageError: the file exists and `overwrite` is false, or it cannot be written.
+        InputError, UndefinedSamplesError: as `export_csv`.
+    """
+    with AtomicFile(path, overwrite=overwrite) as file:
+        with reporting_storage_errors(path), file.temporary.open("w", encoding="utf-8", newline="") as stream:
+            export_csv(result, stream, variables, rate=rate, allow_nan=allow_nan)
+        file.publish()
+
+
+def _stride(result: StoredResult, rate: float) -> int:
+    """Number of stored steps to one exported step."""
+    if not (rate > 0 and math.isfinite(rate)):
+        raise InputError.one(f"the rate must be positive, not {rate:g} Hz")
+    stored = _stored_rate(result)
+    ratio = stored / rate
+    stride = round(ratio)
+    if ratio < 1 - RATE_TOLERANCE:
+        message = f"the rate {rate:.9g} Hz exceeds the stored {stored:.9g} Hz; samples are not interpolated"
+        raise InputError.one(message, result.path)
+    if abs(ratio - stride) > RATE_TOLERANCE * ratio:
+        nearest = f"{stored / math.ceil(ratio):.9g} and {stored / math.floor(ratio):.9g} Hz"
+        message = (
+            f"the stored {stored:.9g} Hz are no whole multiple of {rate:.9g} Hz; the nearest are {nearest}"
+        )
+        raise InputError.one(message, result.path)
+    return stride
+
+
+def _stored_rate(result: StoredResult) -> float:
+    """Samples per second of a file with equal steps."""
+    time, steps = result.time, result.samples - 1
+    if steps < 1:
+        raise InputError.one(
+            "holds fewer than two samples and so no rate; export without --rate", result.path
+        )
+    step = float(time[-1] - time[0]) / steps
+    error = np.abs(time - (time[0] + step * np.arange(result.samples)))
+    if error.max() > STEP_TOLERANCE * step:
+        place = f"near t = {time[error.argmax()]:.6g} s"
+        message = f"the stored times are not equally spaced ({place}); export without --rate"
+        raise InputError.one(message, result.path)
+    return 1 / step
+
+
+def _spans(result: StoredResult, variables: tuple[Variable, ...], stride: int) -> Iterator[tuple[int, int]]:
+    """Consecutive ranges of samples of moderate size, each starting at an exported one."""
+    widest = max((len(column_names(variable, result.joint_names)) for variable in variables), default=1)
+    length = stride * max(1, CELLS // (widest * stride))
+    for start in range(0, result.samples, length):
+        yield start, min(start + length, result.samples)
+
+
+def _check_defined(result: StoredResult, variables: tuple[Variable, ...], stride: int) -> None:
+    """Raise UndefinedSamplesError if any value to be exported is NaN."""
+    gaps = [gap for variable in variables for gap in _gaps(result, variable, stride)]
+    if gaps:
+        raise UndefinedSamplesError(result.path, gaps)
+
+
+def _gaps(result: StoredResult, variable: Variable, stride: int) -> Iterator[Gap]:
+    spans = _spans(result, (variable,), stride)
+    missing = np.concatenate([_undefined(result.read(variable.name, *span)[::stride]) for span in spans])
+    for joint, steps in zip(result.joint_names, missing.T, strict=True):
+        if steps.any():
+            first = float(result.time[::stride][steps.argmax()])
+            yield Gap(variable.name, joint, first, int(steps.sum()))
+
+
+def _undefined(values: FloatArray | FlagArray) -> BoolArray:
+    """(samples, joints): whether a value of the joint is NaN."""
+    return np.asarray(np.isnan(values).reshape(*values.shape[:2], -1).any(axis=-1))
+
+
+def _cells(values: FloatArray | FlagArray) -> list[list[Any]]:
+    """The columns of a variable as Python numbers; NaN becomes None, which csv writes as an empty cell."""
+    flat = values.reshape(len(values), -1).T
+    missing = np.isnan(flat)
+    if not missing.any():
+        return flat.tolist()
+    cells = flat.astype(object)
+    cells[missing] = None
+    return cells.tolist()

@@ -1,0 +1,1 @@
+"""The result file: written atomically, read with nothing but h5py; format page: docs/file-formats."""
