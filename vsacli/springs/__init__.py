@@ -4,17 +4,28 @@ Adding a law is adding a class derived from `SpringLaw` and its line in `LAWS`.
 """
 
 from vsacli.springs.cubic import Cubic
+from vsacli.springs.exponential import Exponential
+from vsacli.springs.four_bar import FourBar
 from vsacli.springs.iterated import IteratedPair
 from vsacli.springs.law import SpringLaw
 from vsacli.springs.pair import Pair, PairSolution
+from vsacli.springs.polynomial import Polynomial
+from vsacli.springs.quadratic import Quadratic
+from vsacli.springs.sinh import Sinh
+from vsacli.springs.table import MeasuredSpring
 
-LAWS: dict[str, type[SpringLaw]] = {"cubic": Cubic}
+LAWS: dict[str, type[SpringLaw]] = {
+    "cubic": Cubic,
+    "polynomial": Polynomial,
+    "sinh": Sinh,
+    "exponential": Exponential,
+    "quadratic": Quadratic,
+    "four_bar": FourBar,
+    "table": MeasuredSpring,
+}
 """Laws by the name they have in a robot file."""
 
-LAWS_NOT_YET = ("polynomial", "sinh", "exponential", "quadratic", "four_bar", "table")
-"""Laws of the file format that this version does not act on."""
-
-__all__ = ["LAWS", "LAWS_NOT_YET", "Pair", "PairSolution", "SpringLaw", "make_pair"]
+__all__ = ["LAWS", "Pair", "PairSolution", "SpringLaw", "make_pair"]
 
 
 def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:

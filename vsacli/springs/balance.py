@@ -43,6 +43,13 @@ class Balance:
             np.minimum(high_1 - tau_e / 2, tau_e / 2 - low_2),
         )
 
+    def is_slack(self, t: FloatArray, tau_e: FloatArray) -> BoolArray:
+        """Whether a side that only pulls carries no torque."""
+        slack: BoolArray = (self.first.pulls_only & (t == -tau_e / 2)) | (
+            self.second.pulls_only & (t == tau_e / 2)
+        )
+        return slack
+
     def slope_is_monotone(self, tau_e: FloatArray) -> BoolArray:
         """Whether dG/dt surely increases with t as long as both torques have the sign of tau_e."""
         (low_1, high_1), (low_2, high_2) = self.first.hardening_peak, self.second.hardening_peak

@@ -58,7 +58,9 @@ def outermost_piece(balance: Balance, tau_e: FloatArray) -> Piece:
     inner, outer = balance.domain(tau_e)
     half = np.abs(tau_e) / 2
     near, far = np.maximum(inner, -half), np.minimum(outer, half)
-    rising = (outer > half) | (balance.slope(np.where(near <= far, far, 0), tau_e) >= 0)
+    rising = outer > half
+    ending = ~rising & (near <= far)
+    rising[ending] = balance.slope(far[ending], tau_e[ending]) >= 0
 
     critical = (half == 0) & (inner < 0) & (outer > 0)
     inner = np.where(critical, 0.0, inner)

@@ -51,6 +51,11 @@ class Cubic(SpringLaw):
         """Equation (27)."""
         return np.full_like(phi, 6 * self.k_c)
 
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Energy K phi^2/2 + Kc phi^4/4."""
+        squared = phi * phi
+        return squared * (self.k / 2 + self.k_c / 4 * squared)
+
     def deflection(self, torque: FloatArray) -> FloatArray:
         """The real root of the cubic, by its hyperbolic form (no cancellation at any size of torque)."""
         scale = self._peak_deflection
@@ -77,6 +82,7 @@ class AlikeCubics(Pair):
             upper=np.full_like(tau_e, np.inf),
             lower_critical=np.ones(tau_e.shape, dtype=bool),
             upper_critical=np.zeros(tau_e.shape, dtype=bool),
+            slack_below=np.zeros(tau_e.shape, dtype=bool),
             phi_1=(u + spread) / 2,
             phi_2=(u - spread) / 2,
         )

@@ -37,7 +37,13 @@ class IteratedPair(Pair):
         preload[carried] = _preload(balance, piece.select(carried), tau_e[carried], demand[carried])
         phi_1, phi_2 = balance.deflections(preload, tau_e)
         return PairSolution(
-            lower, upper, piece.critical & piece.rising, piece.critical & ~piece.rising, phi_1, phi_2
+            lower=lower,
+            upper=upper,
+            lower_critical=piece.critical & piece.rising,
+            upper_critical=piece.critical & ~piece.rising,
+            slack_below=~piece.critical & piece.rising & balance.is_slack(piece.inner, tau_e),
+            phi_1=phi_1,
+            phi_2=phi_2,
         )
 
 

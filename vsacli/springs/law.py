@@ -1,4 +1,4 @@
-"""What every spring law offers: torque over deflection, three derivatives, and the inverse."""
+"""What every spring law offers: torque over deflection, three derivatives, energy, and the inverse."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from vsacli.units import POSITION
 
 @dataclass(frozen=True)
 class SpringLaw(ABC):
-    """Torque tau(phi) of a transmission, strictly increasing in the deflection phi on its domain.
+    """Torque tau(phi) of a transmission: zero at zero, strictly increasing, hardening away from zero.
 
-    The methods take and return arrays of any one shape; phi in rad (m), torque in N m (N).
+    So sigma > 0 on the domain, and zeta has the sign of phi. The methods take and return arrays of any one
+    shape; phi in rad (m), torque in N m (N).
     """
 
     max_deflection: float = number(
@@ -41,9 +42,28 @@ class SpringLaw(ABC):
         return (-math.inf, math.inf)
 
     @property
+    def pulls_only(self) -> bool:
+        """Whether it is a tendon, which goes slack at zero deflection instead of pushing."""
+        return False
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know about how the law was made."""
+        return ()
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether the stiffness is the same at every deflection."""
+        return False
+
+    @property
     def hardening_peak(self) -> tuple[float, float]:
-        """Torques between which the relative hardening zeta/sigma still increases with the torque."""
+        """Torques between which the relative hardening zeta/sigma surely increases with the torque."""
         return (-math.inf, math.inf)
+
+    def as_second(self) -> SpringLaw:
+        """The law as it acts on side 2, where a tendon pulls the other way."""
+        return self
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:  # noqa: ARG002
         """The pair of this law (side 1) with another (side 2), if (14) has a closed solution for them."""
@@ -68,6 +88,10 @@ class SpringLaw(ABC):
     @abstractmethod
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Curvature eta = dzeta/dphi, (66)."""
+
+    @abstractmethod
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Elastic energy stored from zero deflection on, J."""
 
     @abstractmethod
     def deflection(self, torque: FloatArray) -> FloatArray:

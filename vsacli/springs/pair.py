@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import NamedTuple
 
+import numpy as np
+
 from vsacli.arrays import BoolArray, FloatArray
 
 
@@ -16,6 +18,7 @@ class PairSolution(NamedTuple):
         upper: largest reachable stiffness; +inf where nothing bounds it.
         lower_critical: whether `lower` is a critical point, where A is singular (else the end of a domain).
         upper_critical: the same for `upper`.
+        slack_below: whether a side that only pulls goes slack below `lower`.
         phi_1: deflection of side 1 for the stiffness clipped into [lower, upper], rad (m).
         phi_2: deflection of side 2.
     """
@@ -24,6 +27,7 @@ class PairSolution(NamedTuple):
     upper: FloatArray
     lower_critical: BoolArray
     upper_critical: BoolArray
+    slack_below: BoolArray
     phi_1: FloatArray
     phi_2: FloatArray
 
@@ -48,3 +52,17 @@ class Pair(ABC):
             tau_e: elastic torque, (samples,), N m (N).
             stiffness: demanded joint stiffness, (samples,), N m/rad (N/m).
         """
+
+
+def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> PairSolution:
+    """Solution of two tendons: slack below, unbounded above, singular nowhere."""
+    never = np.zeros(lower.shape, dtype=bool)
+    return PairSolution(
+        lower=lower,
+        upper=np.full_like(lower, np.inf),
+        lower_critical=never,
+        upper_critical=never,
+        slack_below=~never,
+        phi_1=phi_1,
+        phi_2=phi_2,
+    )

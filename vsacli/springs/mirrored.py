@@ -1,0 +1,68 @@
+"""A law turned around, as a tendon acts on side 2."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from vsacli.arrays import FloatArray
+from vsacli.springs.law import SpringLaw
+
+
+@dataclass(frozen=True)
+class Mirrored(SpringLaw):
+    """tau(phi) = -law.tau(-phi)."""
+
+    law: SpringLaw = field(kw_only=True)
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """The law's domain, turned around."""
+        return _turned(self.law.domain)
+
+    @property
+    def torque_range(self) -> tuple[float, float]:
+        """The law's range, turned around."""
+        return _turned(self.law.torque_range)
+
+    @property
+    def pulls_only(self) -> bool:
+        """As the law."""
+        return self.law.pulls_only
+
+    @property
+    def hardening_peak(self) -> tuple[float, float]:
+        """The law's, turned around."""
+        return _turned(self.law.hardening_peak)
+
+    def hardening(self, phi: FloatArray) -> FloatArray:
+        """Odd in the deflection."""
+        return -self.law.hardening(-phi)
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Odd in the deflection."""
+        return -self.law.torque(-phi)
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Even in the deflection."""
+        return self.law.stiffness(-phi)
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Odd in the deflection."""
+        return -self.law.slope(-phi)
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Even in the deflection."""
+        return self.law.curvature(-phi)
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Even in the deflection."""
+        return self.law.energy(-phi)
+
+    def deflection(self, torque: FloatArray) -> FloatArray:
+        """Odd in the torque."""
+        return -self.law.deflection(-torque)
+
+
+def _turned(interval: tuple[float, float]) -> tuple[float, float]:
+    low, high = interval
+    return -high, -low

@@ -1,0 +1,155 @@
+"""A spring given by its measured torque-deflection curve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vsacli.arrays import FloatArray
+from vsacli.errors import InputError, Problem
+from vsacli.spec.fields import TableFile, value
+from vsacli.spec.table import Table, line_of
+from vsacli.springs.inversion import inverse
+from vsacli.springs.law import SpringLaw
+from vsacli.springs.measured import MeasuredCurve, fit_curve
+from vsacli.springs.mirrored import Mirrored
+
+LEAST_ROWS = 6
+SHAPE_TOLERANCE = 1e-3
+"""Share of the torque range by which measurement noise may hide the shape: a point above its chord, say."""
+
+HARDENING_NODES = 400
+"""Deflections at which the hardening of a measured curve is looked at, on either side of zero."""
+
+
+@dataclass(frozen=True)
+class MeasuredSpring(SpringLaw):
+    """Torques measured over deflections, fitted as `springs.measured` says; no extrapolation.
+
+    A table that begins at zero deflection is a spring that only pulls.
+    """
+
+    file: Table = value(
+        TableFile(("deflection", "torque")),
+        "CSV file with the header deflection,torque in rad,N m (m,N), path relative to the robot file",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        problems = list(_problems(self.file))
+        if problems:
+            raise InputError(problems)
+
+    @cached_property
+    def _curve(self) -> MeasuredCurve:
+        return fit_curve(*self.file.values.T)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How well the curve fits."""
+        share = 100 * self._curve.residual / np.ptp(self.file.values[:, 1])
+        misfit = f"{self._curve.residual:.2g} ({share:.2g} % of its range)"
+        return (f"the curve through {self.file.source.path} misses a measured torque by up to {misfit}",)
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """The measured range."""
+        return float(self.file.values[0, 0]), float(self.file.values[-1, 0])
+
+    @cached_property
+    def torque_range(self) -> tuple[float, float]:
+        """Fitted torques at the ends of the measured range."""
+        low, high = self.torque(np.array(self.domain))
+        return float(low), float(high)
+
+    @property
+    def pulls_only(self) -> bool:
+        """Whether the table begins at zero deflection."""
+        return self.domain[0] == 0
+
+    @cached_property
+    def hardening_peak(self) -> tuple[float, float]:
+        """Where the hardening of the curve first decreases, on either side."""
+        low, high = (self._peak(end) for end in self.domain)
+        return -low, high
+
+    def _peak(self, end: float) -> float:
+        phi = end * np.arange(1, HARDENING_NODES + 1) / HARDENING_NODES
+        falling = np.diff(np.abs(self.hardening(phi))) < 0 if end else np.zeros(1, dtype=bool)
+        return float(np.abs(self.torque(phi[falling.argmax()]))) if falling.any() else math.inf
+
+    def as_second(self) -> SpringLaw:
+        """Turned around if it only pulls."""
+        return Mirrored(law=self) if self.pulls_only else self
+
+    def hardening(self, phi: FloatArray) -> FloatArray:
+        """Relative hardening, infinite where a spring without stiffness at rest goes slack."""
+        stiffness = self.stiffness(phi)
+        return np.divide(
+            self.slope(phi), stiffness, out=np.full_like(stiffness, np.inf), where=stiffness != 0
+        )
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Torque of the fitted curve."""
+        return np.asarray(self._curve.torque(phi))
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Stiffness of the fitted curve."""
+        return np.asarray(self._curve.stiffness(phi))
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Slope of the fitted curve."""
+        return np.asarray(self._curve.slope(phi))
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Curvature of the fitted curve."""
+        return np.asarray(self._curve.curvature(phi))
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Energy of the fitted curve."""
+        return np.asarray(self._curve.energy(phi))
+
+    def deflection(self, torque: FloatArray) -> FloatArray:
+        """Inverse by safeguarded iteration within the measured range."""
+        low, high = (np.full_like(torque, end) for end in self.domain)
+        return inverse(self, np.clip(torque, *self.torque_range), low, high)
+
+
+def _problems(table: Table) -> Iterator[Problem]:
+    """Why the rows are no hardening spring, with the lines."""
+    deflection, torque = table.values.T
+    path = table.source.path
+
+    def at(row: int, message: str) -> Problem:
+        return Problem(path, line_of(row), message)
+
+    if len(deflection) < LEAST_ROWS:
+        yield Problem(path, 0, f"expected at least {LEAST_ROWS} rows, found {len(deflection)}")
+    elif not deflection[0] <= 0 < deflection[-1]:
+        yield at(0, "the deflections must go from zero (a spring that only pulls) or below to above zero")
+    elif (steps := np.flatnonzero(np.diff(deflection) <= 0)).size:
+        yield at(steps[0] + 1, "the deflection does not increase from the row before")
+    elif (steps := np.flatnonzero(np.diff(torque) <= 0)).size:
+        yield at(steps[0] + 1, "the torque does not increase from the row before, as a spring's does")
+    elif (offset := abs(np.interp(0, deflection, torque))) > 10 * SHAPE_TOLERANCE * np.ptp(torque):
+        yield Problem(
+            path, 0, f"the torque at zero deflection is {offset:.4g}, expected zero; remove the offset"
+        )
+    else:
+        yield from (at(row, message) for row, message in _wrong_bends(deflection, torque))
+
+
+def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
+    """Rows where the torque is not convex for positive, or not concave for negative deflections."""
+    left, middle, right = deflection[:-2], deflection[1:-1], deflection[2:]
+    share = (middle - left) / (right - left)
+    above_chord = torque[1:-1] - ((1 - share) * torque[:-2] + share * torque[2:])
+    tolerance = SHAPE_TOLERANCE * np.ptp(torque)
+    for row in np.flatnonzero((left >= 0) & (above_chord > tolerance)) + 1:
+        yield int(row), "the torque is not convex here, so the spring would not harden with the deflection"
+    for row in np.flatnonzero((right <= 0) & (above_chord < -tolerance)) + 1:
+        yield int(row), "the torque is not concave here, so the spring would not harden with the deflection"
