@@ -13,7 +13,8 @@ from oracles.lagrange import chain_of
 from robots import MotionArrays, almost_square_robot, random_motion, random_robot, robot_of_ones, vsa_3r
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
-from vsacli.newton_euler import JointState, link_constants, link_torques, recursion
+from vsacli.newton_euler import link_constants, link_torques
+from vsacli.recursion import JointState, recursion
 from vsacli.robot import Joint, Robot
 from vsacli.vector import Vector
 

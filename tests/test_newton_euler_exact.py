@@ -15,8 +15,8 @@ from oracles.lagrange import Chain, Link, State
 from oracles.mutants import Mutant, mutants_of
 from oracles.rational import random_chain
 
-from vsacli import newton_euler
-from vsacli.newton_euler import JointState, LinkConstants, recursion
+from vsacli import recursion as recursion_module
+from vsacli.recursion import JointState, LinkConstants, recursion
 from vsacli.vector import SymmetricTensor, Vector
 
 type_chains = pytest.mark.parametrize("types", ["R", "P", "RR", "RP", "PR", "PP", "RPR", "RRP"])
@@ -26,7 +26,7 @@ Recursion = Callable[..., Sequence[tuple[Scalar, Scalar, Scalar]]]
 RICHEST_CHAIN = ("RPR", 1)
 """Type and seed of a chain in which every term of every equation is at work."""
 
-MUTANTS = mutants_of(newton_euler, "recursion")
+MUTANTS = mutants_of(recursion_module, "recursion")
 
 
 def link_constants(link: Link) -> LinkConstants:
