@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.feasibility import has, limit_checks, limit_flags, reach_flags
+from vsacli.feasibility import NEAR_SINGULAR, has, limit_checks, limit_flags, reach_flags
 from vsacli.flags import Flag
 from vsacli.robot import Antagonistic, Joint
 from vsacli.springs import PairSolution, make_pair
@@ -57,20 +57,29 @@ class _Springs(NamedTuple):
     eta: FloatArray
 
 
-def drive(joint: Joint, command: Command) -> Drive:
+def drive(
+    joint: Joint,
+    command: Command,
+    near_singular: float = NEAR_SINGULAR,
+    followed: FloatArray | None = None,
+) -> Drive:
     """Motor motion and motor torques of an antagonistic joint, (61)-(74).
 
     Args:
         joint: the joint with its two motors and springs.
         command: commanded motion and stiffness, and the elastic torque with its two derivatives.
+        near_singular: margin below which a step is near-singular.
+        followed: deflections to use instead of the root of (14), (2, samples); a step where they are NaN is
+            infeasible.
     """
     solution = solve_deflections(joint.actuator, command.tau_e, command.stiffness)
-    flags = reach_flags(command.stiffness, solution)
-    phi = np.stack((solution.phi_1, solution.phi_2))  # (61)
+    flags = reach_flags(command.stiffness, solution, near_singular)
+    phi = solution.deflections if followed is None else followed.copy()  # (61)
+    flags[np.isnan(phi[0])] |= np.uint16(Flag.INFEASIBLE)
     phi[:, has(flags, Flag.INFEASIBLE)] = np.nan
     springs = _springs(joint.actuator, phi)
 
-    det_a = springs.sigma[0] * springs.zeta[1] - springs.sigma[1] * springs.zeta[0]  # (67)
+    det_a = _determinant(springs)
     divisor = np.where(has(flags, Flag.SINGULAR), np.nan, det_a)
     dphi = _solve(springs, divisor, command.dtau_e, command.dstiffness)  # (68)
     dtheta = dphi + command.dq  # (69)
@@ -98,26 +107,47 @@ def drive(joint: Joint, command: Command) -> Drive:
 
 def solve_deflections(actuator: Antagonistic, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
     """Solve (14) on the branch that the actuator's preload names."""
-    first, second = actuator.spring
+    first, second = actuator.laws
     if actuator.preload == "negative":
         return make_pair(second, first).solve(tau_e, stiffness).mirrored()
     return make_pair(first, second).solve(tau_e, stiffness)
 
 
+def deflection_rates(
+    actuator: Antagonistic, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray
+) -> FloatArray:
+    """Rates of the deflections phi, both (2, samples), by (19)-(20)."""
+    springs = _springs(actuator, phi)
+    return _solve(springs, _determinant(springs), dtau_e, dstiffness)
+
+
+def decoupling_determinant(actuator: Antagonistic, phi: FloatArray) -> FloatArray:
+    """Determinant of A at deflections (2, samples), (67)."""
+    return _determinant(_springs(actuator, phi))
+
+
 def other_preload_would_do(actuator: Antagonistic, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
     """Where the branch with the opposite preload reaches the stiffness."""
+    if any(law.pulls_only for law in actuator.laws):
+        return np.zeros(tau_e.shape, dtype=bool)
     opposite = replace(actuator, preload="negative" if actuator.preload == "positive" else "positive")
     return ~has(reach_flags(stiffness, solve_deflections(opposite, tau_e, stiffness)), Flag.INFEASIBLE)
 
 
 def _springs(actuator: Antagonistic, phi: FloatArray) -> _Springs:
-    sides = list(zip(actuator.spring, phi, strict=True))
+    sides = list(zip(actuator.laws, phi, strict=True))
     return _Springs(
         tau=np.stack([law.torque(deflection) for law, deflection in sides]),  # (62)
         sigma=np.stack([law.stiffness(deflection) for law, deflection in sides]),  # (63)
         zeta=np.stack([law.slope(deflection) for law, deflection in sides]),  # (64)
         eta=np.stack([law.curvature(deflection) for law, deflection in sides]),  # (66)
     )
+
+
+def _determinant(springs: _Springs) -> FloatArray:
+    (sigma_1, sigma_2), (zeta_1, zeta_2) = springs.sigma, springs.zeta
+    determinant: FloatArray = sigma_1 * zeta_2 - sigma_2 * zeta_1  # (67)
+    return determinant
 
 
 def _beta(springs: _Springs, dphi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.errors import InputError
 from vsacli.flags import Flag
 from vsacli.robot import Joint
 from vsacli.springs import PairSolution
@@ -15,7 +16,7 @@ TOUCHING = 1e-9
 """Relative margin that counts as zero: deflections are good to about 1e-16/margin, so to 1e-7 at this one."""
 
 NEAR_SINGULAR = 0.01
-"""Relative margin to a critical point below which a step is near-singular; the paper's runs stay above 3 %."""
+"""Relative margin to a critical point below which a step is near-singular; the paper's runs keep 3 %."""
 
 LIMIT_ROUNDING = 1e-9
 """Relative excess over a limit that is none, so that a motion may run along its limit."""
@@ -26,15 +27,31 @@ def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> Float
     return np.minimum(stiffness - lower, upper - stiffness) / stiffness
 
 
-def reach_flags(stiffness: FloatArray, solution: PairSolution) -> FlagArray:
-    """Bits INFEASIBLE, SINGULAR and NEAR_SINGULAR of the steps of a joint, (samples,)."""
+def check_near_singular(threshold: float) -> None:
+    """Refuse a threshold for near-singular steps that no margin can be compared with.
+
+    Raises:
+        InputError: it is not above `TOUCHING` and below 1.
+    """
+    if not TOUCHING < threshold < 1:
+        raise InputError.one(
+            f"the near-singular margin must lie between {TOUCHING:g} and 1, as 0.01 does, not {threshold:g}"
+        )
+
+
+def reach_flags(
+    stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR
+) -> FlagArray:
+    """Bits INFEASIBLE, SINGULAR and NEAR_SINGULAR (below that margin) of the steps of a joint, (samples,)."""
     gap = margin(stiffness, solution.lower, solution.upper)
     at_lower = stiffness - solution.lower <= solution.upper - stiffness
     critical = np.where(at_lower, solution.lower_critical, solution.upper_critical)
+    infeasible = ~(gap >= -TOUCHING)
     return (
-        _bit(Flag.INFEASIBLE, ~(gap >= -TOUCHING))
+        _bit(Flag.INFEASIBLE, infeasible)
+        | _bit(Flag.SLACK, infeasible & at_lower & solution.slack_below)
         | _bit(Flag.SINGULAR, critical & (np.abs(gap) <= TOUCHING))
-        | _bit(Flag.NEAR_SINGULAR, critical & (gap > TOUCHING) & (gap < NEAR_SINGULAR))
+        | _bit(Flag.NEAR_SINGULAR, critical & (gap > TOUCHING) & (gap < near_singular))
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from vsacli.flags import LIMITS, Flag
+from vsacli.following import Stop
 from vsacli.self_check import LADDER_BOUND, SelfCheck
 
 FORMAT = "vsacli-report/1"
@@ -98,6 +99,35 @@ class JointReport:
 
 
 @dataclass(frozen=True)
+class JointDrift:
+    """What became of the followed deflections of a joint.
+
+    Attributes:
+        joint: its name.
+        largest: largest distance of a deflection from the root of (14), NaN if no step was followed.
+        time: when, s.
+        unit: of the distance.
+        stop: from when on they could not be followed, and why.
+    """
+
+    joint: str
+    largest: float
+    time: float
+    unit: str
+    stop: Stop | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values under the published keys."""
+        return {
+            "joint": self.joint,
+            "drift": self.largest,
+            "time": self.time,
+            "unit": self.unit,
+            "stopped": None if self.stop is None else {"time": self.stop.time, "reason": self.stop.reason},
+        }
+
+
+@dataclass(frozen=True)
 class Report:
     """The verdict on a run.
 
@@ -110,6 +140,7 @@ class Report:
         warnings: what the user should know of the inputs.
         self_check: outcome of the self-check.
         joints: one report a joint.
+        drifts: one a joint if the deflections were followed by integration, else none.
     """
 
     robot: str
@@ -120,6 +151,7 @@ class Report:
     self_check: SelfCheck
     joints: tuple[JointReport, ...]
     warnings: tuple[str, ...] = field(default=())
+    drifts: tuple[JointDrift, ...] = field(default=())
 
     @property
     def verdict(self) -> str:
@@ -132,7 +164,7 @@ class Report:
     def as_json(self) -> dict[str, Any]:
         """Plain values for `json.dumps`; numbers that are not finite become None."""
         check = self.self_check
-        plain: dict[str, Any] = _finite(
+        plain: dict[str, Any] = finite(
             {
                 "format": FORMAT,
                 "verdict": self.verdict,
@@ -148,17 +180,24 @@ class Report:
                     "ladder": check.ladder,
                     "bound": LADDER_BOUND,
                 },
+                "deflections": self._deflections(),
                 "joints": [joint.as_json() for joint in self.joints],
             }
         )
         return plain
 
+    def _deflections(self) -> dict[str, Any]:
+        if not self.drifts:
+            return {"method": "root"}
+        return {"method": "integrate", "joints": [drift.as_json() for drift in self.drifts]}
 
-def _finite(content: Any) -> Any:
+
+def finite(content: Any) -> Any:
+    """The same plain values, with None for numbers that are not finite, which JSON does not have."""
     if isinstance(content, dict):
-        return {key: _finite(entry) for key, entry in content.items()}
+        return {key: finite(entry) for key, entry in content.items()}
     if isinstance(content, list):
-        return [_finite(entry) for entry in content]
+        return [finite(entry) for entry in content]
     if isinstance(content, float) and not math.isfinite(content):
         return None
     return content

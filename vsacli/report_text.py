@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from vsacli.flags import Flag
-from vsacli.report import JointReport, Report, Worst
-from vsacli.self_check import LADDER_BOUND, SPRING_BOUND
+from vsacli.report import JointDrift, JointReport, Report, Worst
+from vsacli.self_check import LADDER_BOUND
 from vsacli.units import POSITION, TORQUE
 
 WIDTH = 78
+JOINTS_PER_LINE = 3
 
 QUANTITY_OF_LIMIT = {
     Flag.POSITION_LIMIT.label: "position",
     Flag.VELOCITY_LIMIT.label: "velocity",
     Flag.STIFFNESS_LIMIT.label: "stiffness",
-    Flag.DEFLECTION_LIMIT.label: "deflection",
-    Flag.MOTOR_VELOCITY_LIMIT.label: "velocity",
-    Flag.MOTOR_TORQUE_LIMIT.label: "torque",
+    Flag.DEFLECTION_LIMIT.label: "deflection of spring",
+    Flag.MOTOR_VELOCITY_LIMIT.label: "velocity of motor",
+    Flag.MOTOR_TORQUE_LIMIT.label: "torque of motor",
 }
 
 TROUBLE = ("infeasible", "singular", "over_limit")
@@ -33,7 +34,9 @@ def render(report: Report) -> str:
             *_table(report),
             *(f"warning: {warning}" for warning in report.warnings),
             *(sentence for joint in report.joints for sentence in sentences(joint)),
+            *_stops(report),
             *_start(report),
+            *_drift(report),
             _self_check(report),
         ]
     )
@@ -46,8 +49,7 @@ def sentences(joint: JointReport) -> Iterator[str]:
 
 
 def _headline(report: Report) -> str:
-    steps = f"{report.samples} steps" if report.samples != 1 else "1 step"
-    left = f"{report.robot}, {report.trajectory}: {steps}, {report.duration:g} s"
+    left = f"{report.robot}, {report.trajectory}: {_count(report.samples)}, {report.duration:g} s"
     if not report.complete:
         left += " planned, stopped early"
     return f"{left:<{WIDTH - 32}} {_verdict(report):>31}".rstrip()
@@ -83,7 +85,7 @@ def _row(joint: JointReport) -> tuple[str, ...]:
         f"{motors} {torque}",
         _span(*joint.stiffness),
         _corridor(*joint.reachable),
-        "none" if math.isnan(joint.margin) else f"{100 * joint.margin:.2f} %",
+        _percent(joint.margin),
     )
 
 
@@ -102,47 +104,79 @@ def _number(value: float) -> str:
     return "-" if math.isnan(value) else f"{value:.1f}" if abs(value) >= 10 else f"{value:.3g}"
 
 
+def _percent(share: float) -> str:
+    """Two decimals, or one digit of what is smaller."""
+    if math.isnan(share):
+        return "none"
+    return f"{100 * share:.2f} %" if abs(share) >= 1e-4 or share == 0 else f"{100 * share:.1g} %"
+
+
+def _apart(value: float, bound: float) -> tuple[str, str]:
+    """Both with as many digits as it takes to see how far they are apart, at least four."""
+    for digits in range(4, 17):
+        shown = f"{value:.{digits}g}", f"{bound:.{digits}g}"
+        if math.isclose(float(shown[0]) - float(shown[1]), value - bound, rel_tol=0.1):
+            return shown
+    return repr(value), repr(bound)
+
+
+def _time(time: float) -> str:
+    """Milliseconds, or microseconds where steps are that short."""
+    return f"{time:.3f} s" if abs(time - round(time, 3)) < 5e-7 else f"{time:.6f} s"
+
+
+def _count(steps: int) -> str:
+    return f"{steps} step" if steps == 1 else f"{steps} steps"
+
+
 def _steps(joint: JointReport, kind: str) -> str:
     count = joint.steps[kind]
-    return f"{count} step{'s' if count > 1 else ''}, from {joint.first_time[kind]:.3f} s"
+    return _count(count) if count == 1 else f"{_count(count)}, from {_time(joint.first_time[kind])}"
 
 
 def _infeasible(joint: JointReport, worst: Worst) -> str:
-    when = f"at t = {worst.time:.3f} s"
-    hint = "; with the opposite preload it would be reachable" if joint.other_preload else ""
     steps = _steps(joint, "infeasible")
+    slack = f"; a tendon goes slack at {_count(joint.steps['slack'])}" if joint.steps["slack"] else ""
+    preload = "; the opposite preload would reach it" if joint.other_preload else ""
+    hints = f"({steps}){slack}{preload}"
     if math.isnan(worst.bound):
-        return f"its springs cannot carry the elastic torque {when} at any stiffness ({steps}){hint}"
-    relation = "below" if worst.value < worst.bound else "above"
+        return (
+            f"its springs cannot carry the elastic torque at t = {_time(worst.time)} at any stiffness {hints}"
+        )
+    value, bound = _apart(worst.value, worst.bound)
+    relation, remedy = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
     return (
-        f"stiffness {worst.value:g} {worst.unit} {when} is {relation} the {worst.bound:.6g} "
-        f"its load allows ({steps}){hint}"
+        f"stiffness {value} {worst.unit} at t = {_time(worst.time)} is {relation} the {bound} "
+        f"its load allows, {remedy} it {hints}"
     )
 
 
 def _singular(joint: JointReport, worst: Worst) -> str:
+    remedy = "raise" if worst.value <= worst.bound else "lower"
     return (
-        f"stiffness {worst.value:g} {worst.unit} at t = {worst.time:.3f} s touches the end of its corridor, "
-        f"where motor torques are undefined ({_steps(joint, 'singular')})"
+        f"stiffness {worst.value:.6g} {worst.unit} at t = {_time(worst.time)} is singular: "
+        f"motor torques are undefined at the end of its range, {remedy} it ({_steps(joint, 'singular')})"
     )
 
 
 def _near_singular(joint: JointReport, worst: Worst) -> str:
-    gap = 100 * abs(worst.value - worst.bound) / worst.value
+    gap = abs(worst.value - worst.bound) / worst.value
     return (
-        f"warning: stiffness {worst.value:g} {worst.unit} at t = {worst.time:.3f} s is within "
-        f"{gap:.2g} % of the singular value {worst.bound:.6g}, "
-        f"near which motor torques grow without bound ({_steps(joint, 'near_singular')})"
+        f"warning: stiffness {worst.value:.6g} {worst.unit} at t = {_time(worst.time)} is {100 * gap:.2g} % "
+        f"from singular, where motor torques grow without bound ({_steps(joint, 'near_singular')})"
     )
 
 
 def _limit(joint: JointReport, worst: Worst) -> str:
-    quantity = QUANTITY_OF_LIMIT[worst.kind]
-    whose = quantity if worst.motor is None else f"{quantity} of motor {worst.motor}"
+    whose = QUANTITY_OF_LIMIT[worst.kind]
+    if worst.motor is not None:
+        whose += f" {worst.motor}"
+    value, bound = _apart(worst.value, worst.bound)
     relation = "below" if worst.value < worst.bound else "above"
+    first = joint.first_time[worst.kind]
     return (
-        f"{whose} {worst.value:.6g} {worst.unit} at t = {worst.time:.3f} s is {relation} its limit "
-        f"{worst.bound:g} (first at {joint.first_time[worst.kind]:.3f} s)"
+        f"{whose} is {value} {worst.unit} at t = {_time(worst.time)}, {relation} its limit {bound} "
+        f"(first at {_time(first)})"
     )
 
 
@@ -150,25 +184,53 @@ _SENTENCES = {"infeasible": _infeasible, "singular": _singular, "near_singular":
 
 
 def _start(report: Report) -> Iterator[str]:
-    known = [joint for joint in report.joints if not any(map(math.isnan, joint.start_theta))]
-    if not known:
-        return
-    places = ", ".join(
-        f"{joint.name} {joint.start_theta[0]:+.4g} {joint.start_theta[1]:+.4g} {POSITION.unit(joint.type)}"
-        for joint in known
-    )
-    yield f"start motors at: {places}"
-    steps = [joint for joint in known if not math.isnan(max(joint.torque_step))]
+    yield _by_joint("start motors at: ", [_start_of(joint) for joint in report.joints])
+    steps = [joint for joint in report.joints if not math.isnan(max(joint.torque_step))]
     if steps:
         joint = max(steps, key=lambda each: max(each.torque_step))
         yield f"torque step at start: {max(joint.torque_step):.3g} {TORQUE.unit(joint.type)} ({joint.name})"
 
 
+def _start_of(joint: JointReport) -> str:
+    if any(map(math.isnan, joint.start_theta)):
+        return f"{joint.name} undefined (first step infeasible)"
+    first, second = joint.start_theta
+    return f"{joint.name} {first:+.4g} {second:+.4g} {POSITION.unit(joint.type)}"
+
+
+def _stops(report: Report) -> Iterator[str]:
+    for joint, drift in zip(report.joints, report.drifts, strict=False):
+        if drift.stop is not None:
+            steps = f"infeasible: {_count(joint.steps['infeasible'])}"
+            time, reason = _time(drift.stop.time), drift.stop.reason
+            yield f"{joint.name}: its deflections cannot be followed beyond t = {time}: {reason} ({steps})"
+
+
+def _drift(report: Report) -> Iterator[str]:
+    if report.drifts:
+        yield _by_joint("drift of the integration: ", [_drift_of(drift) for drift in report.drifts])
+
+
+def _drift_of(drift: JointDrift) -> str:
+    if math.isnan(drift.largest):
+        return f"{drift.joint} none (no step followed)"
+    return f"{drift.joint} {drift.largest:.1e} {drift.unit} at {_time(drift.time)}"
+
+
+def _by_joint(label: str, entries: Sequence[str]) -> str:
+    """What is to be said of each joint, a few to a line."""
+    lines = [
+        ", ".join(entries[first : first + JOINTS_PER_LINE])
+        for first in range(0, len(entries), JOINTS_PER_LINE)
+    ]
+    return label + (",\n" + " " * len(label)).join(lines)
+
+
 def _self_check(report: Report) -> str:
     check = report.self_check
     if check.passed:
-        return f"self-check passed ({check.ladder:.0e}, bound {LADDER_BOUND:.0e})"
+        return f"self-check passed ({check.ladder:.1g}, bound {LADDER_BOUND:.0e})"
     return (
         f"SELF-CHECK FAILED: derivatives are off by {check.ladder:.1e} (bound {LADDER_BOUND:.0e}), "
-        f"springs by {check.spring_residual:.1e} (bound {SPRING_BOUND:.0e}); do not use these torques"
+        f"springs by {check.spring_residual:.1e} (bound {check.spring_bound:.0e}); do not use these torques"
     )

@@ -9,8 +9,7 @@ import numpy as np
 
 from vsacli.actuation import other_preload_would_do
 from vsacli.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.feasibility import excess, has, limit_checks, margin
-from vsacli.flags import Flag
+from vsacli.feasibility import TOUCHING, excess, has, limit_checks, margin
 from vsacli.report import COUNTED, JointReport, Worst
 from vsacli.robot import Joint
 from vsacli.variables import VARIABLES, Block
@@ -52,9 +51,9 @@ class JointTally:
         self._stiffness = min(self._stiffness[0], stiffness.min()), max(self._stiffness[1], stiffness.max())
         peaks = np.abs(block.tau_e[:, index]), *np.abs(block.tau_motor[:, index]).T
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(values) for values in peaks])
-        infeasible = has(flags, Flag.INFEASIBLE)
-        if self._other_preload and infeasible.any():
-            demand = block.tau_e[infeasible, index], stiffness[infeasible]
+        beyond = gap < -TOUCHING
+        if self._other_preload and beyond.any():
+            demand = block.tau_e[beyond, index], stiffness[beyond]
             self._other_preload = bool(other_preload_would_do(self._joint.actuator, *demand).all())
 
     def report(self) -> JointReport:
@@ -77,7 +76,7 @@ class JointTally:
             peak_tau_motor=(peak_1, peak_2),
             start_theta=(theta_1, theta_2),
             torque_step=(step_1, step_2),
-            other_preload=self._steps["infeasible"] > 0 and self._other_preload,
+            other_preload="infeasible" in self._worst and self._other_preload,
         )
 
     def _count(self, flags: FlagArray, time: FloatArray) -> None:
@@ -99,8 +98,11 @@ class JointTally:
             )
 
     def _record_reach(self, flags: FlagArray, gap: FloatArray, block: Block) -> None:
+        """Followed deflections may end inside the corridor; such a step is infeasible, but has no worst."""
+        beyond = gap < -TOUCHING
         for kind, bits in REACH.items():
-            for step in _worst_step(has(flags, bits), -gap):
+            hit = has(flags, bits) & (beyond if kind == "infeasible" else ~beyond)
+            for step in _worst_step(hit, -gap):
                 value, lower, upper = (
                     float(getattr(block, name)[step, self._index])
                     for name in ("stiffness", "stiffness_lower", "stiffness_upper")
@@ -120,7 +122,8 @@ class JointTally:
                 value, (lower, upper) = float(values[step]), check.range
                 bound = lower if value < lower else upper
                 unit = VARIABLES[check.variable].quantity.unit(self._joint.type)
-                self._first_time.setdefault(label, float(block.time[hit.argmax()]))
+                first = float(block.time[hit.argmax()])
+                self._first_time[label] = min(first, self._first_time.get(label, first))  # either motor
                 self._keep(over[step], Worst(label, float(block.time[step]), value, bound, unit, check.motor))
 
     def _keep(self, badness: float, worst: Worst) -> None:

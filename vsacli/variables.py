@@ -10,11 +10,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy.typing as npt
+
 from vsacli import units
 from vsacli.arrays import FlagArray, FloatArray
-from vsacli.errors import InputError
+from vsacli.errors import InputError, Problem
 from vsacli.suggestions import did_you_mean
 from vsacli.units import Quantity
+from vsacli.wrench import wrench_columns
 
 MOTORS = (1, 2)
 
@@ -25,8 +28,8 @@ class Variable:
 
     Attributes:
         name: as in the file and in Python.
-        dims: dimensions after `time`: () , ("joint",) or ("joint", "motor").
-        quantity: unit at revolute and prismatic joints.
+        dims: dimensions after `time`: (), ("joint",), ("joint", "motor") or ("wrench_axis",).
+        quantity: unit at revolute and prismatic joints, or of moments and forces.
         long_name: a few words.
         equation: number in Buondonno & De Luca (2016), or where the value comes from.
     """
@@ -38,10 +41,15 @@ class Variable:
     equation: str
 
 
-def _variable(dims: tuple[str, ...], quantity: Quantity, long_name: str, equation: str) -> Any:
-    return dataclasses.field(
-        kw_only=True, metadata={"dims": dims, "quantity": quantity, "long_name": long_name, "equation": equation}
-    )
+def _variable(
+    dims: tuple[str, ...],
+    quantity: Quantity,
+    long_name: str,
+    equation: str,
+    default: Any = dataclasses.MISSING,
+) -> Any:
+    metadata = {"dims": dims, "quantity": quantity, "long_name": long_name, "equation": equation}
+    return dataclasses.field(default=default, kw_only=True, metadata=metadata)
 
 
 def _of_joint(quantity: Quantity, long_name: str, equation: str) -> Any:
@@ -52,11 +60,16 @@ def _of_motor(quantity: Quantity, long_name: str, equation: str) -> Any:
     return _variable(("joint", "motor"), quantity, long_name, equation)
 
 
+def _of_wrench(quantity: Quantity, long_name: str) -> Any:
+    return _variable(("wrench_axis",), quantity, long_name, "given", default=None)
+
+
 @dataclass(frozen=True)
 class Block:
     """Every variable over a block of consecutive steps; shapes (samples, joints) or (samples, joints, 2).
 
-    A value that cannot be computed is NaN, and `flags` says why.
+    A value that cannot be computed is NaN, and `flags` says why. The wrench, (samples, 6), is None if the
+    trajectory has none.
     """
 
     time: FloatArray = _variable((), units.TIME, "time", "given")
@@ -73,15 +86,23 @@ class Block:
         units.STIFFNESS_ACCELERATION, "second derivative of the commanded stiffness", "given"
     )
 
+    wrench: FloatArray | None = _of_wrench(units.WRENCH, "wrench exerted on the end effector")
+    dwrench: FloatArray | None = _of_wrench(units.WRENCH_RATE, "rate of the wrench")
+    ddwrench: FloatArray | None = _of_wrench(units.WRENCH_ACCELERATION, "second derivative of the wrench")
+
     tau_e: FloatArray = _of_joint(units.TORQUE, "total elastic torque", "(58)")
     dtau_e: FloatArray = _of_joint(units.TORQUE_RATE, "rate of the elastic torque", "(59)")
-    ddtau_e: FloatArray = _of_joint(units.TORQUE_ACCELERATION, "second derivative of the elastic torque", "(60)")
+    ddtau_e: FloatArray = _of_joint(
+        units.TORQUE_ACCELERATION, "second derivative of the elastic torque", "(60)"
+    )
 
     phi: FloatArray = _of_motor(units.POSITION, "deflection theta - q of each transmission", "(61)")
     dphi: FloatArray = _of_motor(units.VELOCITY, "deflection rate", "(68)")
     theta: FloatArray = _of_motor(units.POSITION, "motor position, joint side of the gear", "(69)")
     dtheta: FloatArray = _of_motor(units.VELOCITY, "motor velocity, joint side of the gear", "(69)")
-    ddtheta: FloatArray = _of_motor(units.JOINT_ACCELERATION, "motor acceleration, joint side of the gear", "(72)")
+    ddtheta: FloatArray = _of_motor(
+        units.JOINT_ACCELERATION, "motor acceleration, joint side of the gear", "(72)"
+    )
     tau_spring: FloatArray = _of_motor(units.TORQUE, "torque of each transmission", "(62)")
     tau_motor: FloatArray = _of_motor(units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)")
 
@@ -94,7 +115,13 @@ class Block:
     stiffness_upper: FloatArray = _of_joint(
         units.STIFFNESS, "largest stiffness reachable at this elastic torque on the joint's branch", "(14)"
     )
-    flags: FlagArray = _of_joint(units.DIMENSIONLESS, "what is wrong with this step of the joint", "margins of (14)")
+    flags: FlagArray = _of_joint(
+        units.DIMENSIONLESS, "what is wrong with this step of the joint", "margins of (14)"
+    )
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """The variables there are, by name."""
+        return {name: array for name in VARIABLES if (array := getattr(self, name)) is not None}
 
 
 VARIABLES: dict[str, Variable] = {
@@ -107,16 +134,21 @@ def select_variables(names: Iterable[str]) -> tuple[Variable, ...]:
     """The variables of these names, in declared order, `time` left out.
 
     Raises:
-        InputError: a name that is no variable, with the nearest one that is.
+        InputError: for each name that is no variable, the nearest one that is.
     """
     wanted = set(names)
     unknown = sorted(wanted - set(VARIABLES))
     if unknown:
-        raise InputError.one(f"no variable is called {unknown[0]!r}{did_you_mean(unknown[0], VARIABLES)}")
+        raise InputError(
+            Problem("", 0, f"no variable is called {name!r}{did_you_mean(name, VARIABLES)}")
+            for name in unknown
+        )
     return tuple(variable for name, variable in VARIABLES.items() if name in wanted and variable.dims)
 
 
 def column_names(variable: Variable, joint_names: Iterable[str]) -> list[str]:
     """CSV headers of a variable, in the order of its flattened values, e.g. `elbow.tau_motor_1`."""
+    if "wrench_axis" in variable.dims:
+        return wrench_columns(variable.name)
     endings = [f"_{motor}" for motor in MOTORS] if "motor" in variable.dims else [""]
     return [f"{joint}.{variable.name}{ending}" for joint in joint_names for ending in endings]

@@ -105,14 +105,14 @@ class Chain:
     def _torque(self, i: int, order: int) -> Scalar:
         total = self.links[i].damping * self.states[i].rates[order]
         for link, pose, sensitivity in zip(
-            self.links[i:], self.poses[i:], self._sensitivities(i), strict=True
+            self.links[i:], self.poses[i:], self.sensitivities(i), strict=True
         ):
             j = link.pseudo_inertia
             total = total + leibniz(order, sensitivity, pose[2:], lambda a, b, j=j: _trace(a @ j, b))
             total = total - self._weight(sensitivity[order], link)
         return total
 
-    def _sensitivities(self, i: int) -> list[Derivatives]:
+    def sensitivities(self, i: int) -> list[Derivatives]:
         """Derivatives of dT_k/dq_i for k = i, i + 1, ..."""
         generator = self.links[i].generator
         sensitivity = [generator @ step for step in self.steps[i]]

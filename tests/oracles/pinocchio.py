@@ -6,14 +6,14 @@ import numpy as np
 import pinocchio as pin
 
 from vsacli.arrays import FloatArray
-from vsacli.robot import DenavitHartenberg, Robot
+from vsacli.robot import DenavitHartenberg, Pose, Robot
 
 
 def build(robot: Robot) -> pin.Model:
     """The model of a robot: one Pinocchio joint a row, which moves before the row's constant transform."""
     model = pin.Model()
     model.gravity.linear = np.array(robot.gravity)
-    parent, placement = 0, pin.SE3.Identity()
+    parent, placement = 0, _pose(robot.base)
     for joint in robot.joints:
         kind = pin.JointModelRZ() if joint.type == "revolute" else pin.JointModelPZ()
         parent = model.addJoint(parent, kind, placement, joint.name)
@@ -29,6 +29,23 @@ def torques(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Flo
     data = model.createData()
     rows = [pin.rnea(model, data, *row).copy() for row in zip(q, dq, ddq, strict=True)]
     return np.array(rows) + damping * dq
+
+
+def torques_under_wrench(
+    robot: Robot, motion: tuple[FloatArray, FloatArray, FloatArray], wrench: FloatArray, *, in_base: bool
+) -> FloatArray:
+    """tau_e (samples, joints) at q, dq, ddq while `wrench`, (samples, 6), is exerted on the tool."""
+    model, damping = build(robot), _damping(robot)
+    data = model.createData()
+    tool = _row(robot.joints[-1].dh) * _pose(robot.tool)
+    external = [pin.Force.Zero() for _ in range(model.njoints)]
+    rows = []
+    for q, dq, ddq, components in zip(*motion, wrench, strict=True):
+        pin.forwardKinematics(model, data, q)
+        turn = (data.oMi[model.njoints - 1] * tool).rotation.T if in_base else np.eye(3)
+        external[-1] = tool.act(pin.Force(turn @ components[:3], turn @ components[3:]))
+        rows.append(pin.rnea(model, data, q, dq, ddq, external).copy())
+    return np.array(rows) + damping * motion[1]
 
 
 def torque_rates(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray, d3q: FloatArray) -> FloatArray:
@@ -48,6 +65,10 @@ def _row(dh: DenavitHartenberg) -> pin.SE3:
     about_z = pin.SE3(pin.rpy.rpyToMatrix(0, 0, dh.theta), np.array([0, 0, dh.d]))
     about_x = pin.SE3(pin.rpy.rpyToMatrix(dh.alpha, 0, 0), np.array([dh.a, 0, 0]))
     return about_z * about_x
+
+
+def _pose(pose: Pose) -> pin.SE3:
+    return pin.SE3(pin.rpy.rpyToMatrix(*pose.rpy), np.array(pose.xyz))
 
 
 def _damping(robot: Robot) -> FloatArray:

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from oracles.contact import Contact
 from oracles.lagrange import Chain, Link, State
 
 
@@ -16,6 +17,13 @@ def random_chain(types: str, seed: int) -> Chain:
     links = [_link(rng, letter == "R") for letter in types]
     states = [_state(rng) for _ in types]
     return Chain(links, states, _vector(rng))
+
+
+def random_contact(seed: int, *, in_base: bool) -> Contact:
+    """Force, moment, their derivatives and the point of contact random fractions."""
+    rng = random.Random(seed)
+    force, moment = ([_vector(rng) for _ in range(3)] for _ in range(2))
+    return Contact(force, moment, _vector(rng), in_base)
 
 
 def _link(rng: random.Random, revolute: bool) -> Link:

@@ -1,0 +1,31 @@
+"""The same motion with another stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from vsacli.arrays import FloatArray
+from vsacli.profiles import STIFFNESS
+from vsacli.samples import SampledProfile
+from vsacli.times import RecordedTimes
+from vsacli.trajectory import Trajectory
+
+
+def restiffened(trajectory: Trajectory, changes: Mapping[int, FloatArray]) -> Trajectory:
+    """A trajectory with the same steps, whose stiffness is recorded at them.
+
+    Args:
+        trajectory: what is to be changed.
+        changes: for joints by index what to add to the stiffness, its rate and its second derivative at the
+            steps, (3, steps), N m/rad (N/m) per s^k.
+    """
+    time = trajectory.times.block(0, trajectory.samples)
+    rows = trajectory.stiffness.samples(0, trajectory.samples, time).copy()
+    for joint, change in changes.items():
+        rows[:, joint] += change
+    values, *derivatives = rows
+    stiffness = SampledProfile(signal=STIFFNESS, time=time, values=values, derivatives=tuple(derivatives))
+    name = f"{trajectory.name}-fixed"
+    return Trajectory(
+        RecordedTimes(time), trajectory.position, stiffness, wrench=trajectory.wrench, name=name
+    )
