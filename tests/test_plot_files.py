@@ -14,7 +14,7 @@ from plot_samples import rest_to_rest
 from store_samples import random_block, write_result
 
 from vsacli.errors import StorageError
-from vsacli.plots import FIGURES, FORMATS, check_figures, compare_results, plot_result, save_figures
+from vsacli.plots import FORMATS, check_figures, compare_results, plot_result, save_figures
 from vsacli.store.reader import open_result
 
 
@@ -64,10 +64,16 @@ def test_a_stored_result_is_drawn(tmp_path: Path) -> None:
     with open_result(write_result(tmp_path / "run.h5", random_block(5000, 2))) as result:
         figures = plot_result(result)
         comparison = compare_results([result, result])
-    assert list(figures) == list(FIGURES)
+    assert list(figures) == ["motion", "motor-torque", "elastic-torque"]
     assert comparison.get_suptitle() == "two, motor torques"
 
 
 def test_no_display_is_needed() -> None:
     program = "import sys, vsacli.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "figures").write_text("not a folder")
+    with pytest.raises(StorageError, match="is a file; name a folder for the figures"):
+        check_figures(["motion"], tmp_path / "figures", "result")

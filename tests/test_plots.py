@@ -250,7 +250,7 @@ def test_stiffness_axis_of_a_constant_or_unknown_command() -> None:
 def test_figures_without_their_variables_are_left_out_with_a_reason() -> None:
     result = without(rest_to_rest(), "q", "stiffness", "tau_e")
     assert list(plot_result(result)) == ["motor-torque"]
-    reasons = omitted_figures(result)
+    reasons = omitted_figures(result.variables)
     assert list(reasons) == ["motion", "elastic-torque"]
     expected = "figure motion needs q and stiffness, which this result was written without (--variables)"
     assert reasons["motion"] == expected

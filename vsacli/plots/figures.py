@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
+from pathlib import Path
 
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
@@ -43,19 +44,29 @@ def plot_result(result: StoredResult) -> dict[str, Figure]:
     Raises:
         InputError: nothing can be drawn from what is stored.
     """
-    omitted = omitted_figures(result)
-    if len(omitted) == len(_FIGURES):
-        raise InputError.one("nothing can be plotted: " + "; ".join(omitted.values()), result.path)
+    names = drawable_figures(result.variables, result.path)
     with house_style():
         failures = Failures.of(result)
-        return {name: draw(result, failures) for name, (_, draw) in _FIGURES.items() if name not in omitted}
+        return {name: _FIGURES[name][1](result, failures) for name in names}
 
 
-def omitted_figures(result: StoredResult) -> dict[str, str]:
-    """Figures that cannot be drawn from what is stored, by name, each with the reason as a sentence."""
+def drawable_figures(variables: Collection[str], path: str | Path = "") -> list[str]:
+    """Names of the figures that can be drawn from these variables.
+
+    Raises:
+        InputError: there is none; `path` is the file it names.
+    """
+    omitted = omitted_figures(variables)
+    if len(omitted) == len(_FIGURES):
+        raise InputError.one("nothing can be plotted: " + "; ".join(omitted.values()), path)
+    return [name for name in _FIGURES if name not in omitted]
+
+
+def omitted_figures(variables: Collection[str]) -> dict[str, str]:
+    """Figures that cannot be drawn from these variables, by name, each with the reason as a sentence."""
     reasons = {}
     for name, (needed, _) in _FIGURES.items():
-        missing = [variable for variable in needed if variable not in result.variables]
+        missing = [variable for variable in needed if variable not in variables]
         if missing:
             reasons[name] = missing_variables(name, missing)
     return reasons
@@ -131,6 +142,3 @@ _FIGURES = {
     "motor-torque": (("tau_motor",), _motor_torque),
     "elastic-torque": (("tau_e",), _elastic_torque),
 }
-
-FIGURES = tuple(_FIGURES)
-"""Names of the figures of one result; the files are called `<stem>-<name>`."""

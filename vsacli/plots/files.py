@@ -8,6 +8,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from vsacli.errors import StorageError
 from vsacli.plots.style import house_style
 from vsacli.store.atomic import AtomicFile, check_target, reporting_storage_errors
 
@@ -32,10 +33,12 @@ def check_figures(
     """Where the figures of these names are saved, if they may be; nothing is written.
 
     Raises:
-        StorageError: a file exists and `overwrite` is false.
+        StorageError: a file exists and `overwrite` is false, or `directory` is a file.
     """
     paths = [Path(directory) / f"{stem}-{name}.{file_format}" for name in names]
     if Path(directory).exists():
+        if not Path(directory).is_dir():
+            raise StorageError(directory, "is a file; name a folder for the figures")
         for path in paths:
             check_target(path, overwrite=overwrite)
     return paths

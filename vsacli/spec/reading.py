@@ -25,7 +25,7 @@ from vsacli.spec.problems import Problems
 from vsacli.spec.source import Source, read_source
 from vsacli.spec.values import INVALID, Scope, all_valid, read_value, unexpected
 from vsacli.spec.yaml_tree import parse_yaml
-from vsacli.suggestions import did_you_mean
+from vsacli.suggestions import did_you_mean, nearest
 
 _Document = TypeVar("_Document")
 
@@ -73,13 +73,13 @@ def _read_record_of(
     prefix = f"{label}: " if label else ""
     scope = scope.inside(cls, node)
     fields = declared(cls)
-    _refuse_unknown_keys(cls, node, (*fields, *beside), scope)
+    mistyped = _refuse_unknown_keys(cls, node, (*fields, *beside), scope)
     values = {
         name: _read_field(name, field, node, prefix, scope)
         for name, (field, default) in fields.items()
-        if name in node.entries or default is REQUIRED
+        if name in node.entries or (default is REQUIRED and name not in mistyped)
     }
-    if INVALID in values.values():
+    if INVALID in values.values() or not mistyped.isdisjoint(fields):
         return INVALID
     try:
         return cls(**values)
@@ -92,12 +92,16 @@ def _read_record_of(
         return INVALID
 
 
-def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], scope: Scope) -> None:
+def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], scope: Scope) -> set[str]:
+    """Note unknown keys; returns the known ones that were probably meant, which are then not missing."""
+    meant: set[str] = set()
     for key, line in node.key_lines.items():
         if key in getattr(cls, "not_yet", ()):
             scope.problems.add(line, f"{key!r} is not supported yet")
         elif key not in known:
             scope.problems.add(line, f"unknown key {tree.quoted(key)}{did_you_mean(key, known)}")
+            meant.update(filter(None, [nearest(key, known)]))
+    return meant - node.entries.keys()
 
 
 def _read_field(name: str, field: Field, node: tree.Mapping, prefix: str, scope: Scope) -> Any:

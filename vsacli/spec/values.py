@@ -13,7 +13,18 @@ from typing import Any, Final
 from vsacli.errors import InputError
 from vsacli.spec import tree
 from vsacli.spec.expression import BOOLEANS, ExpressionError, evaluate
-from vsacli.spec.fields import Choice, Integer, Interval, Kind, Number, PerJoint, TableFile, Text, Vector, declared
+from vsacli.spec.fields import (
+    Choice,
+    Integer,
+    Interval,
+    Kind,
+    Number,
+    PerJoint,
+    TableFile,
+    Text,
+    Vector,
+    declared,
+)
 from vsacli.spec.problems import Problems
 from vsacli.spec.table import read_table
 from vsacli.suggestions import did_you_mean
@@ -39,7 +50,7 @@ class Scope:
 
     def unit(self, quantity: Quantity) -> str:
         """Unit of a quantity here; an unknown variant is a problem of its own and must not make others."""
-        return quantity.unit(self.variant) if self.variant else quantity.revolute
+        return quantity.unit(self.variant or "revolute")
 
     def inside(self, cls: type, node: tree.Mapping) -> Scope:
         """The scope of the values in a record."""

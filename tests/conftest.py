@@ -1,0 +1,70 @@
+"""Running the command line inside the test process."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from cli_samples import ROBOT, rest_to_rest
+
+from vsacli.cli.main import run
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Exit code of a command line, and what it printed."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def vsacli(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Outcome]:
+    """Run a command line in `tmp_path`, as the command `vsacli` does."""
+    monkeypatch.chdir(tmp_path)
+
+    def run_in_folder(*arguments: object) -> Outcome:
+        capsys.readouterr()
+        code = run([str(argument) for argument in arguments])
+        return Outcome(code, *capsys.readouterr())
+
+    return run_in_folder
+
+
+@pytest.fixture
+def motion(tmp_path: Path) -> Path:
+    """A trajectory that the 3R arm can execute, `move.yaml`."""
+    return rest_to_rest(tmp_path / "move.yaml")
+
+
+@pytest.fixture
+def too_soft(tmp_path: Path) -> Path:
+    """The same, but it ends at a stiffness below 2K, `soft.yaml`."""
+    return rest_to_rest(tmp_path / "soft.yaml", end_stiffness=790)
+
+
+@pytest.fixture(scope="session")
+def feasible_result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result file without trouble; not to be changed."""
+    return _computed(tmp_path_factory.mktemp("feasible"), 1275)
+
+
+@pytest.fixture(scope="session")
+def infeasible_result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result file whose last steps are infeasible; not to be changed."""
+    return _computed(tmp_path_factory.mktemp("infeasible"), 790)
+
+
+def _computed(folder: Path, end_stiffness: float) -> Path:
+    result = folder / "result.h5"
+    motion = rest_to_rest(folder / "motion.yaml", end_stiffness)
+    with contextlib.redirect_stdout(io.StringIO()):
+        run(["invdyn", str(ROBOT), str(motion), "-q", "-o", str(result)])
+    return result

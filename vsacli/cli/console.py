@@ -1,0 +1,117 @@
+"""Talking to the user: results to stdout, notes and progress to stderr."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
+from dataclasses import dataclass
+from functools import wraps
+from typing import Any, TextIO, cast
+
+import click
+
+from vsacli.errors import StorageError
+
+PROGRESS_FROM = 100_000
+"""Steps from which on a run is long enough for a progress bar."""
+
+
+class OutputError(StorageError):
+    """Standard output cannot be written."""
+
+
+class OutputClosedError(OutputError):
+    """The reader of standard output has gone, as `head` does; nobody is left to be told."""
+
+
+def tell(message: str) -> None:
+    """Print a message on stderr; a run does not fail because nobody can read it."""
+    with suppress(OSError):
+        click.echo(message, err=True)
+
+
+@dataclass(frozen=True)
+class Talk:
+    """Notes on stderr, as loud as the user wants them."""
+
+    quiet: bool
+    verbose: bool
+
+    def note(self, message: str) -> None:
+        """Something most users want to know."""
+        if not self.quiet:
+            tell(message)
+
+    def detail(self, message: str) -> None:
+        """Something to know when looking closely."""
+        if self.verbose and not self.quiet:
+            tell(message)
+
+    def progress(self, steps: int) -> AbstractContextManager[Any]:
+        """A progress bar over steps, shown only for long work on a terminal."""
+        hidden = self.quiet or steps < PROGRESS_FROM or not sys.stderr.isatty()
+        return click.progressbar(length=steps, label="computing", file=sys.stderr, hidden=hidden)
+
+
+def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--quiet` and `--verbose`; the command receives them as one argument `talk`."""
+
+    @click.option("-q", "--quiet", is_flag=True, help="No notes and no progress bar on stderr.")
+    @click.option("-v", "--verbose", is_flag=True, help="More notes on stderr.")
+    @wraps(command)
+    def talking(*args: Any, quiet: bool, verbose: bool, **kwargs: Any) -> Any:
+        return command(*args, talk=Talk(quiet, verbose), **kwargs)
+
+    return talking
+
+
+@contextmanager
+def reporting_stdout_errors() -> Iterator[None]:
+    """Within this context, what cannot be written to standard output raises an OutputError."""
+    stream = sys.stdout
+    if stream is None:  # closed before the start, as by `>&-`; click then prints nothing
+        yield
+        return
+    try:
+        with redirect_stdout(cast("TextIO", _CheckedOutput(stream))):
+            yield
+    except OutputError:
+        _lead_nowhere(stream)
+        raise
+
+
+class _CheckedOutput:
+    """Standard output whose failure is told from a bug: anything may print to it, click's help included."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        with _raising_output_errors():
+            return self._stream.write(text)
+
+    def flush(self) -> None:
+        with _raising_output_errors():
+            self._stream.flush()
+
+
+@contextmanager
+def _raising_output_errors() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError as error:
+        raise OutputClosedError("standard output", "is closed") from error
+    except OSError as error:
+        raise OutputError("standard output", f"cannot be written: {error.strerror}") from error
+
+
+def _lead_nowhere(stream: TextIO) -> None:
+    """What is still buffered would otherwise fail once more when the interpreter ends."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)

@@ -1,0 +1,97 @@
+"""`vsacli invdyn`."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.options import (
+    example,
+    json_option,
+    overwrite_option,
+    robot_argument,
+    stop_option,
+    trajectory_argument,
+    variables_option,
+)
+from vsacli.cli.running import load_inputs, refuse_input_as_output, show_report
+
+if TYPE_CHECKING:
+    from vsacli.pipeline import Run
+    from vsacli.report import Report
+    from vsacli.store.writer import ResultWriter
+
+
+@click.command(
+    "invdyn",
+    short_help="Compute the motor torques that execute a trajectory.",
+    epilog=example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml -o result.h5"),
+)
+@robot_argument
+@trajectory_argument
+@click.option(
+    "-o", "--output", metavar="FILE", help="Result file; by default ROBOT-TRAJECTORY.h5 in this folder."
+)
+@variables_option("all")
+@click.option(
+    "--plot", "plot_folder", metavar="FOLDER", help="Also draw the figures of `vsacli plot` there, as png."
+)
+@json_option
+@overwrite_option
+@stop_option
+@talk_options
+def invdyn(
+    robot: str,
+    trajectory: str,
+    output: str | None,
+    variables: tuple[str, ...] | None,
+    plot_folder: str | None,
+    as_json: bool,
+    overwrite: bool,
+    stop_on_infeasible: bool,
+    talk: Talk,
+) -> int:
+    """Compute the motor torques with which ROBOT executes TRAJECTORY.
+
+    Writes an HDF5 file with everything that was computed and prints a report: which steps are infeasible,
+    singular or over a limit, and by how much.
+    """
+    path = Path(f"{Path(robot).stem}-{Path(trajectory).stem}.h5" if output is None else output)
+    inputs = load_inputs(robot, trajectory, talk)
+    refuse_input_as_output(path, (source.path for part in inputs for source in part.sources))
+    from vsacli.pipeline import Run
+    from vsacli.store.writer import ResultWriter
+    from vsacli.variables import VARIABLES
+
+    if plot_folder is not None:
+        from vsacli.plots import check_figures, drawable_figures
+
+        drawn = drawable_figures(VARIABLES if variables is None else variables)
+        check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)
+    writer = ResultWriter(
+        path, *inputs, variables, overwrite=overwrite, command_line=shlex.join(["vsacli", *sys.argv[1:]])
+    )
+    report = _write(Run(*inputs, stop_on_infeasible=stop_on_infeasible), writer, talk)
+    code = show_report(report, as_json)
+    talk.note(f"wrote {path}")
+    if plot_folder is not None:
+        from vsacli.cli.plot import draw_result
+
+        draw_result(path, Path(plot_folder), "png", overwrite, talk)
+    return code
+
+
+def _write(run: Run, writer: ResultWriter, talk: Talk) -> Report:
+    """Compute block by block and write each as it comes."""
+    with writer, talk.progress(run.trajectory.samples) as progress:
+        for block in run:
+            writer.write(block)
+            progress.update(len(block.time))
+        report = run.report()
+        writer.finish(report.as_json())
+    return report

@@ -1,0 +1,74 @@
+"""The command group, and what becomes of its errors."""
+
+from __future__ import annotations
+
+import io
+import sys
+import traceback
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import NoReturn
+
+import click
+
+from vsacli import __version__
+from vsacli.cli.check_feasibility import check_feasibility
+from vsacli.cli.console import OutputClosedError, reporting_stdout_errors, tell
+from vsacli.cli.exit_codes import Exit
+from vsacli.cli.export import export
+from vsacli.cli.invdyn import invdyn
+from vsacli.cli.options import example
+from vsacli.cli.plot import plot
+from vsacli.errors import InputError, StorageError
+
+_EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --plot figures")
+_EPILOG += "\n\n\b\nExit codes:\n" + "\n".join(f"  {code.value:<3}  {code.meaning}" for code in Exit)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EPILOG)
+@click.version_option(__version__, message="%(prog)s %(version)s")
+def vsacli() -> None:
+    """Inverse dynamics of robots with variable stiffness actuators.
+
+    From a robot and a trajectory, compute the motor torques that execute a motion and a stiffness profile;
+    say which steps cannot be done, and why.
+    """
+
+
+for command in (invdyn, check_feasibility, plot, export):
+    vsacli.add_command(command)
+
+
+def main() -> NoReturn:
+    """Entry point of the command `vsacli`."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a name may hold letters that the terminal has not
+        sys.stdout.reconfigure(errors="backslashreplace")
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run a command line; errors become messages on stderr and an exit code."""
+    try:
+        with reporting_stdout_errors():
+            code = vsacli.main(args=list(arguments), prog_name="vsacli", standalone_mode=False)
+    except click.ClickException as error:
+        with suppress(OSError):
+            error.show()
+        return Exit.USAGE
+    except (click.Abort, KeyboardInterrupt):
+        return _fail("interrupted", Exit.INTERRUPTED)
+    except InputError as error:
+        return _fail(str(error), Exit.USAGE)
+    except OutputClosedError:
+        return Exit.STORAGE
+    except StorageError as error:
+        return _fail(str(error), Exit.STORAGE)
+    except Exception:
+        lines = traceback.format_exc()
+        return _fail(f"{lines}vsacli: this is a bug; please report it with the lines above", Exit.BUG)
+    return int(code or Exit.OK)
+
+
+def _fail(message: str, code: Exit) -> int:
+    tell(message)
+    return code

@@ -1,0 +1,39 @@
+"""Arguments and options that several commands share, each defined once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+
+def _split(_context: click.Context, _parameter: click.Parameter, text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise click.BadParameter("expected names separated by commas, e.g. tau_motor,flags")
+    return names
+
+
+def variables_option(default: str) -> Callable[[Any], Any]:
+    """`--variables`, of a command that otherwise takes those that `default` says."""
+    return click.option(
+        "--variables",
+        metavar="NAMES",
+        callback=_split,
+        help=f"Only these variables, e.g. tau_motor,flags; by default {default}.",
+    )
+
+
+def example(command: str) -> str:
+    """The end of a help text: a command line that works."""
+    return f"\b\nExample:\n  {command}"
+
+
+robot_argument = click.argument("robot")
+trajectory_argument = click.argument("trajectory")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+overwrite_option = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
+stop_option = click.option("--stop-on-infeasible", is_flag=True, help="End with the first infeasible step.")
