@@ -1,0 +1,164 @@
+"""The house: which module may import which, and what happens, and does not, at import."""
+
+from __future__ import annotations
+
+import ast
+import graphlib
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import vsacli
+
+REPOSITORY = Path(__file__).parents[1]
+PACKAGE = Path(vsacli.__file__).parent
+GROUND = "ground"
+ROW = re.compile(
+    r"^\| (?P<room>\w+) \| (?P<modules>(?:`\w+` ?)+) \| .* \| (?P<imports>[\w ]*)\|$", re.MULTILINE
+)
+
+HOMES = {"yaml": "spec", "h5py": "store", "matplotlib": "plots", "click": "cli"}
+"""Libraries that only one part of the package may import."""
+
+HEAVY = ("numpy", "scipy", "matplotlib", "h5py")
+
+TALK = ("print", "sys.stdout", "sys.stderr", "sys.exit", "logging", "warnings.warn")
+
+ENTRANCES = ("__init__", "__main__")
+"""Modules of the package itself, which lead to the rooms."""
+
+
+def rooms() -> list[re.Match[str]]:
+    return list(ROW.finditer((REPOSITORY / "docs" / "contributing.md").read_text(encoding="utf-8")))
+
+
+ROOM_OF = {module: row["room"] for row in rooms() for module in re.findall(r"\w+", row["modules"])}
+MAY_IMPORT = {row["room"]: set(row["imports"].split()) for row in rooms()}
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+
+def part_of(source: Path) -> str:
+    """Name of the module or subpackage directly below `vsacli` in which a source file lies."""
+    return source.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+def imports(source: Path) -> Iterator[tuple[str, int]]:
+    """Every import of a source file, wherever it stands: the dotted name, and the line."""
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{source}:{node.lineno}: relative import"
+            names = [""] if node.module != "vsacli" else [f".{alias.name}" for alias in node.names]
+            yield from ((f"{node.module}{name}", node.lineno) for name in names)
+
+
+def lines_run_at_import(source: Path) -> set[int]:
+    """Lines where the statements begin that run when a module is imported."""
+    waiting: list[ast.AST] = [ast.parse(source.read_text(encoding="utf-8"))]
+    lines = set()
+    while waiting:
+        for child in ast.iter_child_nodes(waiting.pop()):
+            for_types_only = isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"
+            if isinstance(child, ast.stmt) and not isinstance(child, ast.FunctionDef) and not for_types_only:
+                lines.add(child.lineno)
+                waiting.append(child)
+    return lines
+
+
+def run_python(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=folder, capture_output=True, text=True, check=False
+    )
+
+
+def test_the_table_of_rooms_is_read() -> None:
+    assert {"ground", "spec", "cli"} <= MAY_IMPORT.keys()
+    assert MAY_IMPORT["springs"] == {"spec"}
+
+
+def test_every_module_has_a_room() -> None:
+    assert {part_of(source) for source in SOURCES} - {*ENTRANCES, "robots", "trajectories"} == set(ROOM_OF)
+
+
+def test_rooms_form_no_circle() -> None:
+    assert set().union(*MAY_IMPORT.values()) <= MAY_IMPORT.keys()
+    graphlib.TopologicalSorter(MAY_IMPORT).prepare()  # raises CycleError
+
+
+def test_imports_go_one_way() -> None:
+    strays = []
+    for source in SOURCES:
+        room = ROOM_OF.get(part_of(source))
+        for name, line in imports(source) if room else ():
+            library, _, rest = name.partition(".")
+            if library == "vsacli" and rest != "__version__":
+                target = ROOM_OF[rest.partition(".")[0]]
+                if target not in {room, GROUND, *MAY_IMPORT[room]}:
+                    strays.append(f"{source}:{line}: room {room} may not import {name} of room {target}")
+    assert strays == []
+
+
+def test_libraries_stay_at_home() -> None:
+    strays = [
+        f"{source}:{line}: {name}"
+        for source in SOURCES
+        for name, line in imports(source)
+        if HOMES.get(library := name.partition(".")[0], part_of(source)) != part_of(source)
+        or (library == "scipy" and line in lines_run_at_import(source))
+    ]
+    assert strays == []
+
+
+def test_only_the_command_line_prints() -> None:
+    strays = [
+        f"{source}:{node.lineno}: {ast.unparse(node)}"
+        for source in SOURCES
+        if part_of(source) != "cli"
+        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in TALK
+    ]
+    assert strays == []
+
+
+def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
+    code = (
+        "import sys; from vsacli.cli.main import run; code = run(['invdyn', '--help']);"
+        f" sys.exit(str([name for name in {HEAVY} if name in sys.modules]) if code == 0 else 'help failed')"
+    )
+    outcome = run_python(code, tmp_path)
+    assert outcome.stderr.strip() == "[]"
+    assert "Usage: vsacli invdyn" in outcome.stdout
+
+
+def test_the_main_job_does_without_scipy(tmp_path: Path) -> None:
+    files = [REPOSITORY / "robots" / "vsa_3r.yaml", REPOSITORY / "trajectories" / "rest_to_rest.yaml"]
+    arguments = ["invdyn", "-q", *map(str, files)]
+    code = (
+        f"import sys; from vsacli.cli.main import run; code = run({arguments});"
+        " sys.exit(str('scipy' in sys.modules) if code == 0 else 'the job failed')"
+    )
+    assert run_python(code, tmp_path).stderr.strip() == "False"
+
+
+def test_importing_everything_does_nothing_else(tmp_path: Path) -> None:
+    modules = [
+        ".".join(source.relative_to(PACKAGE.parent).with_suffix("").parts)
+        for source in SOURCES
+        if part_of(source) != "__main__"
+    ]
+    code = f"""
+import importlib, signal, sys
+handler = signal.getsignal(signal.SIGINT)
+for module in {modules}:
+    importlib.import_module(module)
+import numpy
+assert "matplotlib.pyplot" not in sys.modules
+assert numpy.geterr() == dict(divide="warn", over="warn", under="ignore", invalid="warn")
+assert signal.getsignal(signal.SIGINT) is handler
+"""
+    outcome = run_python(code, tmp_path)
+    assert (outcome.returncode, outcome.stdout, outcome.stderr) == (0, "", "")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,256 @@
+"""README and docs: what they show is what the program does."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import click
+import h5py
+import pytest
+from cli_samples import installed
+
+import vsacli
+from vsacli.cli.main import vsacli as group
+from vsacli.feasibility import NEAR_SINGULAR, TOUCHING
+from vsacli.self_check import LADDER_BOUND, SPRING_BOUND
+from vsacli.spec.source import MAX_DOCUMENT_BYTES
+from vsacli.spec.yaml_tree import MAX_LEVELS, MAX_NODES
+
+REPOSITORY = Path(__file__).parents[1]
+README = REPOSITORY / "README.md"
+PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
+
+SAVED_AS = re.compile(r"Save as `(\S+)`:$")
+EXIT_CODE = re.compile(r"# exit code (\d+)$")
+SETTING_UP = re.compile(r"-m venv|pip install")
+HELP_EXAMPLE = re.compile(r"^ +(vsacli .*)$", re.MULTILINE)
+ROUNDING = re.compile(r"self-check passed \(\S+,")
+"""What of a report differs between machines."""
+
+
+class Block(NamedTuple):
+    """A fenced block of a page, and the line of text before it."""
+
+    before: str
+    language: str
+    text: str
+
+
+def blocks(page: Path) -> list[Block]:
+    text = page.read_text(encoding="utf-8")
+    found = re.finditer(r"(?:^([^\n]*)\n\n?)?^```(\w+)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    return [Block(match[1] or "", match[2], match[3]) for match in found]
+
+
+def commands(block: Block) -> Iterator[str]:
+    """The shell lines of a block that run vsacli, without the making of an environment."""
+    if block.language == "text":
+        yield from HELP_EXAMPLE.findall(block.text.partition("Example:")[2])
+    elif block.language == "sh" and re.search(r"\bvsacli ", block.text):
+        for line in block.text.splitlines():
+            parts = [part for part in line.split(" && ") if not SETTING_UP.search(part)]
+            yield from [" && ".join(parts).replace(".venv/bin/", "")] if parts else []
+
+
+def named(page: Path) -> str:
+    return page.name
+
+
+@pytest.fixture(scope="module")
+def generate() -> ModuleType:
+    """The script that writes the generated parts."""
+    sys.path.insert(0, str(REPOSITORY / "docs"))
+    try:
+        return importlib.import_module("generate")
+    finally:
+        sys.path.remove(str(REPOSITORY / "docs"))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with what a clone shows."""
+    for name in ("robots", "trajectories"):
+        shutil.copytree(REPOSITORY / name, tmp_path / name)
+    return tmp_path
+
+
+def run_shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+    return subprocess.run(
+        ["sh", "-c", line],
+        cwd=folder,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def comparable(report: str) -> str:
+    return ROUNDING.sub("self-check passed (,", report).strip()
+
+
+def test_generated_parts_are_up_to_date(generate: ModuleType) -> None:
+    assert generate.stale() == [], "run python docs/generate.py"
+
+
+def test_a_stale_part_is_noticed(generate: ModuleType, tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- generated: exit-codes -->\nold\n<!-- end of generated part -->\nafter\n")
+    assert generate.stale([page]) == [page]
+    page.write_text(generate.regenerated(page.read_text()))
+    assert generate.stale([page]) == []
+    assert page.read_text().startswith("before\n")
+    assert "old" not in page.read_text()
+
+
+def test_every_part_has_its_place(generate: ModuleType) -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    assert {match["name"] for match in generate.PART.finditer(text)} == generate.PARTS.keys()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
+    printed: tuple[str, ...] = ()
+    for block in blocks(page):
+        if saved := SAVED_AS.search(block.before):
+            (folder / saved[1]).write_text(block.text)
+        if block.language == "text" and printed:
+            assert block.text.strip()
+            assert comparable(block.text) in printed
+        printed = ()
+        for line in commands(block):
+            outcome = run_shell(line, folder)
+            expected = int(match[1]) if (match := EXIT_CODE.search(line)) else 0
+            assert outcome.returncode == expected, f"{line}\n{outcome.stdout}{outcome.stderr}"
+            if block.language == "sh":
+                printed = comparable(outcome.stdout), comparable(outcome.stderr)
+    check_python_examples(page, folder)
+
+
+def check_python_examples(page: Path, folder: Path) -> None:
+    """Run the Python blocks of a page; a comment behind `print` says what it prints, up to a colon."""
+    code = "".join(block.text for block in blocks(page) if block.language == "python")
+    outcome = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert outcome.returncode == 0, outcome.stderr
+    assert outcome.stdout.splitlines() == re.findall(r"^ *print\(.*\)  # ([^:\n]*)", code, re.MULTILINE)
+
+
+def test_the_readme_has_one_line_for_the_main_job_and_one_for_the_tests() -> None:
+    lines = [line for line in README.read_text().splitlines() if line.startswith("python3 -m venv")]
+    assert ["vsacli invdyn" in line for line in lines] == [True, False]
+    assert ["pytest" in line for line in lines] == [False, True]
+
+
+@pytest.mark.parametrize("name", sorted(group.commands))
+def test_every_command_explains_itself(name: str) -> None:
+    command = group.commands[name]
+    assert command.help
+    assert command.short_help
+    assert all(option.help for option in command.params if isinstance(option, click.Option))
+    shown = [line for block in blocks(REPOSITORY / "docs" / "cli.md") for line in commands(block)]
+    assert any(line.startswith(f"vsacli {name} ") for line in shown), f"no example for {name}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=named)
+def test_internal_links_resolve(page: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    targets = [target for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target]
+    for target in targets:
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        assert file.is_file(), f"{page.name}: {target}"
+        assert not anchor or anchor in anchors(file), f"{page.name}: {target}"
+
+
+def anchors(page: Path) -> set[str]:
+    """The names that headings get where Markdown is shown."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.fixture(scope="module")
+def format_page() -> str:
+    return (REPOSITORY / "docs" / "file-formats.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def result(folder: Path) -> Path:
+    """A result with steps that are infeasible and over a limit."""
+    robot, trajectory = folder / "robots" / "rp_2.yaml", folder / "trajectories" / "rp_2.yaml"
+    trajectory.write_text(trajectory.read_text().replace("arm: 950", "arm: 790"))
+    assert installed("invdyn", robot, trajectory, "-o", "result.h5", folder=folder).returncode == 3
+    return folder / "result.h5"
+
+
+def test_every_key_of_the_report_is_documented(result: Path, format_page: str) -> None:
+    with h5py.File(result) as file:
+        report = json.loads(file["report/json"].asstr()[()])
+    for key in leaves(report):
+        assert f"`{key}`" in format_page, key
+
+
+def leaves(content: dict[str, Any], prefix: str = "") -> Iterator[str]:
+    """Keys as the page writes them: nested ones joined by dots, those of a list or of kinds by themselves."""
+    for key, value in content.items():
+        match key, value:
+            case "joints", [*joints]:
+                yield from (leaf for joint in joints for leaf in leaves(joint))
+            case "steps" | "first_time", dict():
+                yield key
+                yield from (kind for kind in value if not kind.endswith("_limit"))
+            case "worst", dict():
+                yield key
+                yield from (leaf for worst in value.values() for leaf in leaves(worst))
+            case _, dict():
+                yield from leaves(value, f"{key}.")
+            case _:
+                yield f"{prefix}{key}"
+
+
+def test_every_attribute_and_group_of_a_result_is_documented(result: Path, format_page: str) -> None:
+    with h5py.File(result) as file:
+        attributes = list(file.attrs)
+        groups = [name for name, item in file.items() if isinstance(item, h5py.Group)]
+    tree = next(
+        block.text for block in blocks(REPOSITORY / "docs" / "file-formats.md") if block.language == "text"
+    )
+    assert all(f"`{name}`" in format_page for name in attributes)
+    assert sorted(groups) == ["inputs", "report"]
+    assert all(f"── {name}" in tree for name in groups)
+
+
+def test_the_numbers_in_the_text_are_those_of_the_code(format_page: str) -> None:
+    theory = (REPOSITORY / "docs" / "theory.md").read_text(encoding="utf-8")
+    for number in (TOUCHING, NEAR_SINGULAR, SPRING_BOUND, LADDER_BOUND):
+        assert f"{number:g}".replace("e-0", "e-") in theory
+    assert f"{MAX_DOCUMENT_BYTES // 10**6} MB, {MAX_LEVELS} levels and {MAX_NODES:,} nodes" in format_page
+
+
+def test_every_extra_package_has_its_reason() -> None:
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    table = (REPOSITORY / "docs" / "contributing.md").read_text(encoding="utf-8")
+    for requirement in (each for extra in project["optional-dependencies"].values() for each in extra):
+        name = re.match(r"[\w-]+", requirement)
+        assert name
+        assert re.search(rf"^\| .*`{name[0]}`.* \| \w.* \|$", table, re.MULTILINE), requirement
+
+
+def test_the_changelog_begins_with_this_version() -> None:
+    changelog = (REPOSITORY / "docs" / "changelog.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## (.*)$", changelog, re.MULTILINE)[0] == vsacli.__version__
+    assert importlib.metadata.version("vsacli") == vsacli.__version__

@@ -1,0 +1,57 @@
+"""The wheel holds the package, its type marker and the examples, and nothing else."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.Path:
+    """The wheel of this tree, built without network."""
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    subprocess.run(build, cwd=REPOSITORY, check=True, capture_output=True)
+    [path] = folder.glob("*.whl")
+    return zipfile.Path(path)
+
+
+def files_below(folder: Path, pattern: str) -> set[str]:
+    return {str(path.relative_to(REPOSITORY)) for path in folder.rglob(pattern)}
+
+
+def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> None:
+    modules = files_below(REPOSITORY / "vsacli", "*.py")
+    examples = {
+        f"vsacli/{name}"
+        for folder in ("robots", "trajectories")
+        for pattern in ("*.yaml", "*.csv")
+        for name in files_below(REPOSITORY / folder, pattern)
+    }
+    assert {"vsacli/robots/vsa_3r.yaml", "vsacli/trajectories/rest_to_rest.yaml"} <= examples
+    content = {name for name in wheel.root.namelist() if not re.search(r"\.dist-info/|/$", name)}
+    assert content == modules | examples | {"vsacli/py.typed"}
+
+
+def test_the_examples_in_the_wheel_are_those_of_the_repository(wheel: zipfile.Path) -> None:
+    packed = (wheel / "vsacli" / "robots" / "vsa_3r.yaml").read_text(encoding="utf-8")
+    assert packed == (REPOSITORY / "robots" / "vsa_3r.yaml").read_text(encoding="utf-8")
+
+
+def test_the_readme_is_the_description(wheel: zipfile.Path) -> None:
+    [metadata] = [name for name in wheel.root.namelist() if name.endswith(".dist-info/METADATA")]
+    text = wheel.root.read(metadata).decode("utf-8")
+    assert (REPOSITORY / "README.md").read_text(encoding="utf-8") in text
+
+
+def test_installing_gives_the_command() -> None:
+    [command] = importlib.metadata.entry_points(group="console_scripts", name="vsacli")
+    assert command.value == "vsacli.cli:main"
