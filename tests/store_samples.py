@@ -11,14 +11,18 @@ from typing import Any
 
 import numpy as np
 
+from vsacli.profiles import WRENCH, Constant
 from vsacli.robot import Antagonistic, DenavitHartenberg, Inertia, Joint, Limits, Link, Motor, Robot
 from vsacli.spec.source import Source
 from vsacli.springs.cubic import Cubic
 from vsacli.store.writer import ResultWriter
+from vsacli.trajectory import WrenchProfile
 from vsacli.variables import VARIABLES, Block
 
 REPORT = {"format": "vsacli-report/1", "verdict": "ok", "samples": 0, "complete": True, "warnings": ["µ: –"]}
 SOURCE = Source("robots/two.yaml", "0" * 64, "name: two\n# °\n")
+
+PUSH = WrenchProfile(Constant(signal=WRENCH, span=(0.0, 1.0), value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), "base")
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,7 @@ class PlannedTrajectory:
     samples: int
     name: str = "swing"
     sources: tuple[Source, ...] = ()
+    wrench: WrenchProfile | None = PUSH
 
 
 def joint(name: str, kind: str, index: int = 0) -> Joint:
@@ -63,7 +68,8 @@ def random_block(samples: int, joints: int, rate: float = 1000.0) -> Block:
         dims = VARIABLES[name].dims
         if name == "flags":
             return generator.integers(0, 1024, (joints, samples)).astype(np.uint16).T
-        shape = (joints, 2, samples) if "motor" in dims else (joints, samples)
+        length = {"joint": joints, "motor": 2, "wrench_axis": 6}
+        shape = (*(length[dim] for dim in dims), samples)
         return np.moveaxis(generator.standard_normal(shape), -1, 0)
 
     time = np.arange(samples) / rate

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-import numpy.typing as npt
 import pytest
 from oracles import pinocchio
 from oracles.lagrange import chain_of
+from paths import STEP, Path, complex_torques
 
 from robots import MotionArrays, almost_square_robot, random_motion, random_robot, robot_of_ones, vsa_3r
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
-from vsacli.newton_euler import link_constants, link_torques
-from vsacli.recursion import JointState, recursion
-from vsacli.robot import Joint, Robot
-from vsacli.vector import Vector
+from vsacli.newton_euler import link_torques
+from vsacli.robot import Robot
 
 ROUNDING = 1e-12
 """Of each joint's peak: a 7-joint chain is a few hundred operations deep, so some 100 eps = 2e-14; the rest
@@ -58,58 +54,18 @@ def test_torques_agree_with_pinocchio(robot: Robot) -> None:
     assert_same(dtau_e, pinocchio.torque_rates(robot, q, dq, ddq, d3q))
 
 
-ComplexArray = npt.NDArray[np.complex128]
-
-
-class Path:
-    """q(t) = a + b t + c sin(w t + f) for each joint, analytic in complex t."""
-
-    def __init__(self, joints: int, seed: int) -> None:
-        rng = np.random.default_rng(seed)
-        self.a, self.b, self.c, self.f = rng.uniform(-2, 2, (4, joints, 1))
-        self.w = rng.uniform(1, 4, (joints, 1))
-
-    def motion(self, time: ComplexArray) -> list[ComplexArray]:
-        """q, dq, ddq, d3q, d4q, each (joints, samples)."""
-        phase = self.w * time + self.f
-        sine, cosine = self.c * np.sin(phase), self.c * np.cos(phase)
-        return [
-            self.a + self.b * time + sine,
-            self.b + self.w * cosine,
-            -(self.w**2) * sine,
-            -(self.w**3) * cosine,
-            self.w**4 * sine,
-        ]
-
-
-def complex_torques(robot: Robot, motion: Sequence[ComplexArray]) -> ComplexArray:
-    """The recursion on complex rows, (orders, samples, joints)."""
-    q, *rates = motion
-    states = [_state(joint, q[k], [rate[k] for rate in rates]) for k, joint in enumerate(robot.joints)]
-    torques = recursion([link_constants(joint) for joint in robot.joints], states, Vector(*robot.gravity))
-    return np.moveaxis(np.array([tuple(joint) for joint in torques]), 0, -1)
-
-
-def _state(joint: Joint, q: ComplexArray, rates: list[ComplexArray]) -> JointState:
-    turn, slide = (q, 0) if joint.is_revolute else (0, q)
-    angle, offset = joint.dh.theta + turn, joint.dh.d + slide
-    dq, ddq, d3q, d4q = rates
-    return JointState(np.cos(angle), np.sin(angle), offset, (dq, ddq, d3q, d4q))
-
-
 @pytest.mark.parametrize("types", ["RRRRR", "RPRPR", "PRPRP", "RRPPR", "PPRRR"])
 @pytest.mark.parametrize("seed", [1, 2])
 def test_each_derivative_is_the_rate_of_the_one_before(types: str, seed: int) -> None:
     robot, path = random_robot(types, seed), Path(len(types), seed)
     time = np.linspace(0, 3, SAMPLES, dtype=np.complex128)
-    step = 1e-30  # s; a complex step has no cancellation, and the square of this one vanishes against 1
-    stepped = complex_torques(robot, path.motion(time + 1j * step))
+    stepped = complex_torques(robot, path.motion(time + 1j * STEP))
 
     exact = link_torques(robot, *(array.real.T for array in path.motion(time)))
 
     assert_same(stepped[0].real, exact[0])
-    assert_same(stepped[0].imag / step, exact[1])
-    assert_same(stepped[1].imag / step, exact[2])
+    assert_same(stepped[0].imag / STEP, exact[1])
+    assert_same(stepped[1].imag / STEP, exact[2])
 
 
 @pytest.fixture(scope="module")

@@ -134,7 +134,7 @@ def test_a_spring_shared_by_an_alias(load):
             "      mass: 2\n      mass: 3\n",
             "10: duplicate key 'mass'; it stands on line 9",
         ),
-        ("name: rig", "name: rig\nbase: {xyz: [0, 0, 0]}", "3: 'base' is not supported yet"),
+        ("name: rig", "name: rig\nconvention: modified", "3: 'convention' is not supported yet"),
         (
             "motor: {inertia: 3.2",
             "motor: {gear_ratio: 9, inertia: 3.2",

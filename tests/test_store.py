@@ -172,7 +172,7 @@ def test_xarray_opens_it_with_named_coordinates_and_no_warning(path, block):
         with xarray.open_dataset(path, engine="h5netcdf") as data:
             data.load()
     assert data.tau_motor.dims == ("time", "joint", "motor")
-    assert set(data.coords) == {"time", "joint", "motor", "joint_type"}
+    assert set(data.coords) == {"time", "joint", "motor", "joint_type", "wrench_axis"}
     assert data.time.dtype == np.float64
     one = data.tau_motor.sel(joint="j1", motor=2)
     np.testing.assert_array_equal(one, block.tau_motor[:, 1, 1])

@@ -184,7 +184,7 @@ def test_a_bare_table_without_stiffness(robot):
         ),
         ("rate: 100", "rate: -1", "4: rate: must be positive, not -1"),
         ("rate: 100", "rat: 100", "4: unknown key 'rat'; did you mean 'rate'?"),
-        ("rate: 100", "wrench: {}", "4: 'wrench' is not supported yet"),
+        ("rate: 100", "wrench: {}", "4: wrench: missing key 'type', one of polynomial, constant, csv"),
         (
             "type: polynomial\n  degree: 7",
             "type: via_points",

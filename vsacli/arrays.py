@@ -13,6 +13,7 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 FlagArray = npt.NDArray[np.uint16]
+IndexArray = npt.NDArray[np.intp]
 
 
 def over_time(rows: FloatArray) -> FloatArray:

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from vsacli.errors import InputError, Problem
-from vsacli.profiles import POSITION, STIFFNESS, Signal
+from vsacli.profiles import POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.suggestions import did_you_mean
+from vsacli.wrench import wrench_columns
 
 TIME = "time"
-SIGNALS = (POSITION, STIFFNESS)
+JOINT_SIGNALS = (POSITION, STIFFNESS)
+SIGNALS = (*JOINT_SIGNALS, WRENCH)
 
 Layout = dict[str, list[int]]
-"""For each quantity that a table has, e.g. `dq`, the index of each joint's column."""
+"""For each quantity that a table has, e.g. `dq`, the index of each joint's (each wrench axis's) column."""
+
+_WRENCH_WAY = {name: wrench_columns(name) for name in WRENCH.names}
 
 
 def column_layout(
@@ -20,7 +24,8 @@ def column_layout(
 ) -> Layout:
     """Where the quantities stand in a table.
 
-    Columns are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one way throughout.
+    Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one way
+    throughout. Those of the wrench are named by `wrench_columns`.
 
     Args:
         header: names of all columns, none twice.
@@ -34,8 +39,10 @@ def column_layout(
     ways = (_columns("{joint}.{name}", joint_names), _columns("{name}{number}", joint_names))
     used = [way for way in ways if any(column in header for column in _all(way))]
     way = used[0] if used else ways[0]
+    expected = [TIME, *_all(way), *(_all(_WRENCH_WAY) if WRENCH in wanted else ())]
 
-    problems = list(_strangers(header, [TIME, *_all(way)], {TIME, *_all(ways[0]), *_all(ways[1])}))
+    problems = list(_strangers(header, expected, {TIME, *_all(ways[0]), *_all(ways[1]), *_all(_WRENCH_WAY)}))
+    way = way | _WRENCH_WAY
     if len(used) == len(ways):
         examples = " and ".join(
             repr(next(column for column in header if column in _all(way))) for way in ways
@@ -53,7 +60,7 @@ def _columns(pattern: str, joint_names: Sequence[str]) -> dict[str, list[str]]:
     joints = list(enumerate(joint_names, 1))
     return {
         name: [pattern.format(name=name, joint=joint, number=number) for number, joint in joints]
-        for signal in SIGNALS
+        for signal in JOINT_SIGNALS
         for name in signal.names
     }
 
@@ -77,4 +84,5 @@ def _gaps(header: Sequence[str], way: dict[str, list[str]], needed: Collection[s
         if absent and name in needed:
             yield f"there is no column {', '.join(absent)}"
         elif absent and len(absent) < len(columns):
-            yield f"there is no column {', '.join(absent)}; {name} is given for all joints or for none"
+            every = "axes" if name in WRENCH.names else "joints"
+            yield f"there is no column {', '.join(absent)}; {name} is given for all {every} or for none"

@@ -153,7 +153,8 @@ def _spans(result: StoredResult, variables: tuple[Variable, ...], stride: int) -
 
 def _check_defined(result: StoredResult, variables: tuple[Variable, ...], stride: int) -> None:
     """Raise UndefinedSamplesError if any value to be exported is NaN."""
-    gaps = [gap for variable in variables for gap in _gaps(result, variable, stride)]
+    of_joints = [variable for variable in variables if "joint" in variable.dims]
+    gaps = [gap for variable in of_joints for gap in _gaps(result, variable, stride)]
     if gaps:
         raise UndefinedSamplesError(result.path, gaps)
 

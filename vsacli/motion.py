@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from vsacli.arrays import FloatArray
+from vsacli.wrench import WRENCH_NAMES, Wrench
 
 
 @dataclass(frozen=True)
@@ -16,6 +17,7 @@ class Motion:
         q, dq, ddq, d3q, d4q: position and its four derivatives, (samples, joints), rad (m) per s^k.
         stiffness, dstiffness, ddstiffness: joint stiffness and two derivatives, (samples, joints),
             N m/rad (N/m) per s^k.
+        wrench: what the environment exerts on the end effector meanwhile, if anything.
     """
 
     time: FloatArray
@@ -27,3 +29,11 @@ class Motion:
     stiffness: FloatArray
     dstiffness: FloatArray
     ddstiffness: FloatArray
+    wrench: Wrench | None = field(default=None, kw_only=True)
+
+    def variables(self) -> dict[str, FloatArray]:
+        """All arrays by the names of result variables."""
+        arrays = {name: array for name, array in vars(self).items() if name != "wrench"}
+        if self.wrench is not None:
+            arrays |= {name: getattr(self.wrench, name) for name in WRENCH_NAMES}
+        return arrays

@@ -1,4 +1,4 @@
-"""Courses of position and stiffness over time, in closed form: rest to rest, and constant."""
+"""Courses of position, stiffness and wrench over time, in closed form: rest to rest, and constant."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from numpy.polynomial import polynomial
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
 from vsacli.times import stretch
+from vsacli.wrench import WRENCH_AXES, WRENCH_NAMES
 
 DEGREES = range(3, 16, 2)
 """Degrees that a rest-to-rest polynomial may have."""
@@ -29,11 +30,13 @@ class Signal:
         names: the value and its derivatives, as in files and in `Motion`.
         spline_degree: odd degree of the spline through recorded values.
         positive: whether the value must be positive.
+        components: how many numbers a value has; None: one a joint.
     """
 
     names: tuple[str, ...]
     spline_degree: int
     positive: bool = False
+    components: int | None = None
 
     @property
     def orders(self) -> int:
@@ -43,6 +46,7 @@ class Signal:
 
 POSITION = Signal(("q", "dq", "ddq", "d3q", "d4q"), spline_degree=5)
 STIFFNESS = Signal(("stiffness", "dstiffness", "ddstiffness"), spline_degree=3, positive=True)
+WRENCH = Signal(WRENCH_NAMES, spline_degree=3, components=len(WRENCH_AXES))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,8 +63,8 @@ class ClosedForm(ABC):
 
     @property
     @abstractmethod
-    def joints(self) -> int:
-        """Number of joints."""
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -74,7 +78,7 @@ class ClosedForm(ABC):
 
     @abstractmethod
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, joints, samples)."""
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
 
     def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
         """The same at the steps start..stop-1, whose times are `time`."""
@@ -88,18 +92,18 @@ class ClosedForm(ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Constant(ClosedForm):
-    """The same `value`, one number a joint, all the time."""
+    """The same `value`, one number a component, all the time."""
 
     value: tuple[float, ...]
 
     @property
-    def joints(self) -> int:
-        """Number of joints."""
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
         return len(self.value)
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, joints, samples)."""
-        rows = np.zeros((self.signal.orders, self.joints, len(time)))
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        rows = np.zeros((self.signal.orders, self.components, len(time)))
         rows[0] = np.array(self.value)[:, None]
         return rows
 
@@ -110,7 +114,7 @@ class RestToRest(ClosedForm):
 
     Attributes:
         degree: odd, 3 to 15.
-        start, end: one value a joint, taken exactly at the ends.
+        start, end: one value a component, taken exactly at the ends.
     """
 
     degree: int
@@ -125,18 +129,18 @@ class RestToRest(ClosedForm):
             raise InputError.one(f"start has {len(self.start)} values, end has {len(self.end)}")
 
     @property
-    def joints(self) -> int:
-        """Number of joints."""
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
         return len(self.start)
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, joints, samples)."""
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
         first, last = self.span
         elapsed, remaining = time - first, last - time
         late = remaining < elapsed
         start, end = np.array(self.start), np.array(self.end)
 
-        rows = np.empty((self.signal.orders, self.joints, len(time)))
+        rows = np.empty((self.signal.orders, self.components, len(time)))
         rise = _rise(np.minimum(elapsed, remaining) / (last - first), self.degree)
         np.multiply.outer(end - start, np.where(late, -rise, rise), out=rows[0])
         rows[0] += np.where(late, end[:, None], start[:, None])

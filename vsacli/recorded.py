@@ -1,4 +1,4 @@
-"""Recorded trajectories: the columns of a CSV table as position and stiffness of a robot's joints."""
+"""Recorded trajectories: the columns of a CSV table as position and stiffness of joints, and wrench."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vsacli.arrays import FloatArray
-from vsacli.columns import SIGNALS, TIME, Layout, column_layout
+from vsacli.columns import JOINT_SIGNALS, SIGNALS, TIME, Layout, column_layout
 from vsacli.errors import InputError, Problem
 from vsacli.profiles import Signal
 from vsacli.samples import SampledProfile, SampleProblem, time_problems, value_problems
@@ -55,9 +55,9 @@ class Recording:
 
 
 def read_recording(
-    path: str | os.PathLike[str], joint_names: Sequence[str], wanted: Sequence[Signal] = SIGNALS
+    path: str | os.PathLike[str], joint_names: Sequence[str], wanted: Sequence[Signal] = JOINT_SIGNALS
 ) -> Recording:
-    """Read signals of all joints from a CSV file.
+    """Read signals from a CSV file.
 
     Args:
         path: a file with the columns `time` and those of `column_layout`.

@@ -57,6 +57,22 @@ class TorqueDerivatives(NamedTuple):
     ddtau: Scalar
 
 
+class TipLoad(NamedTuple):
+    """What the end effector exerts on the environment, at a point fixed to the last link.
+
+    Attributes:
+        force: its components and their first and second derivatives.
+        moment: likewise, about that point.
+        point: from the origin of frame N, in frame N.
+        in_base: whether the components are along the axes of frame 0, else of frame N.
+    """
+
+    force: Sequence[Vector]
+    moment: Sequence[Vector]
+    point: Vector
+    in_base: bool
+
+
 class _Angular(NamedTuple):
     """Angular velocity, acceleration, jerk and snap of a frame."""
 
@@ -109,21 +125,31 @@ class _Body(NamedTuple):
 
 
 class _Reaction(NamedTuple):
-    """Force f and moment n of link k-1 on link k, with their derivatives f', f'', n', n''."""
+    """Force f and moment n of link k-1 on link k, with their derivatives f', f'', n', n''.
+
+    Beyond the last link, of that link on the environment.
+    """
 
     f: tuple[Vector, Vector, Vector]
     n: tuple[Vector, Vector, Vector]
 
 
+_NO_REACTION = _Reaction((ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO))
+
+
 def recursion(
-    links: Sequence[LinkConstants], states: Sequence[JointState], gravity: Vector
+    links: Sequence[LinkConstants],
+    states: Sequence[JointState],
+    gravity: Vector,
+    tip: TipLoad | None = None,
 ) -> list[TorqueDerivatives]:
     """Run (36)-(60) once over a chain.
 
     Args:
         links: constants of each joint and link, base to tip.
         states: pose and motion of each joint, in the same order.
-        gravity: gravity acceleration in the base frame, m/s^2.
+        gravity: gravity acceleration in frame 0, m/s^2.
+        tip: what the end effector exerts on the environment, if anything; N and N m per s^k.
 
     Returns:
         tau_e, tau_e', tau_e'' of each joint, base to tip; N m (N at a prismatic joint) per s^k.
@@ -136,7 +162,7 @@ def recursion(
         bodies.append(body)
 
     torques = []
-    reaction = _Reaction((ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO))
+    reaction = _NO_REACTION if tip is None else _tip_reaction(tip, bodies)
     for link, state, body in zip(reversed(links), reversed(states), reversed(bodies), strict=True):
         reaction = _backward(body, reaction)
         torques.append(_project(link, state, body, reaction))
@@ -220,6 +246,38 @@ def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector,
         + cross(w, cross(w, i_g) + inertia.times(i + g_w) * 2 + dmoment)
     )  # fmt: skip
     return moment, dmoment, ddmoment
+
+
+def _tip_reaction(tip: TipLoad, bodies: Sequence[_Body]) -> _Reaction:
+    """f+, n+ of the last link and their derivatives, about the origin of frame N."""
+    angular = bodies[-1].frame.angular
+    if tip.in_base:
+        rotations = [body.rotation for body in bodies]
+        f, df, ddf = (_into_last_frame(rotations, vector) for vector in tip.force)
+        m, dm, ddm = (_into_last_frame(rotations, vector) for vector in tip.moment)
+    else:
+        f, df, ddf = _turning(angular, *tip.force)
+        m, dm, ddm = _turning(angular, *tip.moment)
+
+    v_r = _fixed_point(angular, tip.point)
+    r, dr, ddr = tip.point, v_r.first, v_r.second
+    n = m + cross(r, f)
+    dn = dm + cross(dr, f) + cross(r, df)
+    ddn = ddm + cross(ddr, f) + cross(dr, df) * 2 + cross(r, ddf)
+    return _Reaction((f, df, ddf), (n, dn, ddn))
+
+
+def _into_last_frame(rotations: Sequence[Rotation], v: Vector) -> Vector:
+    for rotation in rotations:
+        v = rotation.undo(v)
+    return v
+
+
+def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vector, Vector, Vector]:
+    """Derivatives in the base frame of a vector whose components in a turning frame are u(t)."""
+    w, g = angular.omega, angular.gamma
+    w_u = cross(w, u)
+    return u, du + w_u, ddu + cross(w, du) * 2 + cross(g, u) + cross(w, w_u)
 
 
 def _backward(body: _Body, tip: _Reaction) -> _Reaction:

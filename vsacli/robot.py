@@ -53,6 +53,24 @@ class DenavitHartenberg:
 
 
 @dataclass(frozen=True)
+class Pose:
+    """Where a frame lies in another, as the `origin` of URDF: its origin there, then fixed-axis rotations."""
+
+    xyz: tuple[float, float, float] = vector(
+        3, units.LENGTH, "position of its origin", default=(0.0, 0.0, 0.0)
+    )
+    rpy: tuple[float, float, float] = vector(
+        3,
+        units.ANGLE,
+        "roll, pitch, yaw: turned about the fixed x, then y, then z axis, Rz(yaw) Ry(pitch) Rx(roll)",
+        default=(0.0, 0.0, 0.0),
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
 class Inertia:
     """Central inertia tensor; entries of the tensor itself, as in URDF: xy = -integral(x y dm)."""
 
@@ -167,6 +185,27 @@ class Antagonistic:
 
 
 @dataclass(frozen=True)
+class Elastic:
+    """One motor that moves the link through a spring of constant stiffness."""
+
+    motor: Motor = value(Record(Motor), "the motor")
+    stiffness: float = number(units.STIFFNESS, "stiffness of the transmission", check=POSITIVE)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """One motor that moves the link directly."""
+
+    motor: Motor = value(Record(Motor), "the motor")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
 class Limits:
     """Ranges of the commanded motion; steps beyond are computed and flagged."""
 
@@ -216,10 +255,12 @@ class Robot:
     gravity: tuple[float, float, float] = vector(
         3, units.ACCELERATION, "gravity acceleration in the base frame", default=(0.0, 0.0, -9.81)
     )
+    base: Pose = value(Record(Pose), "DH frame 0 in the base frame", default=Pose())
+    tool: Pose = value(Record(Pose), "end effector in the last DH frame (frame N)", default=Pose())
     joints: tuple[Joint, ...] = value(Items(Record(Joint), unique="name"), "joints from the base to the tip")
     sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
 
-    not_yet = ("base", "tool", "convention")
+    not_yet = ("convention",)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -26,8 +26,8 @@ class SampledProfile:
     Attributes:
         signal: what is described.
         time: (samples,) in s.
-        values: (joints, samples).
-        derivatives: for each derivative of the signal the given values, (joints, samples), or None.
+        values: (components, samples).
+        derivatives: for each derivative of the signal the given values, (components, samples), or None.
     """
 
     signal: Signal
@@ -39,13 +39,13 @@ class SampledProfile:
     def from_arrays(
         cls, signal: Signal, time: FloatArray, values: npt.ArrayLike, *derivatives: npt.ArrayLike | None
     ) -> SampledProfile:
-        """From arrays of the shape (samples, joints).
+        """From arrays of the shape (samples, components).
 
         Raises:
             InputError: an array holds something else than numbers, or has another shape.
         """
         name, *names = signal.names
-        rows = _checked_rows(name, values, len(time), None)
+        rows = _checked_rows(name, values, len(time), signal.components)
         further = tuple(
             None if array is None else _checked_rows(name, array, len(time), len(rows))
             for name, array in zip(names, derivatives, strict=True)
@@ -53,8 +53,8 @@ class SampledProfile:
         return cls(signal=signal, time=time, values=rows, derivatives=further)
 
     @property
-    def joints(self) -> int:
-        """Number of joints."""
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
         return len(self.values)
 
     @property
@@ -85,7 +85,7 @@ class SampledProfile:
         if any(given is None for given in self.derivatives):
             rows = self.at(time)
         else:
-            rows = np.empty((self.signal.orders, self.joints, len(time)))
+            rows = np.empty((self.signal.orders, self.components, len(time)))
         for row, given in zip(rows, (self.values, *self.derivatives), strict=True):
             if given is not None:
                 row[:] = given[:, start:stop]
@@ -100,7 +100,7 @@ class SampledProfile:
         return replace(self, time=stretch(self.time, self.time[0], factor), derivatives=derivatives)
 
     def at(self, time: FloatArray) -> FloatArray:
-        """The spline and its derivatives at any times of the span, shape (orders, joints, samples).
+        """The spline and its derivatives at any times of the span, shape (orders, components, samples).
 
         Within a knot span one polynomial is evaluated, so that neighbouring values share their rounding
         error; evaluating derivatives of B-splines point by point leaves noise of about eps / step^order.
@@ -111,7 +111,7 @@ class SampledProfile:
         offset = time - knots[span]
         taylor = [self._spline(knots[used], nu=order).T[:, which] for order in range(degree + 1)]
 
-        rows = np.empty((self.signal.orders, self.joints, len(time)))
+        rows = np.empty((self.signal.orders, self.components, len(time)))
         for order, row in enumerate(rows):
             row[:] = taylor[degree]
             for power in range(degree - order, 0, -1):
@@ -136,8 +136,8 @@ def checked_array(name: str, array: npt.ArrayLike, *shape: int | None) -> FloatA
     return found
 
 
-def _checked_rows(name: str, array: npt.ArrayLike, samples: int, joints: int | None) -> FloatArray:
-    return by_joint(checked_array(name, array, samples, joints))
+def _checked_rows(name: str, array: npt.ArrayLike, samples: int, components: int | None) -> FloatArray:
+    return by_joint(checked_array(name, array, samples, components))
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
-"""The trajectory a robot is asked to execute: motion and stiffness at any block of its steps."""
+"""The trajectory a robot is asked to execute: motion, stiffness and wrench at any block of its steps."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -11,18 +12,19 @@ import numpy.typing as npt
 from vsacli.arrays import FloatArray, over_time
 from vsacli.errors import InputError, Problem
 from vsacli.motion import Motion
-from vsacli.profiles import POSITION, STIFFNESS
+from vsacli.profiles import POSITION, STIFFNESS, WRENCH
 from vsacli.samples import SampledProfile, checked_array, time_problems, value_problems
 from vsacli.spec.source import Source
 from vsacli.times import RecordedTimes, Times
+from vsacli.wrench import WRENCH_AXES, Wrench, check_frame
 
 
 class Profile(Protocol):
-    """A function of time with one component a joint, and its first derivatives."""
+    """A function of time with one component a joint or axis, and its first derivatives."""
 
     @property
-    def joints(self) -> int:
-        """Number of joints."""
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -33,7 +35,7 @@ class Profile(Protocol):
         """Ascending times between which the function is analytic; the first and last are its span."""
 
     def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, joints, samples)."""
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
 
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
         """The same at the steps start..stop-1, whose times are `time`; given columns pass through."""
@@ -42,12 +44,36 @@ class Profile(Protocol):
         """The same course, slower by a factor, from the same first time on."""
 
 
+@dataclass(frozen=True)
+class WrenchProfile:
+    """What the environment exerts on the end effector, over time.
+
+    Attributes:
+        profile: force and moment about the origin of the tool frame, `WRENCH_AXES`, N and N m.
+        frame: along whose axes these are, "end_effector" or "base".
+    """
+
+    profile: Profile
+    frame: str = "end_effector"
+
+    def __post_init__(self) -> None:
+        check_frame(self.frame)
+        if self.profile.components != len(WRENCH_AXES):
+            expected = f"{len(WRENCH_AXES)} ({', '.join(WRENCH_AXES)})"
+            raise InputError.one(f"the wrench has {self.profile.components} components, not {expected}")
+
+    def stretched(self, factor: float) -> WrenchProfile:
+        """The same course, slower by a factor, from the same first time on."""
+        return replace(self, profile=self.profile.stretched(factor))
+
+
 class Trajectory:
-    """Motion and stiffness of all joints over the same times.
+    """Motion and stiffness of all joints, and the wrench at the end effector, over the same times.
 
     Attributes:
         times: the steps.
         position, stiffness: what happens at them and between them.
+        wrench: what the environment exerts meanwhile; None if nothing.
         name: used in reports and for the name of the result file.
         warnings: what the user should know about times and profiles.
         sources: the files it was read from.
@@ -59,6 +85,7 @@ class Trajectory:
         position: Profile,
         stiffness: Profile,
         *,
+        wrench: WrenchProfile | None = None,
         name: str,
         warnings: Iterable[str] = (),
         sources: Iterable[Source] = (),
@@ -68,18 +95,25 @@ class Trajectory:
         Raises:
             InputError: they have not.
         """
-        self.times, self.position, self.stiffness = times, position, stiffness
+        self.times, self.position, self.stiffness, self.wrench = times, position, stiffness, wrench
         self.name = name
-        self.warnings = (*warnings, *times.warnings, *position.warnings, *stiffness.warnings)
+        doubts = (doubt for _, profile in self._profiles() for doubt in profile.warnings)
+        self.warnings = (*warnings, *times.warnings, *doubts)
         self.sources = tuple(sources)
         self._check()
 
+    def _profiles(self) -> Iterator[tuple[str, Profile]]:
+        yield "position", self.position
+        yield "stiffness", self.stiffness
+        if self.wrench is not None:
+            yield "wrench", self.wrench.profile
+
     def _check(self) -> None:
-        if self.position.joints != self.stiffness.joints:
-            joints = f"{self.position.joints} joints, the stiffness {self.stiffness.joints}"
+        if self.position.components != self.stiffness.components:
+            joints = f"{self.position.components} joints, the stiffness {self.stiffness.components}"
             raise InputError.one(f"the position has {joints}")
         first, last = self.times.span
-        for part, profile in (("position", self.position), ("stiffness", self.stiffness)):
+        for part, profile in self._profiles():
             start, end = profile.breakpoints[[0, -1]]
             if (start, end) != (first, last):
                 raise InputError.one(
@@ -99,12 +133,16 @@ class Trajectory:
         d4q: npt.ArrayLike | None = None,
         dstiffness: npt.ArrayLike | None = None,
         ddstiffness: npt.ArrayLike | None = None,
+        wrench: npt.ArrayLike | None = None,
+        dwrench: npt.ArrayLike | None = None,
+        ddwrench: npt.ArrayLike | None = None,
+        wrench_frame: str = "end_effector",
         name: str = "samples",
     ) -> Trajectory:
         """A trajectory through samples; derivatives that are given are used at the samples as they are.
 
         Those that are not come from a spline through the values: degree 5 (C4) for q, cubic (C2) for the
-        stiffness. `at` evaluates these splines in any case.
+        stiffness and the wrench. `at` evaluates these splines in any case.
 
         Args:
             time: (samples,) in s, strictly increasing, at least 6.
@@ -116,6 +154,11 @@ class Trajectory:
             d4q: fourth derivative of q.
             dstiffness: first derivative of the stiffness.
             ddstiffness: second derivative of the stiffness.
+            wrench: what the environment exerts on the end effector, (samples, 6): force and moment about the
+                origin of the tool frame, N and N m, as are its derivatives per s^k; None if nothing.
+            dwrench: first derivative of its components.
+            ddwrench: second derivative of its components.
+            wrench_frame: along whose axes the components are, "end_effector" or "base".
             name: used in reports and for the name of the result file.
 
         Raises:
@@ -124,15 +167,18 @@ class Trajectory:
         times = checked_array("time", time, None)
         position = SampledProfile.from_arrays(POSITION, times, q, dq, ddq, d3q, d4q)
         stiffnesses = SampledProfile.from_arrays(STIFFNESS, times, stiffness, dstiffness, ddstiffness)
-        problems = [*time_problems(times), *value_problems(position), *value_problems(stiffnesses)]
+        wrenches = _recorded_wrench(times, wrench, dwrench, ddwrench)
+        profiles = [position, stiffnesses, *wrenches]
+        problems = [*time_problems(times), *(found for part in profiles for found in value_problems(part))]
         if problems:
             raise InputError(Problem("", 0, str(problem)) for problem in problems)
-        return cls(RecordedTimes(times), position, stiffnesses, name=name)
+        exerted = WrenchProfile(wrenches[0], wrench_frame) if wrenches else None
+        return cls(RecordedTimes(times), position, stiffnesses, wrench=exerted, name=name)
 
     @property
     def joints(self) -> int:
         """Number of joints."""
-        return self.position.joints
+        return self.position.components
 
     @property
     def samples(self) -> int:
@@ -148,23 +194,34 @@ class Trajectory:
     def block(self, start: int, stop: int) -> Motion:
         """The steps start..stop-1; like a slice, it ends where the steps end."""
         time = self.times.block(start, stop)
-        return _motion(
-            time, self.position.samples(start, stop, time), self.stiffness.samples(start, stop, time)
-        )
+        return self._motion(time, lambda profile: profile.samples(start, stop, time))
 
     def at(self, time: FloatArray) -> Motion:
         """The smooth functions at any times of the span, (samples,); given derivatives play no part."""
-        return _motion(time, self.position.at(time), self.stiffness.at(time))
+        return self._motion(time, lambda profile: profile.at(time))
+
+    def _motion(self, time: FloatArray, rows: Callable[[Profile], FloatArray]) -> Motion:
+        commanded = map(over_time, (*rows(self.position), *rows(self.stiffness)))
+        if self.wrench is None:
+            return Motion(time, *commanded)
+        wrench = Wrench(*map(over_time, rows(self.wrench.profile)), frame=self.wrench.frame)
+        return Motion(time, *commanded, wrench=wrench)
 
     def stretched(self, factor: float) -> Trajectory:
-        """Position and stiffness slower by a factor; steps at a uniform rate keep their rate."""
+        """Position, stiffness and wrench slower by a factor; steps at a uniform rate keep their rate."""
         return Trajectory(
             self.times.stretched(factor),
             self.position.stretched(factor),
             self.stiffness.stretched(factor),
+            wrench=None if self.wrench is None else self.wrench.stretched(factor),
             name=self.name,
             sources=self.sources,
         )
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """Ascending times between which all its functions are analytic; the first and last are its span."""
+        return np.unique(np.concatenate([profile.breakpoints for _, profile in self._profiles()]))
 
     def check_points(self, count: int) -> tuple[FloatArray, FloatArray]:
         """`count` times all over the span at which the derivatives can be checked by finite differences.
@@ -173,7 +230,7 @@ class Trajectory:
             Times (count,), respaced evenly within the pieces of the functions that evenly spread times fall
             into, and for each the distance to the nearest end of its piece, within which all is analytic.
         """
-        ends = np.union1d(self.position.breakpoints, self.stiffness.breakpoints)
+        ends = self.breakpoints
         spread = ends[0] + self.duration * (np.arange(count) + 0.5) / count
         piece, which, hits = np.unique(
             np.searchsorted(ends, spread, side="right") - 1, return_inverse=True, return_counts=True
@@ -184,5 +241,12 @@ class Trajectory:
         return time, np.minimum(time - left, right - time)
 
 
-def _motion(time: FloatArray, position: FloatArray, stiffness: FloatArray) -> Motion:
-    return Motion(time, *(over_time(rows) for rows in (*position, *stiffness)))
+def _recorded_wrench(
+    times: FloatArray, wrench: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
+) -> list[SampledProfile]:
+    """The profile through samples of a wrench, if there are any."""
+    if wrench is not None:
+        return [SampledProfile.from_arrays(WRENCH, times, wrench, *derivatives)]
+    if any(given is not None for given in derivatives):
+        raise InputError.one("derivatives of a wrench are given, but not the wrench")
+    return []

@@ -21,14 +21,17 @@ from vsacli.spec.fields import (
     OneOf,
     PerJoint,
     check_fields,
+    choice,
     integer,
     number,
     text,
     value,
+    vector,
 )
 from vsacli.spec.reading import read_document
 from vsacli.times import Times, UniformTimes
-from vsacli.trajectory import Profile, Trajectory
+from vsacli.trajectory import Profile, Trajectory, WrenchProfile
+from vsacli.wrench import WRENCH_FRAMES
 
 FORMAT = "vsacli-trajectory/1"
 DEFAULT_RATE = 1000.0
@@ -41,6 +44,10 @@ _POSITION_DEGREE = Check(
 _STIFFNESS_DEGREE = Check(
     lambda degree: degree in profiles.DEGREES,
     "odd, 3 to 15 (the stiffness must be twice differentiable, so its rate must vanish at the ends)",
+)
+_WRENCH_DEGREE = Check(
+    lambda degree: degree in profiles.DEGREES,
+    "odd, 3 to 15 (the wrench must be twice differentiable, so its rate must vanish at the ends)",
 )
 
 
@@ -118,8 +125,51 @@ class Recorded:
         check_fields(self)
 
 
+@dataclass(frozen=True)
+class _Framed:
+    frame: str = choice(WRENCH_FRAMES, "along whose axes `fx fy fz mx my mz` are given")
+
+
+@dataclass(frozen=True)
+class WrenchPolynomial(_Framed):
+    """From one wrench to another: all derivatives up to (degree-1)/2 vanish at both ends."""
+
+    degree: int = integer("degree of the polynomial, odd, 3 to 15", check=_WRENCH_DEGREE)
+    start: tuple[float, ...] = vector(6, units.WRENCH, "wrench at the start, `[fx, fy, fz, mx, my, mz]`")
+    end: tuple[float, ...] = vector(6, units.WRENCH, "wrench at the end")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def over(self, span: tuple[float, float]) -> Profile:
+        """The profile from the first to the last time of a span, in s."""
+        return profiles.RestToRest(
+            signal=profiles.WRENCH, span=span, degree=self.degree, start=self.start, end=self.end
+        )
+
+
+@dataclass(frozen=True)
+class WrenchConstant(_Framed):
+    """The same wrench all the time."""
+
+    value: tuple[float, ...] = vector(6, units.WRENCH, "wrench all the time, `[fx, fy, fz, mx, my, mz]`")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def over(self, span: tuple[float, float]) -> Profile:
+        """The profile from the first to the last time of a span, in s."""
+        return profiles.Constant(signal=profiles.WRENCH, span=span, value=self.value)
+
+
+@dataclass(frozen=True)
+class RecordedWrench(Recorded, _Framed):
+    """Samples from a CSV table with the columns fx, fy, fz, mx, my, mz."""
+
+
 PositionCourse: TypeAlias = PositionPolynomial | PositionConstant | Recorded
 StiffnessCourse: TypeAlias = StiffnessPolynomial | StiffnessConstant | Recorded
+WrenchCourse: TypeAlias = WrenchPolynomial | WrenchConstant | RecordedWrench
 
 
 @dataclass(frozen=True)
@@ -147,14 +197,27 @@ class TrajectoryFile:
         OneOf({"polynomial": StiffnessPolynomial, "constant": StiffnessConstant, "csv": Recorded}),
         "stiffness of the joints",
     )
-
-    not_yet = ("wrench",)
+    wrench: WrenchCourse | None = value(
+        OneOf({"polynomial": WrenchPolynomial, "constant": WrenchConstant, "csv": RecordedWrench}),
+        "what the environment exerts on the end effector: force, and moment about the tool frame's origin",
+        default=None,
+    )
 
     def __post_init__(self) -> None:
         check_fields(self, *self._time_problems())
 
+    @property
+    def recorded(self) -> dict[Signal, str]:
+        """The CSV file of each signal that is recorded."""
+        courses = {
+            profiles.POSITION: self.position,
+            profiles.STIFFNESS: self.stiffness,
+            profiles.WRENCH: self.wrench,
+        }
+        return {signal: course.file for signal, course in courses.items() if isinstance(course, Recorded)}
+
     def _time_problems(self) -> Iterator[FieldProblem]:
-        if isinstance(self.position, Recorded) or isinstance(self.stiffness, Recorded):
+        if self.recorded:
             for name in ("duration", "rate"):
                 if getattr(self, name) is not None:
                     yield FieldProblem((name,), "the times come from the CSV file; leave this key out")
@@ -184,6 +247,7 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
         times,
         _profile(document.position, profiles.POSITION, times, recorded),
         _profile(document.stiffness, profiles.STIFFNESS, times, recorded),
+        wrench=_wrench(document.wrench, times, recorded),
         name=document.name,
         warnings=[warning for recording in recordings for warning in recording.warnings],
         sources=[source, *(recording.source for recording in recordings)],
@@ -193,9 +257,8 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
 def _read_recordings(document: TrajectoryFile, folder: Path, robot: Robot) -> list[Recording]:
     """Each CSV file once, for the signals that are wanted from it; all with the times of the first."""
     wanted: dict[Path, list[Signal]] = defaultdict(list)
-    for course, signal in ((document.position, profiles.POSITION), (document.stiffness, profiles.STIFFNESS)):
-        if isinstance(course, Recorded):
-            wanted[folder / course.file].append(signal)
+    for signal, file in document.recorded.items():
+        wanted[folder / file].append(signal)
     recordings = [read_recording(file, robot.joint_names, signals) for file, signals in wanted.items()]
     for other in recordings[1:]:
         recordings[0].check_times(other)
@@ -212,8 +275,16 @@ def _uniform_times(duration: float, rate: float | None) -> UniformTimes:
     return UniformTimes(duration, DEFAULT_RATE if rate is None else rate)
 
 
+def _wrench(
+    course: WrenchCourse | None, times: Times, recorded: Mapping[Signal, SampledProfile]
+) -> WrenchProfile | None:
+    if course is None:
+        return None
+    return WrenchProfile(_profile(course, profiles.WRENCH, times, recorded), course.frame)
+
+
 def _profile(
-    course: PositionCourse | StiffnessCourse,
+    course: PositionCourse | StiffnessCourse | WrenchCourse,
     signal: Signal,
     times: Times,
     recorded: Mapping[Signal, SampledProfile],

@@ -22,6 +22,17 @@ class Quantity:
         return f"{self.revolute} ({self.prismatic} if prismatic)"
 
 
+class WrenchQuantity(Quantity):
+    """A wrench or a rate of it; its moments have the unit `revolute`, its forces the unit `prismatic`."""
+
+    def unit(self, _joint_type: str) -> str:
+        """Both units, whatever the joint."""
+        return str(self)
+
+    def __str__(self) -> str:
+        return f"{self.prismatic} (forces), {self.revolute} (moments)"
+
+
 def constant(unit: str) -> Quantity:
     """A quantity whose unit is the same at every joint."""
     return Quantity(unit, unit)
@@ -44,6 +55,9 @@ SNAP = Quantity("rad/s^4", "m/s^4")
 TORQUE = Quantity("N m", "N")
 TORQUE_RATE = Quantity("N m/s", "N/s")
 TORQUE_ACCELERATION = Quantity("N m/s^2", "N/s^2")
+WRENCH = WrenchQuantity("N m", "N")
+WRENCH_RATE = WrenchQuantity("N m/s", "N/s")
+WRENCH_ACCELERATION = WrenchQuantity("N m/s^2", "N/s^2")
 STIFFNESS = Quantity("N m/rad", "N/m")
 STIFFNESS_RATE = Quantity("N m/(rad s)", "N/(m s)")
 STIFFNESS_ACCELERATION = Quantity("N m/(rad s^2)", "N/(m s^2)")

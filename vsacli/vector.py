@@ -130,3 +130,19 @@ class Rotation(NamedTuple):
             add(mul(self.cos_alpha, y), mul(self.sin_alpha, v.z)),
             sub(mul(self.cos_alpha, v.z), mul(self.sin_alpha, y)),
         )
+
+
+class Matrix(NamedTuple):
+    """A 3x3 matrix, by its rows."""
+
+    x: Vector
+    y: Vector
+    z: Vector
+
+    def times(self, v: Vector) -> Vector:
+        """The matrix applied to a vector."""
+        return Vector(self.x.dot(v), self.y.dot(v), self.z.dot(v))
+
+    def transposed(self) -> Matrix:
+        """Its transpose, which is the inverse of a rotation."""
+        return Matrix(*(Vector(*column) for column in zip(self.x, self.y, self.z, strict=True)))

@@ -21,6 +21,11 @@ STEP = 1e-200
 LARGEST_TORQUE = 1e5
 """N m; what springs without an end are scanned up to."""
 
+ROUNDING = 1e-12
+"""Relative changes of the stiffness that are none."""
+CLOSE = np.concatenate(([0.0], np.geomspace(1e-6, 0.1, 200)))
+"""Shares of the torque at an end that are scanned there; closer, the stiffness of a four-bar is rounding."""
+
 
 @dataclass(frozen=True)
 class Curve:
@@ -159,13 +164,13 @@ class Springs:
         outer, sign = values[0], 0.0
         for _ in range(5):
             change = np.diff(values)
-            noticed = np.abs(change) > 1e-14 * values[1:]
+            noticed = np.abs(change) > ROUNDING * values[1:]
             if not sign:
                 sign = float(np.sign(change[noticed.argmax()])) if noticed.any() else -1.0
             turning = np.flatnonzero(noticed & (sign * change < 0))
             if not turning.size:
                 break
-            cell = slice(max(turning[0] - 1, 0), turning[0] + 2)
+            cell = slice(max(turning[0] - 1, 0), turning[0] + 3)
             nodes = np.linspace(nodes[cell][0], nodes[cell][-1], 41)
             values = self.stiffness(nodes, tau_e)
         return float(outer), float(values.min() if sign < 0 else values.max())
@@ -177,7 +182,7 @@ class Springs:
         largest = np.minimum(np.minimum(high_1, tau_e - low_2), 2 * np.maximum(np.abs(tau_1), np.abs(tau_e)))
         values = self.stiffness(tau_1 + shares * (largest - tau_1), tau_e)
         change = np.diff(values, axis=0)
-        rounding = 1e-13 * values[1:]
+        rounding = ROUNDING * values[1:]
         monotone: BoolArray = np.all(change >= -rounding, axis=0) | np.all(change <= rounding, axis=0)
         return monotone
 
@@ -187,6 +192,7 @@ def _nodes(tau_e: float, least: float, largest: float) -> FloatArray:
     size = max(abs(tau_e), 1.0)
     near = size * np.geomspace(1e-13, 4, 700)
     nodes = np.concatenate([centre + sign * near for centre in (0.0, tau_e) for sign in (-1, 1)])
-    ends = [end for end in (least, largest) if math.isfinite(end)]
-    nodes = np.concatenate((nodes, np.linspace(-abs(tau_e), 2 * abs(tau_e), 1500), [0.0, tau_e], ends))
+    inwards = [(least, 1), (largest, -1)]
+    ends = [end + sign * abs(end) * CLOSE for end, sign in inwards if math.isfinite(end)]
+    nodes = np.concatenate((nodes, np.linspace(-abs(tau_e), 2 * abs(tau_e), 1500), [0.0, tau_e], *ends))
     return np.unique(nodes[(nodes >= least) & (nodes <= largest)])[::-1]

@@ -12,14 +12,15 @@ import numpy as np
 from vsacli import __version__
 from vsacli.robot import Robot
 from vsacli.store.inputs import write_robot, write_sources
-from vsacli.store.schema import FORMAT, TEXT, chunk_rows, storable, storage_type, variable_attributes
+from vsacli.store.schema import TEXT, chunk_rows, storable, storage_type, variable_attributes
 from vsacli.trajectory import Trajectory
 from vsacli.variables import MOTORS, VARIABLES, Variable
+from vsacli.wrench import WRENCH_AXES
 
 
 def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
     """Lengths of the axes after time."""
-    lengths = {"joint": joints, "motor": len(MOTORS)}
+    lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
     return tuple(lengths[dim] for dim in variable.dims)
 
 
@@ -29,11 +30,19 @@ def row_bytes(variable: Variable, joints: int) -> int:
 
 
 def create_layout(
-    file: h5py.File, robot: Robot, trajectory: Trajectory, variables: tuple[Variable, ...], command_line: str
+    file: h5py.File,
+    format_name: str,
+    robot: Robot,
+    trajectory: Trajectory,
+    variables: tuple[Variable, ...],
+    command_line: str,
 ) -> None:
     """Write everything that is known before the first sample; the time axis has its planned length."""
+    file.attrs["format"] = format_name
     file.attrs.update(_root_attributes(robot, trajectory, command_line))
     _create_coordinates(file, robot, trajectory.samples)
+    if trajectory.wrench is not None and any("wrench_axis" in variable.dims for variable in variables):
+        _create_wrench_axis(file, trajectory.wrench.frame)
     for variable in variables:
         dataset = _create_variable(file, variable, robot, trajectory.samples)
         for axis, dim in enumerate(("time", *variable.dims)):
@@ -51,7 +60,6 @@ def _root_attributes(robot: Robot, trajectory: Trajectory, command_line: str) ->
         "h5py": h5py.__version__,
     }
     return {
-        "format": FORMAT,
         "generated_by": f"vsacli {__version__}",
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "command_line": storable(command_line),
@@ -70,6 +78,12 @@ def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> None:
     motor = file.create_dataset("motor", data=np.array(MOTORS, dtype="<i8"), track_order=True)
     motor.attrs["long_name"] = "motor of a joint"
     motor.make_scale("motor")
+
+
+def _create_wrench_axis(file: h5py.File, frame: str) -> None:
+    axis = _create_labels(file, "wrench_axis", WRENCH_AXES, "force and moment along the axes of a frame")
+    axis.attrs["frame"] = frame
+    axis.make_scale("wrench_axis")
 
 
 def _create_labels(file: h5py.File, name: str, labels: tuple[str, ...], long_name: str) -> h5py.Dataset:

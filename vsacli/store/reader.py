@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,13 +14,13 @@ import h5py
 from vsacli.arrays import FlagArray, FloatArray
 from vsacli.errors import InputError, StorageError
 from vsacli.store.schema import FORMAT
-from vsacli.variables import VARIABLES, select_variables
+from vsacli.variables import VARIABLES, Variable, select_variables
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class StoredResult:
-    """An open result file; a context manager that closes it.
+    """An open result file; a context manager that closes it. A subclass reads another format.
 
     Attributes:
         path: the file, as given.
@@ -34,6 +34,28 @@ class StoredResult:
         report: the report of the run, as in `--json`.
     """
 
+    format = FORMAT
+    declared: Mapping[str, Variable] = VARIABLES
+
+    @classmethod
+    def open(cls, path: str | Path) -> Self:
+        """Open a file.
+
+        Raises:
+            InputError: there is no such file, or it is not a complete file of the format this version reads.
+            StorageError: the operating system refuses to read it, or another program is writing it.
+        """
+        _check_signature(path)
+        with contextlib.ExitStack() as stack:
+            with _reporting_damage(path):
+                file = stack.enter_context(h5py.File(path, "r"))
+                found = file.attrs.get("format")
+            if found != cls.format:
+                raise InputError.one(_foreign(found, cls.format), path)
+            result = cls(path, file)
+            stack.pop_all()
+        return result
+
     def __init__(self, path: str | Path, file: h5py.File) -> None:
         self.path = Path(path)
         self._file = file
@@ -46,7 +68,7 @@ class StoredResult:
             self.joint_names: tuple[str, ...] = tuple(file["joint"].asstr()[...])
             self.joint_types: tuple[str, ...] = tuple(file["joint_type"].asstr()[...])
             self.variables = tuple(
-                name for name, variable in VARIABLES.items() if variable.dims and name in file
+                name for name, variable in self.declared.items() if variable.dims and name in file
             )
             self.time: FloatArray = file["time"][...]
             self.samples = len(self.time)
@@ -58,7 +80,7 @@ class StoredResult:
         Raises:
             InputError: there is no such variable, the file does not hold it, or the file is damaged.
         """
-        select_variables([name])
+        select_variables([name], self.declared)
         if name not in self._file:
             message = f"holds no {name}; run invdyn again without --variables, or with {name} among them"
             raise InputError.one(message, self.path)
@@ -80,22 +102,8 @@ class StoredResult:
 
 
 def open_result(path: str | Path) -> StoredResult:
-    """Open a result file.
-
-    Raises:
-        InputError: there is no such file, or it is not a complete result file of a format this version reads.
-        StorageError: the operating system refuses to read it, or another program is writing it.
-    """
-    _check_signature(path)
-    with contextlib.ExitStack() as stack:
-        with _reporting_damage(path):
-            file = stack.enter_context(h5py.File(path, "r"))
-            found = file.attrs.get("format")
-        if found != FORMAT:
-            raise InputError.one(_foreign(found), path)
-        result = StoredResult(path, file)
-        stack.pop_all()
-    return result
+    """Open a result file of `invdyn`; see `StoredResult.open`."""
+    return StoredResult.open(path)
 
 
 def _check_signature(path: str | Path) -> None:
@@ -116,10 +124,10 @@ def _check_signature(path: str | Path) -> None:
         raise InputError.one(f"{kind}; expected a result file, as invdyn writes it", path)
 
 
-def _foreign(found: object) -> str:
+def _foreign(found: object, expected: str) -> str:
     if isinstance(found, str) and found.startswith("vsacli-"):
-        return f"has the format {found}, but this version reads {FORMAT}; run invdyn again"
-    return f"is an HDF5 file, but no result file: it has no attribute format = {FORMAT!r}"
+        return f"has the format {found}, but this version reads {expected}; run invdyn again"
+    return f"is an HDF5 file, but no result file: it has no attribute format = {expected!r}"
 
 
 @contextlib.contextmanager

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from vsacli.flags import Flag
-from vsacli.units import Quantity
+from vsacli.units import Quantity, WrenchQuantity
 from vsacli.variables import Variable
 
 FORMAT = "vsacli-result/1"
@@ -17,7 +17,13 @@ TEXT = h5py.string_dtype("utf-8")
 
 
 def unit_attributes(quantity: Quantity, joint_types: tuple[str, ...]) -> dict[str, str]:
-    """`units`, and if the robot's joints differ in it, `units_revolute` and `units_prismatic`."""
+    """`units`; if the robot's joints differ in it, or forces and moments do, one more attribute for each."""
+    if isinstance(quantity, WrenchQuantity):
+        return {
+            "units": "see wrench_axis",
+            "units_force": quantity.prismatic,
+            "units_moment": quantity.revolute,
+        }
     found = sorted({quantity.unit(joint_type) for joint_type in joint_types})
     if len(found) == 1:
         return {"units": found[0]}

@@ -7,22 +7,35 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import h5py
 
+from vsacli.arrays import FloatArray
+from vsacli.errors import InputError
 from vsacli.robot import Robot
 from vsacli.store.atomic import AtomicFile, check_free_space, reporting_storage_errors, storage_error
 from vsacli.store.interrupts import interrupts_deferred
 from vsacli.store.layout import create_layout, row_bytes
-from vsacli.store.schema import TEXT, storable
+from vsacli.store.schema import FORMAT, TEXT, storable
 from vsacli.store.sink import Sink
 from vsacli.trajectory import Trajectory
-from vsacli.variables import VARIABLES, Block, select_variables
+from vsacli.variables import VARIABLES, Variable, select_variables
+from vsacli.wrench import WRENCH_NAMES
+
+
+class Samples(Protocol):
+    """Consecutive steps: times, and an array for each variable under its name."""
+
+    @property
+    def time(self) -> FloatArray:
+        """Times, (samples,), s."""
 
 
 class ResultWriter:
     """Context manager that writes a result file, which exists only after `finish`.
+
+    A subclass writes another format: other variables in the same layout.
 
     HDF5 crashes if an exception crosses its code. So its file is a `Sink`, which raises none, and Ctrl-C
     waits until a block is written.
@@ -31,13 +44,15 @@ class ResultWriter:
         path: the file to write.
         robot: the robot of the run, stored as resolved arrays.
         trajectory: gives the name, the number of samples, and the files that were read.
-        variables: names of the variables to store, all by default; the coordinates always are.
+        variables: names of the variables to store, all there are by default; the coordinates always are.
         overwrite: whether an existing file may be replaced.
         command_line: what the user typed, for the record.
 
     Raises:
-        InputError: a name in `variables` is none.
+        InputError: a name in `variables` is none, or of a wrench the trajectory does not have.
     """
+
+    _format = FORMAT
 
     def __init__(
         self,
@@ -52,7 +67,7 @@ class ResultWriter:
         self.path = Path(path)
         self._robot = robot
         self._trajectory = trajectory
-        self._variables = select_variables(VARIABLES if variables is None else variables)
+        self._variables = self._selected(variables, trajectory)
         self._stored = ("time", *(variable.name for variable in self._variables))
         self._overwrite = overwrite
         self._command_line = command_line
@@ -73,7 +88,7 @@ class ResultWriter:
             raise
         return self
 
-    def write(self, block: Block) -> None:
+    def write(self, block: Samples) -> None:
         """Append a block of steps.
 
         Raises:
@@ -128,9 +143,11 @@ class ResultWriter:
         with self._hdf5():
             file = h5py.File(self._sink, "w", libver=("earliest", "v110"), track_order=True)
             self._file = self._cleanup.enter_context(file)
-            create_layout(file, self._robot, self._trajectory, self._variables, self._command_line)
+            create_layout(
+                file, self._format, self._robot, self._trajectory, self._variables, self._command_line
+            )
 
-    def _append(self, block: Block) -> None:
+    def _append(self, block: Samples) -> None:
         stop = self._written + len(block.time)
         for name in self._stored:
             self._file[name][self._written : stop] = getattr(block, name)
@@ -146,5 +163,18 @@ class ResultWriter:
 
     def _size(self) -> int:
         """Bytes of all samples, flags before compression."""
-        row = sum(row_bytes(VARIABLES[name], len(self._robot.joints)) for name in self._stored)
+        stored = (VARIABLES["time"], *self._variables)
+        row = sum(row_bytes(variable, len(self._robot.joints)) for variable in stored)
         return self._trajectory.samples * row
+
+    @staticmethod
+    def _selected(names: Iterable[str] | None, trajectory: Trajectory) -> tuple[Variable, ...]:
+        """The variables of these names, or all that a run along the trajectory has."""
+        absent = WRENCH_NAMES if trajectory.wrench is None else ()
+        if names is None:
+            return select_variables(name for name in VARIABLES if name not in absent)
+        selected = select_variables(names)
+        for variable in selected:
+            if variable.name in absent:
+                raise InputError.one(f"there is no {variable.name}: the trajectory has no wrench")
+        return selected

@@ -1,0 +1,30 @@
+"""The simulation file: the layout of a result file, with the variables of a simulation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from vsacli.simulation.variables import SIMULATION_VARIABLES
+from vsacli.store.reader import StoredResult
+from vsacli.store.writer import ResultWriter
+from vsacli.trajectory import Trajectory
+from vsacli.variables import Variable, select_variables
+
+FORMAT = "vsacli-simulation/1"
+
+
+class SimulationWriter(ResultWriter):
+    """Writes a simulation file; the trajectory's samples are the most it can have."""
+
+    _format = FORMAT
+
+    @staticmethod
+    def _selected(names: Iterable[str] | None, _trajectory: Trajectory) -> tuple[Variable, ...]:
+        return select_variables(SIMULATION_VARIABLES if names is None else names, SIMULATION_VARIABLES)
+
+
+class StoredSimulation(StoredResult):
+    """An open simulation file; a context manager that closes it."""
+
+    format = FORMAT
+    declared = SIMULATION_VARIABLES
