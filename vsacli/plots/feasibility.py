@@ -1,0 +1,30 @@
+"""The figure of `check-feasibility`: the stiffness of each joint inside its corridor."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from vsacli.plots.corridor import MOST_ROWS, draw_corridors
+from vsacli.plots.curves import Failures
+from vsacli.plots.layout import PANEL_WIDTH, complete, folding, result_title
+from vsacli.plots.style import house_style
+from vsacli.store.reader import StoredResult
+
+FEASIBILITY = "feasibility"
+"""Name of the figure; its file is called `<stem>-feasibility`."""
+
+FEASIBILITY_VARIABLES = ("stiffness", "stiffness_lower", "stiffness_upper", "flags")
+"""What it is drawn from."""
+
+PANEL_HEIGHT = 1.7
+"""Inches."""
+
+
+def plot_feasibility(result: StoredResult) -> Figure:
+    """Draw the commanded stiffness of each joint inside what its load allows, bad stretches shaded."""
+    rows, folds = folding(len(result.joint_names), MOST_ROWS)
+    width = 2 * PANEL_WIDTH if folds == 1 else PANEL_WIDTH * folds
+    with house_style():
+        figure = Figure((width, PANEL_HEIGHT * rows + 1), layout="constrained")
+        handles = draw_corridors(figure.add_gridspec()[0], result, Failures.of(result))
+        return complete(figure, result_title(result), handles)
