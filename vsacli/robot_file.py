@@ -18,4 +18,4 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
         InputError: with every problem of the file, each with its line.
     """
     robot, source = read_document(path, Robot, FORMAT)
-    return dataclasses.replace(robot, sources=(source,))
+    return dataclasses.replace(robot, sources=(source, *robot.spring_sources))

@@ -1,8 +1,8 @@
 """Two springs on a joint by brute force: the reachable stiffness from dense scans along the torque balance.
 
-A spring is its torque as a formula; the stiffness is a complex step, the inverse a table lookup with Newton steps.
-The scan knows nothing of hardening or of where critical points may lie: it walks in from the largest preload until
-the joint stiffness turns around.
+A spring is its torque as a formula; the stiffness is a complex step, the inverse a table lookup with Newton
+steps. The scan knows nothing of hardening or of where critical points may lie: it walks in from the largest
+preload until the joint stiffness turns around.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Curve:
         """Inverse of the torque; its ends beyond them."""
         phis, torques = self._table
         phi = np.interp(torque, torques, phis)
-        for _ in range(4):  # each squares the relative error of the lookup, 1e-4
+        for _ in range(2):  # each squares the relative error of the lookup, 1e-5
             stiffness = self.stiffness(phi)
             step = np.divide(
                 self.torque(phi) - torque, stiffness, out=np.zeros_like(phi), where=stiffness > 0
@@ -84,10 +84,6 @@ class Curve:
         while abs(self.torque(sign * reach)) < LARGEST_TORQUE:
             reach *= 1.1
         return reach
-
-
-def cubic(k: float, k_c: float) -> Curve:
-    return Curve(lambda phi: k * phi + k_c * phi**3)
 
 
 def polynomial(*coefficients: float) -> Curve:
@@ -176,7 +172,7 @@ class Springs:
         return float(outer), float(values.min() if sign < 0 else values.max())
 
     def on_branch(self, tau_1: FloatArray, tau_e: FloatArray, nodes: int) -> BoolArray:
-        """Whether the stiffness is monotone from a torque of side 1 to the largest preload; arrays (samples,)."""
+        """Whether the stiffness is monotone from a torque of side 1 to the largest preload; (samples,)."""
         shares = np.unique(np.concatenate((np.geomspace(1e-6, 1, nodes), np.linspace(0, 1, nodes))))[:, None]
         (_, high_1), (low_2, _) = self.first.torque_ends, self.second.torque_ends
         largest = np.minimum(np.minimum(high_1, tau_e - low_2), 2 * np.maximum(np.abs(tau_1), np.abs(tau_e)))

@@ -124,7 +124,10 @@ class TableFile(Kind):
 
 @dataclass(frozen=True)
 class PerJoint(Kind):
-    """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint."""
+    """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint.
+
+    Joints that have no such quantity are named in no mapping and null in a list; their entry is None.
+    """
 
     unit: Quantity
 
@@ -250,6 +253,6 @@ def repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
 def _check_numbers(name: str, check: Check, content: Any) -> Iterator[FieldProblem]:
     in_tuple = isinstance(content, tuple)
     for index, item in enumerate(content if in_tuple else (content,)):
-        if not check.holds(item):
+        if item is not None and not check.holds(item):
             path = (name, index) if in_tuple else (name,)
             yield FieldProblem(path, f"must be {check.requirement}, not {item:g}")

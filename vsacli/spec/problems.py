@@ -51,4 +51,6 @@ class Problems:
             raise InputError(self._in_order())
 
     def _in_order(self, *last: Problem) -> list[Problem]:
-        return sorted(dict.fromkeys([*self._found, *last]), key=lambda problem: (problem.file != self.file, problem))
+        return sorted(
+            dict.fromkeys([*self._found, *last]), key=lambda problem: (problem.file != self.file, problem)
+        )

@@ -26,6 +26,7 @@ from vsacli.spec.source import Source, read_source
 from vsacli.spec.values import INVALID, Scope, all_valid, read_value, unexpected
 from vsacli.spec.yaml_tree import parse_yaml
 from vsacli.suggestions import did_you_mean, nearest
+from vsacli.units import Quantity
 
 _Document = TypeVar("_Document")
 
@@ -35,6 +36,7 @@ def read_document(
     cls: type[_Document],
     format_name: str,
     members: Mapping[str, str] | None = None,
+    exempt: Mapping[Quantity, Mapping[str, str]] | None = None,
 ) -> tuple[_Document, Source]:
     """Read a YAML file into a record.
 
@@ -43,6 +45,7 @@ def read_document(
         cls: the record class of the whole document.
         format_name: what its key `format` has to say.
         members: name and unit variant of every joint, where the document has PerJoint values.
+        exempt: for a quantity the joints that have none, each with the reason: a clause about the joint.
 
     Raises:
         InputError: with every problem of the file, each with its line.
@@ -53,7 +56,7 @@ def read_document(
     if not isinstance(root, tree.Mapping):
         problems.fail(root.line, f"expected a mapping that begins with `format: {format_name}`, found {root}")
     _check_format(root, format_name, problems)
-    record = _read_record_of(cls, root, "", Scope(problems, members or {}), beside=("format",))
+    record = _read_record_of(cls, root, "", Scope(problems, members or {}, exempt or {}), beside=("format",))
     problems.check()
     return record, source
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import singledispatch
 from pathlib import Path
@@ -41,11 +41,13 @@ class Scope:
     Attributes:
         problems: receives everything that is wrong.
         members: name and unit variant of every joint, for PerJoint values.
+        exempt: for a quantity the joints that have none, each with the reason.
         variant: the choice on which units depend here, None while it is unknown.
     """
 
     problems: Problems
     members: Mapping[str, str]
+    exempt: Mapping[Quantity, Mapping[str, str]]
     variant: str | None = None
 
     def unit(self, quantity: Quantity) -> str:
@@ -151,36 +153,53 @@ def _read_table_file(kind: TableFile, node: tree.Node, label: str, scope: Scope)
 
 @read_value.register
 def _read_per_joint(kind: PerJoint, node: tree.Node, label: str, scope: Scope) -> Any:
-    nodes = _one_per_joint(node, label, scope)
+    exempt = scope.exempt.get(kind.unit, {})
+    nodes = _by_joint(node, label, scope, exempt)
     if nodes is None:
         return INVALID
-    variants = scope.members.values()
     return all_valid(
-        _number(item, kind.unit.unit(variant), label, scope)
-        for item, variant in zip(nodes, variants, strict=True)
+        _no_number(nodes.get(name), name, exempt[name], label, scope)
+        if name in exempt
+        else _number(nodes[name], kind.unit.unit(variant), label, scope)
+        for name, variant in scope.members.items()
     )
 
 
-def _one_per_joint(node: tree.Node, label: str, scope: Scope) -> Collection[tree.Node] | None:
+def _no_number(node: tree.Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:
+    """None, for a joint that must not have a number."""
+    if node is None or (isinstance(node, tree.Scalar) and node.is_null):
+        return None
+    return unexpected(node, f"no value for {name}", label, scope, f": {reason}")
+
+
+def _by_joint(
+    node: tree.Node, label: str, scope: Scope, exempt: Mapping[str, str]
+) -> Mapping[str, tree.Node] | None:
+    """What is written for each joint, a scalar for those that are not exempt; None if joints are wrong."""
     names = scope.members
     match node:
         case tree.Scalar():
-            return [node] * len(names)
+            return {name: node for name in names if name not in exempt}
         case tree.Sequence(items=items) if len(items) != len(names):
             unexpected(node, f"{len(names)} numbers, one for each joint", label, scope)
             return None
         case tree.Sequence(items=items):
-            return items
-        case tree.Mapping(entries=entries, key_lines=key_lines):
-            for unknown in [name for name in entries if name not in names]:
-                message = f"{label}: no joint is called {tree.quoted(unknown)}{did_you_mean(unknown, names)}"
-                scope.problems.add(key_lines[unknown], message)
-            missing = [name for name in names if name not in entries]
-            if missing:
-                scope.problems.add(
-                    node.line, f"{label}: no value for {', '.join(missing)}; each joint needs one"
-                )
-            return [entries[name] for name in names] if entries.keys() == names.keys() else None
+            return dict(zip(names, items, strict=True))
+        case tree.Mapping(entries=entries):
+            return entries if _check_names(node, label, scope, exempt) else None
+
+
+def _check_names(node: tree.Mapping, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
+    """Note names that are no joint's, and joints without a value."""
+    names = scope.members
+    unknown = [name for name in node.entries if name not in names]
+    for name in unknown:
+        message = f"{label}: no joint is called {tree.quoted(name)}{did_you_mean(name, names)}"
+        scope.problems.add(node.key_lines[name], message)
+    missing = [name for name in names if name not in node.entries and name not in exempt]
+    if missing:
+        scope.problems.add(node.line, f"{label}: no value for {', '.join(missing)}; each joint needs one")
+    return not unknown and not missing
 
 
 def all_valid(values: Iterable[Any]) -> Any:

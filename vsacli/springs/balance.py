@@ -21,18 +21,18 @@ class Balance:
     first: SpringLaw
     second: SpringLaw
 
-    def deflections(self, t: FloatArray, tau_e: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """phi_1 and phi_2."""
-        return self.first.deflection(tau_e / 2 + t), self.second.deflection(tau_e / 2 - t)
+    def deflections(self, tau_1: FloatArray, tau_2: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """phi_1 and phi_2 under the torques of the two springs."""
+        return self.first.deflection(tau_1), self.second.deflection(tau_2)
 
-    def stiffness(self, t: FloatArray, tau_e: FloatArray) -> FloatArray:
-        """G(t)."""
-        phi_1, phi_2 = self.deflections(t, tau_e)
+    def stiffness(self, tau_1: FloatArray, tau_2: FloatArray) -> FloatArray:
+        """G under the torques of the two springs."""
+        phi_1, phi_2 = self.deflections(tau_1, tau_2)
         return self.first.stiffness(phi_1) + self.second.stiffness(phi_2)
 
     def slope(self, t: FloatArray, tau_e: FloatArray) -> FloatArray:
         """dG/dt."""
-        phi_1, phi_2 = self.deflections(t, tau_e)
+        phi_1, phi_2 = self.deflections(*torques(t, tau_e))
         return self.first.hardening(phi_1) - self.second.hardening(phi_2)
 
     def domain(self, tau_e: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -45,12 +45,16 @@ class Balance:
 
     def is_slack(self, t: FloatArray, tau_e: FloatArray) -> BoolArray:
         """Whether a side that only pulls carries no torque."""
-        slack: BoolArray = (self.first.pulls_only & (t == -tau_e / 2)) | (
-            self.second.pulls_only & (t == tau_e / 2)
-        )
+        tau_1, tau_2 = torques(t, tau_e)
+        slack: BoolArray = (self.first.pulls_only & (tau_1 == 0)) | (self.second.pulls_only & (tau_2 == 0))
         return slack
 
     def slope_is_monotone(self, tau_e: FloatArray) -> BoolArray:
         """Whether dG/dt surely increases with t as long as both torques have the sign of tau_e."""
         (low_1, high_1), (low_2, high_2) = self.first.hardening_peak, self.second.hardening_peak
         return (max(low_1, low_2) <= tau_e) & (tau_e <= min(high_1, high_2))
+
+
+def torques(t: FloatArray, tau_e: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """tau_1 and tau_2 at a preload torque."""
+    return tau_e / 2 + t, tau_e / 2 - t

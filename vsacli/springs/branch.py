@@ -48,10 +48,6 @@ class Piece(NamedTuple):
     rising: BoolArray
     critical: BoolArray
 
-    def select(self, samples: BoolArray) -> Piece:
-        """The piece at some of the samples."""
-        return Piece(self.inner[samples], self.outer[samples], self.rising[samples], self.critical[samples])
-
 
 def outermost_piece(balance: Balance, tau_e: FloatArray) -> Piece:
     """The piece of G that reaches the largest preload, for each tau_e (samples,)."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.arrays import BoolArray, FloatArray
-from vsacli.springs.balance import Balance
+from vsacli.arrays import FloatArray
+from vsacli.springs.balance import Balance, torques
 from vsacli.springs.bracketing import bracketed_root
-from vsacli.springs.branch import Piece, outermost_piece
+from vsacli.springs.branch import outermost_piece
 from vsacli.springs.law import SpringLaw
 from vsacli.springs.pair import Pair, PairSolution
 
@@ -26,16 +26,15 @@ class IteratedPair(Pair):
         balance = Balance(self.first, self.second)
         piece = outermost_piece(balance, tau_e)
         carried = piece.inner <= piece.outer
-        at_inner = _stiffness(balance, piece.inner, tau_e, carried)
-        at_outer = _stiffness(balance, piece.outer, tau_e, carried & np.isfinite(piece.outer))
-        at_outer[carried & np.isinf(piece.outer)] = np.inf
+        at_inner, at_outer, phi_1, phi_2 = np.full((4, tau_e.size), np.nan)
+        walk = _Walk(balance, *torques(piece.inner[carried], tau_e[carried]))
+        width = (piece.outer - piece.inner)[carried]
+        at_inner[carried] = walk.stiffness(np.zeros_like(width))
+        at_outer[carried] = walk.end_stiffness(width)
         lower = np.where(piece.rising, at_inner, at_outer)
         upper = np.where(piece.rising, at_outer, at_inner)
-
-        preload = np.full_like(tau_e, np.nan)
         demand = np.clip(stiffness, lower, upper)
-        preload[carried] = _preload(balance, piece.select(carried), tau_e[carried], demand[carried])
-        phi_1, phi_2 = balance.deflections(preload, tau_e)
+        phi_1[carried], phi_2[carried] = walk.deflections(width, demand[carried])
         return PairSolution(
             lower=lower,
             upper=upper,
@@ -47,30 +46,43 @@ class IteratedPair(Pair):
         )
 
 
-def _stiffness(balance: Balance, t: FloatArray, tau_e: FloatArray, where: BoolArray) -> FloatArray:
-    result = np.full_like(tau_e, np.nan)
-    result[where] = balance.stiffness(t[where], tau_e[where])
-    return result
+@dataclass(frozen=True)
+class _Walk:
+    """The piece from its inner end outwards; arrays (samples,).
 
+    Distances are preload torques counted from there, so that the torque of a spring that is nearly slack at
+    the inner end keeps its digits.
+    """
 
-def _preload(balance: Balance, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
-    """The preload torque at which the piece has the demanded stiffness, which lies within its ends."""
-    return bracketed_root(
-        lambda t, torque, stiffness: balance.stiffness(t, torque) - stiffness,
-        piece.inner,
-        _finite_outer_end(balance, piece, tau_e, demand),
-        tau_e,
-        demand,
-    )
+    balance: Balance
+    tau_1: FloatArray
+    tau_2: FloatArray
 
+    def stiffness(self, distance: FloatArray) -> FloatArray:
+        """G at a distance."""
+        return self.balance.stiffness(self.tau_1 + distance, self.tau_2 - distance)
 
-def _finite_outer_end(balance: Balance, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
-    """A preload torque beyond which the stiffness exceeds the demand, by doubling the distance."""
-    outer = piece.outer.copy()
-    short = np.flatnonzero(np.isinf(outer))
-    step = np.abs(tau_e) + demand
-    while short.size:
-        outer[short] = piece.inner[short] + step[short]
-        step *= 2
-        short = short[balance.stiffness(outer[short], tau_e[short]) < demand[short]]
-    return outer
+    def end_stiffness(self, width: FloatArray) -> FloatArray:
+        """G at the outer end; +inf where there is none."""
+        endless = np.isinf(width)
+        return np.where(endless, np.inf, self.stiffness(np.where(endless, 0, width)))
+
+    def deflections(self, width: FloatArray, demand: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """phi_1 and phi_2 where the piece has the demanded stiffness, which lies within its ends."""
+        distance = bracketed_root(
+            lambda x, tau_1, tau_2, wanted: self.balance.stiffness(tau_1 + x, tau_2 - x) - wanted,
+            np.zeros_like(width),
+            self._finite(width, demand),
+            self.tau_1,
+            self.tau_2,
+            demand,
+        )
+        return self.balance.deflections(self.tau_1 + distance, self.tau_2 - distance)
+
+    def _finite(self, width: FloatArray, demand: FloatArray) -> FloatArray:
+        """The width, or where it is infinite a distance at which G exceeds the demand."""
+        endless = np.isinf(width)
+        width = np.where(endless, np.abs(self.tau_1) + np.abs(self.tau_2) + demand, width)
+        while (short := endless & (self.stiffness(width) < demand)).any():
+            width = np.where(short, 2 * width, width)
+        return width

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from vsacli.arrays import FloatArray
 from vsacli.spec.fields import POSITIVE_OR_INFINITE, check_fields, number
+from vsacli.spec.source import Source
 from vsacli.springs.pair import Pair
 from vsacli.units import POSITION
 
@@ -49,6 +50,11 @@ class SpringLaw(ABC):
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user should know about how the law was made."""
+        return ()
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Files that the law was read from."""
         return ()
 
     @property

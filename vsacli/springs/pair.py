@@ -31,6 +31,11 @@ class PairSolution(NamedTuple):
     phi_1: FloatArray
     phi_2: FloatArray
 
+    @property
+    def deflections(self) -> FloatArray:
+        """phi_1 and phi_2, (2, samples)."""
+        return np.stack((self.phi_1, self.phi_2))
+
     def mirrored(self) -> PairSolution:
         """The same with the two sides exchanged."""
         return self._replace(phi_1=self.phi_2, phi_2=self.phi_1)
@@ -55,7 +60,10 @@ class Pair(ABC):
 
 
 def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> PairSolution:
-    """Solution of two tendons: slack below, unbounded above, singular nowhere."""
+    """Solution of two tendons: slack below, unbounded above, singular nowhere.
+
+    Deflections that rounding has made those of a tendon that pushes are zero.
+    """
     never = np.zeros(lower.shape, dtype=bool)
     return PairSolution(
         lower=lower,
@@ -63,6 +71,6 @@ def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> 
         lower_critical=never,
         upper_critical=never,
         slack_below=~never,
-        phi_1=phi_1,
-        phi_2=phi_2,
+        phi_1=np.maximum(phi_1, 0),
+        phi_2=np.minimum(phi_2, 0),
     )

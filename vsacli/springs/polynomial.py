@@ -80,7 +80,8 @@ class Polynomial(SpringLaw):
             for index, coefficient in enumerate(self._coefficients)
             if coefficient > 0
         ]
-        return np.copysign(inverse(self, load, np.zeros_like(load), np.minimum.reduce(bounds)), torque)
+        high = np.minimum.reduce(bounds)
+        return np.copysign(inverse(self, load, np.zeros_like(load), high, start=high), torque)
 
     def _evaluate(self, order: int, phi: FloatArray) -> FloatArray:
         result: FloatArray = self._derivatives[order](phi)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from vsacli.springs.pair import Pair, PairSolution
 
 @dataclass(frozen=True)
 class Sinh(SpringLaw):
-    """tau = k sinh(a phi); qbmove advanced kit manual (April 2021), section 3.2.2."""
+    """tau = k sinh(a phi), the qbmove and VSA-CubeBot family; qbmove Advanced manual (April 2021), 3.2.2."""
 
     k: float = number(units.TORQUE, "torque scale k", check=POSITIVE)
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
@@ -53,8 +54,9 @@ class Sinh(SpringLaw):
 class SinhPair(Pair):
     """Two sinh springs of the same a, from their sum and difference.
 
-    With x = sigma/a: x^2 - tau_e^2 = k_1^2 + k_2^2 + 2 k_1 k_2 cosh(a(phi_1 - phi_2)), and
-    x +- tau_e = k_1 exp(+-a phi_1) + k_2 exp(+-a phi_2).
+    With h = a(phi_1 - phi_2)/2, m = a(phi_1 + phi_2)/2 and x = sigma/a:
+    x^2 - tau_e^2 = (k_1 + k_2)^2 + 4 k_1 k_2 sinh(h)^2 = R^2, and
+    m = asinh(tau_e/R) - asinh((k_1 - k_2) sinh(h)/R).
     """
 
     first: Sinh
@@ -65,18 +67,22 @@ class SinhPair(Pair):
         a, k_1, k_2 = self.first.a, self.first.k, self.second.k
         lower = a * np.hypot(tau_e, k_1 + k_2)
         demand = np.maximum(stiffness, lower)
-        excess = (demand - lower) / a * ((demand + lower) / a)
-        spread = 2 * np.arcsinh(np.sqrt(excess / (4 * k_1 * k_2)))
-        # The sign that adds x and |tau_e| keeps the digits.
-        sign = np.where(tau_e < 0, -1.0, 1.0)
-        exponential = (demand / a + np.abs(tau_e)) / (k_1 * np.exp(sign * spread) + k_2)
-        phi_2 = sign * np.log(exponential) / a
+        sinh = np.sqrt((demand - lower) / (2 * a * k_1)) * np.sqrt((demand + lower) / (2 * a * k_2))
+        radius = np.hypot(k_1 + k_2, 2 * math.sqrt(k_1) * math.sqrt(k_2) * sinh)
+        mean = np.arcsinh(tau_e / radius) - np.arcsinh((k_1 - k_2) / radius * sinh)
+        half_spread = np.arcsinh(sinh)
+        phi_1, phi_2 = (mean + half_spread) / a, (mean - half_spread) / a
+        # The weaker spring takes up what rounding leaves of the balance of the torques.
+        if k_1 < k_2:
+            phi_1 = self.first.deflection(tau_e - self.second.torque(phi_2))
+        elif k_2 < k_1:
+            phi_2 = self.second.deflection(tau_e - self.first.torque(phi_1))
         return PairSolution(
             lower=lower,
             upper=np.full_like(tau_e, np.inf),
             lower_critical=np.ones(tau_e.shape, dtype=bool),
             upper_critical=np.zeros(tau_e.shape, dtype=bool),
             slack_below=np.zeros(tau_e.shape, dtype=bool),
-            phi_1=phi_2 + spread / a,
+            phi_1=phi_1,
             phi_2=phi_2,
         )

@@ -12,6 +12,7 @@ import numpy as np
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError, Problem
 from vsacli.spec.fields import TableFile, value
+from vsacli.spec.source import Source
 from vsacli.spec.table import Table, line_of
 from vsacli.springs.inversion import inverse
 from vsacli.springs.law import SpringLaw
@@ -28,7 +29,7 @@ HARDENING_NODES = 400
 
 @dataclass(frozen=True)
 class MeasuredSpring(SpringLaw):
-    """Torques measured over deflections, fitted as `springs.measured` says; no extrapolation.
+    """Torques measured over deflections, with a smooth hardening curve fitted through them; no extrapolation.
 
     A table that begins at zero deflection is a spring that only pulls.
     """
@@ -56,6 +57,11 @@ class MeasuredSpring(SpringLaw):
         return (f"the curve through {self.file.source.path} misses a measured torque by up to {misfit}",)
 
     @property
+    def sources(self) -> tuple[Source, ...]:
+        """The table."""
+        return (self.file.source,)
+
+    @property
     def domain(self) -> tuple[float, float]:
         """The measured range."""
         return float(self.file.values[0, 0]), float(self.file.values[-1, 0])
@@ -78,9 +84,12 @@ class MeasuredSpring(SpringLaw):
         return -low, high
 
     def _peak(self, end: float) -> float:
-        phi = end * np.arange(1, HARDENING_NODES + 1) / HARDENING_NODES
-        falling = np.diff(np.abs(self.hardening(phi))) < 0 if end else np.zeros(1, dtype=bool)
-        return float(np.abs(self.torque(phi[falling.argmax()]))) if falling.any() else math.inf
+        if not end:
+            return math.inf
+        phi = np.linspace(0, end, HARDENING_NODES)
+        falling = np.flatnonzero(np.diff(np.abs(self.hardening(phi))) < 0)
+        # The peak lies in the cell before the first that falls, or in that one.
+        return float(np.abs(self.torque(phi[max(falling[0] - 1, 0)]))) if falling.size else math.inf
 
     def as_second(self) -> SpringLaw:
         """Turned around if it only pulls."""
@@ -95,28 +104,30 @@ class MeasuredSpring(SpringLaw):
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque of the fitted curve."""
-        return np.asarray(self._curve.torque(phi))
+        return self._curve(0, phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Stiffness of the fitted curve."""
-        return np.asarray(self._curve.stiffness(phi))
+        return self._curve(1, phi)
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope of the fitted curve."""
-        return np.asarray(self._curve.slope(phi))
+        return self._curve(2, phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Curvature of the fitted curve."""
-        return np.asarray(self._curve.curvature(phi))
+        return self._curve(3, phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Energy of the fitted curve."""
-        return np.asarray(self._curve.energy(phi))
+        return self._curve(-1, phi)
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration within the measured range."""
         low, high = (np.full_like(torque, end) for end in self.domain)
-        return inverse(self, np.clip(torque, *self.torque_range), low, high)
+        deflections, torques = self.file.values.T
+        start = np.interp(torque, torques, deflections)
+        return inverse(self, np.clip(torque, *self.torque_range), low, high, start)
 
 
 def _problems(table: Table) -> Iterator[Problem]:
@@ -147,9 +158,15 @@ def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[i
     """Rows where the torque is not convex for positive, or not concave for negative deflections."""
     left, middle, right = deflection[:-2], deflection[1:-1], deflection[2:]
     share = (middle - left) / (right - left)
-    above_chord = torque[1:-1] - ((1 - share) * torque[:-2] + share * torque[2:])
+    chord = (1 - share) * torque[:-2] + share * torque[2:]
+    above_chord = torque[1:-1] - chord
     tolerance = SHAPE_TOLERANCE * np.ptp(torque)
-    for row in np.flatnonzero((left >= 0) & (above_chord > tolerance)) + 1:
-        yield int(row), "the torque is not convex here, so the spring would not harden with the deflection"
-    for row in np.flatnonzero((right <= 0) & (above_chord < -tolerance)) + 1:
-        yield int(row), "the torque is not concave here, so the spring would not harden with the deflection"
+    for row in np.flatnonzero((left >= 0) & (above_chord > tolerance)):
+        yield int(row) + 1, _bend(torque[row + 1], "above", chord[row], "convex")
+    for row in np.flatnonzero((right <= 0) & (above_chord < -tolerance)):
+        yield int(row) + 1, _bend(torque[row + 1], "below", chord[row], "concave")
+
+
+def _bend(torque: float, side: str, chord: float, shape: str) -> str:
+    where = f"the torque {torque:.4g} lies {side} {chord:.4g}, the line between the rows before and after"
+    return f"{where}: it is not {shape} here, so the spring would not harden away from zero"
