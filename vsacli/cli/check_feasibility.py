@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.options import (
+    deflections_option,
     example,
     json_option,
     overwrite_option,
@@ -15,9 +19,18 @@ from vsacli.cli.options import (
     stop_option,
     trajectory_argument,
 )
-from vsacli.cli.running import load_inputs, refuse_input_as_output, show_report
+from vsacli.cli.running import (
+    compute,
+    followed,
+    load_inputs,
+    refuse_input_as_output,
+    run_stem,
+    show_report,
+)
 
 if TYPE_CHECKING:
+    from vsacli.pipeline import Run
+    from vsacli.report import Report
     from vsacli.robot import Robot
     from vsacli.suggest import Suggestions
 
@@ -37,6 +50,13 @@ if TYPE_CHECKING:
     type=float,
     help="Relative margin below which a step is near-singular; by default 0.01.",
 )
+@deflections_option
+@click.option(
+    "--plot",
+    "plot_folder",
+    metavar="FOLDER",
+    help="Also draw each stiffness inside its reachable range there, as png.",
+)
 @click.option("--suggest", "advise", is_flag=True, help="Also say what smallest change would mend it.")
 @click.option(
     "--write-fixed",
@@ -52,6 +72,8 @@ def check_feasibility(
     as_json: bool,
     stop_on_infeasible: bool,
     near_singular: float | None,
+    deflections: str,
+    plot_folder: str | None,
     advise: bool,
     fixed: str | None,
     overwrite: bool,
@@ -67,24 +89,55 @@ def check_feasibility(
     confirmed on all steps.
     """
     inputs = load_inputs(robot, trajectory, talk)
-    from vsacli.feasibility import NEAR_SINGULAR
+    from vsacli.feasibility import NEAR_SINGULAR, check_near_singular
     from vsacli.pipeline import Run
     from vsacli.suggest import check_fixed_target, fixed_paths, suggest
 
     margin = NEAR_SINGULAR if near_singular is None else near_singular
-    run = Run(*inputs, stop_on_infeasible=stop_on_infeasible, near_singular=margin)
+    check_near_singular(margin)
     if fixed is not None:
         check_fixed_target(fixed, overwrite=overwrite)
         for path in fixed_paths(fixed):
             refuse_input_as_output(path, (source.path for part in inputs for source in part.sources))
-    with talk.progress(run.trajectory.samples) as progress:
-        for block in run:
-            progress.update(len(block.time))
-    report = run.report()
+    stem = run_stem(robot, trajectory)
+    if plot_folder is not None:
+        from vsacli.plots import FEASIBILITY, check_figures
+
+        check_figures([FEASIBILITY], plot_folder, stem, overwrite=overwrite)
+    run = Run(
+        *inputs,
+        stop_on_infeasible=stop_on_infeasible,
+        near_singular=margin,
+        following=followed(deflections, *inputs),
+    )
+    report, figures = (compute(run, talk), None) if plot_folder is None else _compute_and_draw(run, talk)
     suggestions = suggest(*inputs, margin) if advise or fixed is not None else None
     if suggestions is not None and fixed is not None:
         _write_fixed(suggestions, inputs[0], fixed, overwrite, talk)
-    return show_report(report, as_json, suggestions)
+    code = show_report(report, as_json, suggestions)
+    if plot_folder is not None and figures is not None:
+        _save(figures, plot_folder, stem, overwrite, talk)
+    return code
+
+
+def _compute_and_draw(run: Run, talk: Talk) -> tuple[Report, Mapping[str, Any]]:
+    """Compute, and draw figures, by name, from a result file that exists no longer than it takes."""
+    from vsacli.plots import FEASIBILITY, FEASIBILITY_VARIABLES, plot_feasibility
+    from vsacli.store.reader import open_result
+    from vsacli.store.writer import ResultWriter
+
+    with TemporaryDirectory(prefix="vsacli-") as folder:
+        path = Path(folder) / "result.h5"
+        report = compute(run, talk, ResultWriter(path, run.robot, run.trajectory, FEASIBILITY_VARIABLES))
+        with open_result(path) as result:
+            return report, {FEASIBILITY: plot_feasibility(result)}
+
+
+def _save(figures: Mapping[str, Any], folder: str, stem: str, overwrite: bool, talk: Talk) -> None:
+    from vsacli.plots import save_figures
+
+    for path in save_figures(figures, folder, stem, overwrite=overwrite):
+        talk.note(f"wrote {path}")
 
 
 def _write_fixed(suggestions: Suggestions, robot: Robot, path: str, overwrite: bool, talk: Talk) -> None:

@@ -49,9 +49,9 @@ class Talk:
         if self.verbose and not self.quiet:
             tell(message)
 
-    def progress(self, steps: int) -> AbstractContextManager[Any]:
+    def progress(self, steps: int, *, shown_from: int = PROGRESS_FROM) -> AbstractContextManager[Any]:
         """A progress bar over steps, shown only for long work on a terminal."""
-        hidden = self.quiet or steps < PROGRESS_FROM or not sys.stderr.isatty()
+        hidden = self.quiet or steps < shown_from or not sys.stderr.isatty()
         return click.progressbar(length=steps, label="computing", file=sys.stderr, hidden=hidden)
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.options import (
+    deflections_option,
     example,
     json_option,
     overwrite_option,
@@ -19,12 +19,14 @@ from vsacli.cli.options import (
     trajectory_argument,
     variables_option,
 )
-from vsacli.cli.running import load_inputs, refuse_input_as_output, show_report
-
-if TYPE_CHECKING:
-    from vsacli.pipeline import Run
-    from vsacli.report import Report
-    from vsacli.store.writer import ResultWriter
+from vsacli.cli.running import (
+    compute,
+    followed,
+    load_inputs,
+    refuse_input_as_output,
+    run_stem,
+    show_report,
+)
 
 
 @click.command(
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 @click.option(
     "--plot", "plot_folder", metavar="FOLDER", help="Also draw the figures of `vsacli plot` there, as png."
 )
+@deflections_option
 @json_option
 @overwrite_option
 @stop_option
@@ -51,6 +54,7 @@ def invdyn(
     output: str | None,
     variables: tuple[str, ...] | None,
     plot_folder: str | None,
+    deflections: str,
     as_json: bool,
     overwrite: bool,
     stop_on_infeasible: bool,
@@ -61,10 +65,11 @@ def invdyn(
     Writes an HDF5 file with everything that was computed and prints a report: which steps are infeasible,
     singular or over a limit, and by how much.
     """
-    path = Path(f"{Path(robot).stem}-{Path(trajectory).stem}.h5" if output is None else output)
+    path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
     refuse_input_as_output(path, (source.path for part in inputs for source in part.sources))
     from vsacli.pipeline import Run
+    from vsacli.store.atomic import check_target
     from vsacli.store.writer import ResultWriter
     from vsacli.variables import VARIABLES
 
@@ -76,7 +81,9 @@ def invdyn(
     writer = ResultWriter(
         path, *inputs, variables, overwrite=overwrite, command_line=shlex.join(["vsacli", *sys.argv[1:]])
     )
-    report = _write(Run(*inputs, stop_on_infeasible=stop_on_infeasible), writer, talk)
+    check_target(path, overwrite=overwrite)
+    run = Run(*inputs, stop_on_infeasible=stop_on_infeasible, following=followed(deflections, *inputs))
+    report = compute(run, talk, writer)
     code = show_report(report, as_json)
     talk.note(f"wrote {path}")
     if plot_folder is not None:
@@ -84,14 +91,3 @@ def invdyn(
 
         draw_result(path, Path(plot_folder), "png", overwrite, talk)
     return code
-
-
-def _write(run: Run, writer: ResultWriter, talk: Talk) -> Report:
-    """Compute block by block and write each as it comes."""
-    with writer, talk.progress(run.trajectory.samples) as progress:
-        for block in run:
-            writer.write(block)
-            progress.update(len(block.time))
-        report = run.report()
-        writer.finish(report.as_json())
-    return report

@@ -19,6 +19,7 @@ from vsacli.cli.export import export
 from vsacli.cli.invdyn import invdyn
 from vsacli.cli.options import example
 from vsacli.cli.plot import plot
+from vsacli.cli.simulate import simulate
 from vsacli.errors import InputError, StorageError
 
 _EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --plot figures")
@@ -35,7 +36,7 @@ def vsacli() -> None:
     """
 
 
-for command in (invdyn, check_feasibility, plot, export):
+for command in (invdyn, check_feasibility, plot, export, simulate):
     vsacli.add_command(command)
 
 

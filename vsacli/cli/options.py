@@ -36,4 +36,11 @@ robot_argument = click.argument("robot")
 trajectory_argument = click.argument("trajectory")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
+deflections_option = click.option(
+    "--deflections",
+    type=click.Choice(["root", "integrate"]),
+    default="root",
+    show_default=True,
+    help="Solve for the deflections at each step, or follow those of the first by integration, which drifts.",
+)
 stop_option = click.option("--stop-on-infeasible", is_flag=True, help="End with the first infeasible step.")

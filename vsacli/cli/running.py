@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,9 +16,12 @@ from vsacli.cli.exit_codes import OF_VERDICT, Exit
 from vsacli.errors import InputError
 
 if TYPE_CHECKING:
+    from vsacli.following import Following
+    from vsacli.pipeline import Run
     from vsacli.report import Report
     from vsacli.robot import Robot
     from vsacli.store.reader import StoredResult
+    from vsacli.store.writer import ResultWriter
     from vsacli.suggest import Suggestions
     from vsacli.trajectory import Trajectory
 
@@ -40,6 +44,28 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> tuple[Robo
     return robot, trajectory
 
 
+def followed(deflections: str, robot: Robot, trajectory: Trajectory) -> Following | None:
+    """The deflections that a run uses, as `--deflections` says; None if it solves for them at each step."""
+    if deflections == "root":
+        return None
+    from vsacli.following import follow
+
+    return follow(robot, trajectory)
+
+
+def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
+    """Compute block by block; a writer gets each block as it comes, and the report at the end."""
+    with writer or nullcontext(), talk.progress(run.trajectory.samples) as progress:
+        for block in run:
+            if writer is not None:
+                writer.write(block)
+            progress.update(len(block.time))
+        report = run.report()
+        if writer is not None:
+            writer.finish(report.as_json())
+    return report
+
+
 def refuse_input_as_output(output: Path, inputs: Iterable[str | Path]) -> None:
     """Refuse to replace a file that the command reads, which --overwrite alone would allow.
 
@@ -48,6 +74,11 @@ def refuse_input_as_output(output: Path, inputs: Iterable[str | Path]) -> None:
     """
     if os.path.exists(output) and any(os.path.samefile(output, path) for path in inputs):
         raise InputError.one("is read by this command; choose another name for its output", output)
+
+
+def run_stem(robot_path: str, trajectory_path: str) -> str:
+    """What the files of a run are called after, unless the user says otherwise."""
+    return f"{Path(robot_path).stem}-{Path(trajectory_path).stem}"
 
 
 def described(result: StoredResult) -> str:

@@ -86,15 +86,15 @@ def _motion(result: StoredResult, failures: Failures) -> Figure:
 
 def _motor_torque(result: StoredResult, failures: Failures) -> Figure:
     """Fig. 2: motor 1 at the left, motor 2 at the right."""
-    return _grouped(result, failures, "tau_motor", [partial(_motor_label, motor) for motor in MOTORS])
+    return grouped_figure(result, failures, "tau_motor", [partial(_motor_label, motor) for motor in MOTORS])
 
 
 def _elastic_torque(result: StoredResult, failures: Failures) -> Figure:
     """Fig. 3."""
-    return _grouped(result, failures, "tau_e", [_elastic_label])
+    return grouped_figure(result, failures, "tau_e", [_elastic_label])
 
 
-def _grouped(result: StoredResult, failures: Failures, name: str, labels: Sequence[Label]) -> Figure:
+def grouped_figure(result: StoredResult, failures: Failures, name: str, labels: Sequence[Label]) -> Figure:
     """A figure of one variable, with a column of panels for each of its curves."""
     height = PANEL_HEIGHT * len(panel_groups(result.joint_types)) + 1
     figure = Figure((2 * PANEL_WIDTH, height), layout="constrained")

@@ -28,6 +28,7 @@ class StoredResult:
         robot_name, trajectory_name, verdict: as in the report.
         complete: False if the run was ended at an infeasible step.
         joint_names, joint_types: base to tip; "revolute" or "prismatic".
+        actuators: of each joint, "antagonistic", "elastic" or "rigid".
         variables: names of the variables the file holds, in declared order, without `time`.
         samples: number of steps stored.
         time: (samples,) in s.
@@ -67,6 +68,8 @@ class StoredResult:
             self.complete = bool(file.attrs["complete"])
             self.joint_names: tuple[str, ...] = tuple(file["joint"].asstr()[...])
             self.joint_types: tuple[str, ...] = tuple(file["joint_type"].asstr()[...])
+            kinds = file["inputs/robot/joints/actuator_type"]
+            self.actuators: tuple[str, ...] = tuple(kinds.asstr()[...])
             self.variables = tuple(
                 name for name, variable in self.declared.items() if variable.dims and name in file
             )
@@ -125,9 +128,11 @@ def _check_signature(path: str | Path) -> None:
 
 
 def _foreign(found: object, expected: str) -> str:
-    if isinstance(found, str) and found.startswith("vsacli-"):
-        return f"has the format {found}, but this version reads {expected}; run invdyn again"
-    return f"is an HDF5 file, but no result file: it has no attribute format = {expected!r}"
+    if not isinstance(found, str) or not found.startswith("vsacli-"):
+        return f"is an HDF5 file, but no result file: it has no attribute format = {expected!r}"
+    if found.partition("/")[0] != expected.partition("/")[0]:
+        return f"has the format {found}, but expected is a file of the format {expected}"
+    return f"has the format {found}, but this version reads {expected}; run invdyn again"
 
 
 @contextlib.contextmanager

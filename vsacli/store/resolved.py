@@ -100,8 +100,25 @@ def _of_variant(kind: OneOf, content: Any, field: Field) -> Iterator[ResolvedFie
 def _stack(dim: str, members: Sequence[list[ResolvedField]]) -> Iterator[ResolvedField]:
     """Join the fields of all joints, or of both sides of a joint, along a new first axis."""
     tables = [{part.path: part.values for part in member} for member in members]
-    prototypes = {part.path: part for member in reversed(members) for part in member}
-    for path, part in prototypes.items():
+    for path, part in _prototypes(members).items():
         absent = np.full_like(part.values, "" if part.quantity is None else np.nan)
-        values = np.stack([table.get(path, absent) for table in tables])
+        values = np.stack([_fitted(table.get(path, absent), absent) for table in tables])
         yield dataclasses.replace(part, dims=(dim, *part.dims), values=values)
+
+
+def _prototypes(members: Sequence[list[ResolvedField]]) -> dict[tuple[str, ...], ResolvedField]:
+    """Of each field the one with most dimensions: a motor may be one of a joint, or one of two."""
+    prototypes: dict[tuple[str, ...], ResolvedField] = {}
+    for part in (part for member in reversed(members) for part in member):
+        if part.path not in prototypes or len(part.dims) >= len(prototypes[part.path].dims):
+            prototypes[part.path] = part
+    return prototypes
+
+
+def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """The values in the shape of those of two motors, if they are those of one: as of the first."""
+    if values.shape == absent.shape:
+        return values
+    fitted = absent.copy()
+    fitted[0] = values
+    return fitted

@@ -1,0 +1,214 @@
+"""`vsacli simulate`."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.exit_codes import Exit
+from vsacli.cli.options import example, json_option, overwrite_option, robot_argument, trajectory_argument
+from vsacli.cli.running import load_inputs, refuse_input_as_output
+from vsacli.errors import InputError
+
+if TYPE_CHECKING:
+    from vsacli.control.gains import Gains
+    from vsacli.robot import Robot
+    from vsacli.simulation import Setup
+    from vsacli.simulation.report import SimulationReport
+    from vsacli.spec.source import Source
+    from vsacli.store.simulation import SimulationWriter
+    from vsacli.trajectory import Trajectory
+
+PROGRESS_STEPS = 1000
+FEEDBACK = "feedback-linearization"
+
+
+def _numbers(_context: click.Context, _parameter: click.Parameter, written: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(word) for word in written.split(","))
+    except ValueError:
+        raise click.BadParameter("expected a number, or one for each joint, e.g. 0.01,0,-0.02") from None
+
+
+@click.command(
+    "simulate",
+    short_help="Integrate the robot's full dynamics under a controller.",
+    epilog=example("vsacli simulate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --perturb 0.01"),
+)
+@robot_argument
+@trajectory_argument
+@click.option(
+    "--controller",
+    type=click.Choice(["feedforward", FEEDBACK]),
+    default="feedforward",
+    show_default=True,
+    help="What sets the motor torques.",
+)
+@click.option(
+    "--poles",
+    metavar="POLES",
+    help="Poles of the position error in 1/s, e.g. -20,-21,-10+5j,-10-5j, one number for all, or a YAML "
+    "file with those of each joint; by default -20.",
+)
+@click.option("--stiffness-poles", metavar="POLES", help="Poles of the stiffness error; by default -20.")
+@click.option(
+    "--integral", is_flag=True, help="Add integral action, which takes one more pole of each error."
+)
+@click.option(
+    "--initial-error", metavar="RAD", default="0", callback=_numbers, help="Of q, for all joints or for each."
+)
+@click.option(
+    "--initial-stiffness-error", metavar="NM/RAD", default="0", callback=_numbers, help="Of the stiffness."
+)
+@click.option(
+    "--perturb",
+    metavar="ERROR",
+    type=float,
+    default=0.0,
+    help="Largest relative error of each parameter of the controller's model, e.g. 0.05.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of these errors.")
+@click.option(
+    "--measure",
+    "measured",
+    type=click.Choice(["state", "positions"]),
+    default="state",
+    show_default=True,
+    help="What the controller knows; of positions it takes samples, and filtered differences for rates.",
+)
+@click.option("--rtol", type=float, default=1e-9, show_default=True, help="Relative tolerance.")
+@click.option("--atol", type=float, default=1e-10, show_default=True, help="Absolute tolerance.")
+@click.option(
+    "-o", "--output", metavar="FILE", help="Result; by default ROBOT-TRAJECTORY-simulation.h5 in this folder."
+)
+@click.option(
+    "--plot", "plot_folder", metavar="FOLDER", help="Also draw figures of the errors there, as png."
+)
+@json_option
+@overwrite_option
+@talk_options
+def simulate(
+    robot: str,
+    trajectory: str,
+    output: str | None,
+    plot_folder: str | None,
+    as_json: bool,
+    overwrite: bool,
+    talk: Talk,
+    **choices: Any,
+) -> int:
+    """Integrate the full dynamics of ROBOT while a controller makes it follow TRAJECTORY.
+
+    Writes an HDF5 file with commanded and actual motion, and prints a report of the errors. Motors give at
+    most their max_torque. A run ends early where a decoupling matrix becomes singular or a spring leaves the
+    range of its law.
+    """
+    stems = f"{Path(robot).stem}-{Path(trajectory).stem}"
+    path = Path(f"{stems}-simulation.h5" if output is None else output)
+    inputs = load_inputs(robot, trajectory, talk)
+    setup, sources = _setup(inputs[0], **choices)
+    recorded = replace(inputs[0], sources=(*inputs[0].sources, *sources))
+    refuse_input_as_output(path, (source.path for source in (*recorded.sources, *inputs[1].sources)))
+    from vsacli.store.simulation import SimulationWriter
+
+    if plot_folder is not None:
+        from vsacli.plots import SIMULATION_FIGURES, check_figures
+
+        check_figures(SIMULATION_FIGURES, plot_folder, path.stem, overwrite=overwrite)
+    command_line = shlex.join(["vsacli", *sys.argv[1:]])
+    writer = SimulationWriter(path, recorded, inputs[1], overwrite=overwrite, command_line=command_line)
+    report = _run(*inputs, setup, writer, talk)
+    code = _show(report, as_json)
+    talk.note(f"wrote {path}")
+    if plot_folder is not None:
+        _draw(path, Path(plot_folder), overwrite, talk)
+    return code
+
+
+def _setup(
+    robot: Robot,
+    *,
+    controller: str,
+    poles: str | None,
+    stiffness_poles: str | None,
+    integral: bool,
+    initial_error: tuple[float, ...],
+    initial_stiffness_error: tuple[float, ...],
+    perturb: float,
+    seed: int,
+    measured: Any,
+    rtol: float,
+    atol: float,
+) -> tuple[Setup, list[Source]]:
+    """The conditions that the options describe, and the files read for them."""
+    from vsacli.simulation import InitialError, Setup, Tolerances, perturbed
+
+    gains: Gains | None = None
+    sources: list[Source] = []
+    if controller == FEEDBACK:
+        gains, sources = _gains(robot, poles, stiffness_poles, integral)
+    elif poles is not None or stiffness_poles is not None or integral:
+        raise InputError.one(f"poles and integral action need --controller {FEEDBACK}")
+    setup = Setup(
+        gains=gains,
+        model=perturbed(robot, perturb, seed),
+        initial_error=InitialError(initial_error, initial_stiffness_error),
+        measured=measured,
+        tolerances=Tolerances(rtol, atol),
+    )
+    return setup, sources
+
+
+def _gains(
+    robot: Robot, poles: str | None, stiffness_poles: str | None, integral: bool
+) -> tuple[Gains, list[Source]]:
+    from vsacli.control.poles import DEFAULT, gains_from_text, load_gains
+
+    if poles is not None and poles.endswith((".yaml", ".yml")):
+        if stiffness_poles is not None:
+            raise InputError.one("--stiffness-poles: the poles file holds these too", poles)
+        gains, source = load_gains(poles, robot, integral=integral)
+        return gains, [source]
+    return gains_from_text(robot, poles or DEFAULT, stiffness_poles or DEFAULT, integral=integral), []
+
+
+def _run(
+    robot: Robot, trajectory: Trajectory, setup: Setup, writer: SimulationWriter, talk: Talk
+) -> SimulationReport:
+    """Simulate, and write what happened."""
+    from vsacli.simulation import simulate
+
+    first, last = trajectory.times.span
+    with writer, talk.progress(PROGRESS_STEPS, shown_from=0) as bar:
+
+        def progress(time: float) -> None:
+            bar.update(int(PROGRESS_STEPS * (time - first) / (last - first)) - bar.pos)
+
+        simulation = simulate(robot, trajectory, setup, progress)
+        writer.write(simulation.history)
+        writer.finish(simulation.report.as_json())
+    return simulation.report
+
+
+def _show(report: SimulationReport, as_json: bool) -> Exit:
+    from vsacli.simulation.report_text import render
+
+    click.echo(json.dumps(report.as_json(), indent=1) if as_json else render(report))
+    return Exit.OK if report.verdict == "ok" else Exit.VERDICT
+
+
+def _draw(path: Path, folder: Path, overwrite: bool, talk: Talk) -> None:
+    from vsacli.plots import plot_simulation, save_figures
+    from vsacli.store.simulation import StoredSimulation
+
+    with StoredSimulation.open(path) as simulation:
+        saved = save_figures(plot_simulation(simulation), folder, path.stem, overwrite=overwrite)
+    for figure in saved:
+        talk.note(f"wrote {figure}")

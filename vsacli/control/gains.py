@@ -1,0 +1,128 @@
+"""Gains of the linear control (32), from the poles of the characteristic polynomials (33)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from vsacli.arrays import FloatArray
+from vsacli.errors import InputError
+
+POSITION_ORDER = 4
+"""Degree of (33a): q is decoupled at its fourth derivative."""
+
+RIGID_ORDER = 2
+"""The same for a robot without springs, (3)."""
+
+STIFFNESS_ORDER = 2
+"""Degree of (33b)."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Coefficients of the error dynamics e^(r) + ... + K1 e' + K0 e + KI integral(e) = 0 of each joint.
+
+    Attributes:
+        position: K0, K1, ... of (33a), (joints, r) or (1, r) for all joints alike, 1/s^(r-k). The order r is
+            4, or 2 for a robot without springs.
+        stiffness: K_sigma0, K_sigma1 of (33b), (joints, 2) or (1, 2).
+        position_integral: KI of the position, (joints,) or (1,), 1/s^(r+1); 0 for no integral action.
+        stiffness_integral: KI of the stiffness, likewise, 1/s^3.
+
+    Raises:
+        InputError: a polynomial that is not Hurwitz.
+    """
+
+    position: FloatArray
+    stiffness: FloatArray
+    position_integral: FloatArray
+    stiffness_integral: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("position", "stiffness"):
+            for joint, row in enumerate(
+                zip(getattr(self, name), getattr(self, f"{name}_integral"), strict=True)
+            ):
+                _check_hurwitz(f"{name} gains, row {joint}", *row)
+
+    @classmethod
+    def from_poles(cls, position: npt.ArrayLike, stiffness: npt.ArrayLike = (-1.0, -1.0)) -> Gains:
+        """Gains that give the errors these poles; one more pole than the order asks for integral action.
+
+        Args:
+            position: poles of the position error, 1/s: 4 (2 for a robot without springs), or 5 (3) with
+                integral action; (poles,) for all joints alike, or (joints, poles).
+            stiffness: poles of the stiffness error, 2, or 3 with integral action; without effect at joints
+                whose stiffness is not commanded.
+
+        Raises:
+            InputError: another number of poles, an unstable one, or a complex one without its conjugate.
+        """
+        position_gains, position_integral = _coefficients("position", position, {2, 3, 4, 5})
+        stiffness_gains, stiffness_integral = _coefficients("stiffness", stiffness, {2, 3})
+        return cls(position_gains, stiffness_gains, position_integral, stiffness_integral)
+
+    @property
+    def order(self) -> int:
+        """The order r of the position error."""
+        return int(self.position.shape[1])
+
+    @property
+    def integrates(self) -> bool:
+        """Whether there is integral action."""
+        return bool(np.any(self.position_integral) or np.any(self.stiffness_integral))
+
+    def check_fit(self, joints: int, order: int) -> None:
+        """Refuse gains of another robot.
+
+        Raises:
+            InputError: they are not of `joints` joints, or not of this order.
+        """
+        if self.order != order:
+            raise InputError.one(
+                f"this robot needs {order} poles of the position error ({order + 1} with integral action), "
+                f"not {self.order}"
+            )
+        for name in ("position", "stiffness"):
+            count = len(getattr(self, name))
+            if count not in (1, joints):
+                raise InputError.one(f"there are {name} gains of {count} joints, but the robot has {joints}")
+
+
+def _coefficients(name: str, poles: npt.ArrayLike, counts: set[int]) -> tuple[FloatArray, FloatArray]:
+    """Rows K0, K1, ..., and KI of each."""
+    table = np.atleast_2d(np.asarray(poles, dtype=np.complex128))
+    if table.ndim != 2 or table.shape[1] not in counts:
+        expected = ", ".join(map(str, sorted(counts)))
+        raise InputError.one(f"expected {expected} poles of the {name} error, found {table.shape[-1]}")
+    for pole in table.ravel():
+        check_stable(name, pole)
+    polynomials = [np.poly(row) for row in table]
+    if any(np.iscomplexobj(polynomial) for polynomial in polynomials):
+        raise InputError.one(f"a complex pole of the {name} error lacks its conjugate")
+    rows = np.array(polynomials)[:, :0:-1]
+    return (rows[:, 1:], rows[:, 0]) if rows.shape[1] % 2 else (rows, np.zeros(len(rows)))
+
+
+def check_stable(name: str, pole: complex) -> None:
+    """Refuse a pole that makes an error grow, or last.
+
+    Raises:
+        InputError: its real part is not negative.
+    """
+    if not pole.real < 0:
+        shown = f"{pole:g}" if pole.imag else f"{pole.real:g}"
+        raise InputError.one(
+            f"the pole {shown} of the {name} error is unstable; its real part must be negative"
+        )
+
+
+def _check_hurwitz(name: str, gains: FloatArray, integral: float) -> None:
+    coefficients = [1.0, *gains[::-1], *([integral] if integral else [])]
+    worst = max(np.roots(coefficients).real)
+    if not worst < 0:
+        raise InputError.one(
+            f"the {name} are unstable: a root of their polynomial (33) has the real part {worst:.3g}"
+        )

@@ -1,0 +1,119 @@
+"""Poles as people write them: in one line for all joints, or in a file joint by joint."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, STIFFNESS_ORDER, Gains, check_stable
+from vsacli.drivetrain import Drivetrain
+from vsacli.errors import FieldProblem, InputError
+from vsacli.robot import Robot
+from vsacli.spec.fields import Items, Record, check_fields, text, value
+from vsacli.spec.reading import read_document
+from vsacli.spec.source import Source
+from vsacli.suggestions import did_you_mean
+
+FORMAT = "vsacli-poles/1"
+DEFAULT = "-20"
+"""Poles of both errors unless given, 1/s: settled within half a second."""
+
+Poles = tuple[complex, ...]
+
+
+@dataclass(frozen=True)
+class JointPoles:
+    """Poles of the errors of a joint."""
+
+    name: str = text("name of the joint", identifier=True)
+    position: str = text("poles of the position error, 1/s; one number stands for all of them")
+    stiffness: str = text("poles of the stiffness error, 1/s, likewise", default=DEFAULT)
+
+    def __post_init__(self) -> None:
+        check_fields(self, *self._pole_problems())
+
+    def _pole_problems(self) -> Iterator[FieldProblem]:
+        for name in ("position", "stiffness"):
+            try:
+                for pole in parse_poles(getattr(self, name)):
+                    check_stable(name, pole)
+            except InputError as error:
+                yield FieldProblem((name,), str(error))
+
+
+@dataclass(frozen=True)
+class PolesFile:
+    """The content of a poles file."""
+
+    joints: tuple[JointPoles, ...] = value(Items(Record(JointPoles), unique="name"), "poles of each joint")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+def parse_poles(written: str) -> Poles:
+    """Poles written as numbers between commas, e.g. `-20, -21, -10+5j, -10-5j`.
+
+    Raises:
+        InputError: something else.
+    """
+    try:
+        return tuple(complex(re.sub(r"\s", "", word)) for word in written.split(","))
+    except ValueError:
+        raise InputError.one(f"expected poles such as -20,-21,-10+5j,-10-5j, not {written!r}") from None
+
+
+def gains_from_text(robot: Robot, position: str, stiffness: str, *, integral: bool) -> Gains:
+    """Gains that give all joints the same poles.
+
+    Raises:
+        InputError: poles that cannot be used, or another number of them than the robot needs.
+    """
+    return _gains(robot, [parse_poles(position)], [parse_poles(stiffness)], integral)
+
+
+def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) -> tuple[Gains, Source]:
+    """Gains from a file with the poles of each joint, and the record of the file.
+
+    Raises:
+        InputError: with every problem of the file.
+    """
+    document, source = read_document(path, PolesFile, FORMAT)
+    given = {joint.name: joint for joint in document.joints}
+    for name in given.keys() - set(robot.joint_names):
+        hint = did_you_mean(name, robot.joint_names)
+        raise InputError.one(f"the robot has no joint {name!r}{hint}", source.path)
+    missing = [name for name in robot.joint_names if name not in given]
+    if missing:
+        raise InputError.one(f"no poles for {', '.join(missing)}; each joint needs them", source.path)
+    joints = [given[name] for name in robot.joint_names]
+    position, stiffness = (
+        [parse_poles(getattr(joint, name)) for joint in joints] for name in ("position", "stiffness")
+    )
+    try:
+        return _gains(robot, position, stiffness, integral), source
+    except InputError as error:
+        raise InputError.one(str(error), source.path) from None
+
+
+def _gains(robot: Robot, position: Sequence[Poles], stiffness: Sequence[Poles], integral: bool) -> Gains:
+    order = POSITION_ORDER if Drivetrain(robot).sprung.any() else RIGID_ORDER
+    return Gains.from_poles(
+        [_counted("position", poles, order, integral) for poles in position],
+        [_counted("stiffness", poles, STIFFNESS_ORDER, integral) for poles in stiffness],
+    )
+
+
+def _counted(name: str, poles: Poles, order: int, integral: bool) -> Poles:
+    """As many poles as the error has; a single one as often as needed."""
+    count = order + integral
+    if len(poles) == 1:
+        return poles * count
+    if len(poles) != count:
+        action = "with" if integral else "without"
+        raise InputError.one(
+            f"the {name} error of this robot has {count} poles {action} integral action, not {len(poles)}"
+        )
+    return poles
