@@ -10,7 +10,7 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import chdir
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,13 @@ from field_tables import record_sections, table, variant_sections
 from vsacli.cli.exit_codes import Exit
 from vsacli.cli.main import vsacli
 from vsacli.columns import JOINT_SIGNALS
+from vsacli.control.poles import PolesFile
 from vsacli.flags import Flag
 from vsacli.robot import Robot
+from vsacli.simulation.variables import SIMULATION_VARIABLES
 from vsacli.springs import LAWS
 from vsacli.trajectory_file import TrajectoryFile
-from vsacli.variables import VARIABLES
+from vsacli.variables import VARIABLES, Variable
 from vsacli.wrench import WRENCH_NAMES, wrench_columns
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -101,8 +103,22 @@ def _wrench_columns() -> Iterator[tuple[str, str, str]]:
         yield columns, str(VARIABLES[name].quantity), needed
 
 
+def pole_fields() -> str:
+    """Fields of a poles file."""
+    return record_sections(PolesFile)
+
+
 def variables() -> str:
     """Variables of a result file."""
+    return _variables(VARIABLES)
+
+
+def simulation_variables() -> str:
+    """Variables of a simulation file."""
+    return _variables(SIMULATION_VARIABLES)
+
+
+def _variables(declared: Mapping[str, Variable]) -> str:
     return table(
         ("variable", "dimensions", "unit", "meaning", "equation"),
         (
@@ -113,7 +129,7 @@ def variables() -> str:
                 variable.long_name,
                 variable.equation,
             )
-            for name, variable in VARIABLES.items()
+            for name, variable in declared.items()
         ),
     )
 
@@ -132,6 +148,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "spring-fields": spring_fields,
     "trajectory-fields": trajectory_fields,
     "csv-columns": csv_columns,
+    "pole-fields": pole_fields,
+    "simulation-variables": simulation_variables,
     "variables": variables,
     "flags": flags,
 }

@@ -17,6 +17,7 @@ NAN = math.nan
 QUIET = JointReport(
     name="elbow",
     type="revolute",
+    actuator="antagonistic",
     steps=dict.fromkeys(COUNTED, 0),
     first_time={},
     worst={},

@@ -1,8 +1,8 @@
 """Array types, and the memory layout used throughout.
 
 Arrays over time have the shape (samples, joints) or (samples, joints, 2) for the user, and are laid out with
-the samples contiguous (`over_time` and `by_joint` change the view, not the memory), because every operation runs along
-the samples of one joint.
+the samples contiguous (`over_time` and `by_joint` change the view, not the memory), because every operation
+runs along the samples of one joint.
 """
 
 from __future__ import annotations

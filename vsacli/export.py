@@ -15,7 +15,7 @@ from vsacli.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.errors import InputError, VsacliError
 from vsacli.store.atomic import AtomicFile, reporting_storage_errors
 from vsacli.store.reader import StoredResult
-from vsacli.variables import Variable, column_names, select_variables
+from vsacli.variables import Variable, column_names, existing, select_variables
 
 DEFAULT_VARIABLES = ("tau_motor",)
 CELLS = 2**18
@@ -62,6 +62,8 @@ def export_csv(
 ) -> None:
     """Write time and variables as CSV with a header line; floats read back bit for bit.
 
+    What a joint does not have is left out: a second motor, or the stiffness of a rigid joint.
+
     Args:
         result: an open result file.
         stream: where to write; a file should be open with newline="".
@@ -77,13 +79,20 @@ def export_csv(
     stride = 1 if rate is None else _stride(result, rate)
     if not allow_nan:
         _check_defined(result, selected, stride)
-    headers = [name for variable in selected for name in column_names(variable, result.joint_names)]
+    headers = [
+        name
+        for variable in selected
+        for name, there in zip(
+            column_names(variable, result.joint_names), _existing(result, variable).flat, strict=True
+        )
+        if there
+    ]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *headers])
     for start, stop in _spans(result, selected, stride):
         columns = [result.time[start:stop:stride].tolist()]
         for variable in selected:
-            columns += _cells(result.read(variable.name, start, stop)[::stride])
+            columns += _cells(result.read(variable.name, start, stop)[::stride], _existing(result, variable))
         writer.writerows(zip(*columns, strict=True))
 
 
@@ -160,22 +169,32 @@ def _check_defined(result: StoredResult, variables: tuple[Variable, ...], stride
 
 
 def _gaps(result: StoredResult, variable: Variable, stride: int) -> Iterator[Gap]:
-    spans = _spans(result, (variable,), stride)
-    missing = np.concatenate([_undefined(result.read(variable.name, *span)[::stride]) for span in spans])
+    spans, there = _spans(result, (variable,), stride), _existing(result, variable)
+    missing = np.concatenate(
+        [_undefined(result.read(variable.name, *span)[::stride], there) for span in spans]
+    )
     for joint, steps in zip(result.joint_names, missing.T, strict=True):
         if steps.any():
             first = float(result.time[::stride][steps.argmax()])
             yield Gap(variable.name, joint, first, int(steps.sum()))
 
 
-def _undefined(values: FloatArray | FlagArray) -> BoolArray:
-    """(samples, joints): whether a value of the joint is NaN."""
-    return np.asarray(np.isnan(values).reshape(*values.shape[:2], -1).any(axis=-1))
+def _existing(result: StoredResult, variable: Variable) -> BoolArray:
+    """(joints, columns of each): which columns of a variable there are; of the wrench (axes, 1)."""
+    if "joint" not in variable.dims:
+        return np.ones((len(column_names(variable, ())), 1), dtype=bool)
+    return np.array(existing(variable, result.actuators))
 
 
-def _cells(values: FloatArray | FlagArray) -> list[list[Any]]:
-    """The columns of a variable as Python numbers; NaN becomes None, which csv writes as an empty cell."""
-    flat = values.reshape(len(values), -1).T
+def _undefined(values: FloatArray | FlagArray, there: BoolArray) -> BoolArray:
+    """(samples, joints): whether a value that the joint has is NaN."""
+    missing = np.isnan(values).reshape(len(values), *there.shape)
+    return np.any(missing & there, axis=-1)
+
+
+def _cells(values: FloatArray | FlagArray, there: BoolArray) -> list[list[Any]]:
+    """The columns of a variable that are there, as numbers; NaN becomes None, which csv leaves empty."""
+    flat = values.reshape(len(values), -1).T[there.ravel()]
     missing = np.isnan(flat)
     if not missing.any():
         return flat.tolist()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.drivetrain import motors_and_springs
 from vsacli.errors import InputError
 from vsacli.flags import Flag
 from vsacli.robot import Joint
@@ -73,15 +75,16 @@ class LimitCheck(NamedTuple):
 
 def limit_checks(joint: Joint) -> list[LimitCheck]:
     """The limits that a joint has."""
-    limits, actuator = joint.limits, joint.actuator
+    limits = joint.limits
     checks = [
         LimitCheck(Flag.POSITION_LIMIT, "q", None, limits.position),
         LimitCheck(Flag.VELOCITY_LIMIT, "dq", None, limits.velocity),
         LimitCheck(Flag.STIFFNESS_LIMIT, "stiffness", None, limits.stiffness),
     ]
-    for motor, (drive, spring) in enumerate(zip(actuator.motor, actuator.spring, strict=True), start=1):
+    for motor, (drive, spring) in enumerate(motors_and_springs(joint.actuator), start=1):
+        deflection = math.inf if spring is None else spring.max_deflection
         checks += [
-            LimitCheck(Flag.DEFLECTION_LIMIT, "phi", motor, _symmetric(spring.max_deflection)),
+            LimitCheck(Flag.DEFLECTION_LIMIT, "phi", motor, _symmetric(deflection)),
             LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", motor, _symmetric(drive.max_velocity)),
             LimitCheck(Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor, _symmetric(drive.max_torque)),
         ]

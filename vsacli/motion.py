@@ -16,7 +16,7 @@ class Motion:
         time: (samples,) in s.
         q, dq, ddq, d3q, d4q: position and its four derivatives, (samples, joints), rad (m) per s^k.
         stiffness, dstiffness, ddstiffness: joint stiffness and two derivatives, (samples, joints),
-            N m/rad (N/m) per s^k.
+            N m/rad (N/m) per s^k; NaN for a joint for which none is chosen.
         wrench: what the environment exerts on the end effector meanwhile, if anything.
     """
 

@@ -14,9 +14,9 @@ from vsacli.feasibility import NEAR_SINGULAR, check_near_singular, has
 from vsacli.flags import Flag
 from vsacli.following import Following
 from vsacli.report import Report
-from vsacli.robot import Robot
+from vsacli.robot import Antagonistic, Robot
 from vsacli.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
-from vsacli.steps import compute_block
+from vsacli.steps import check_fit, compute_block
 from vsacli.tally import JointTally
 from vsacli.trajectory import Trajectory
 from vsacli.variables import Block
@@ -37,7 +37,7 @@ class Run:
         block_samples: steps in a block; results do not depend on it.
 
     Raises:
-        InputError: the margin is none.
+        InputError: the margin is none, or the trajectory does not fit the robot.
     """
 
     def __init__(
@@ -51,6 +51,7 @@ class Run:
         block_samples: int = BLOCK_SAMPLES,
     ) -> None:
         check_near_singular(near_singular)
+        check_fit(robot, trajectory)
         self.robot = robot
         self.trajectory = trajectory
         self._stop_on_infeasible = stop_on_infeasible
@@ -134,7 +135,8 @@ def inverse_dynamics(
         Every variable of `vsacli.variables.Block` over (samples, joints[, 2]); `report` holds the verdict.
 
     Raises:
-        InputError: the trajectory has another number of joints than the robot.
+        InputError: the trajectory has another number of joints than the robot, or no stiffness for a joint
+            that needs one.
     """
     run = Run(robot, trajectory, stop_on_infeasible=stop_on_infeasible, following=following)
     return Result(**_joined(list(run)), report=run.report(), joint_names=robot.joint_names)
@@ -142,7 +144,11 @@ def inverse_dynamics(
 
 def _drift_tallies(robot: Robot, following: Following) -> list[DriftTally]:
     pairs = zip(robot.joints, following.stops, strict=True)
-    return [DriftTally(joint, index, stop) for index, (joint, stop) in enumerate(pairs)]
+    return [
+        DriftTally(joint, joint.actuator, index, stop)
+        for index, (joint, stop) in enumerate(pairs)
+        if isinstance(joint.actuator, Antagonistic)
+    ]
 
 
 def _shortened(block: Block, samples: int) -> Block:

@@ -30,12 +30,14 @@ class Signal:
         names: the value and its derivatives, as in files and in `Motion`.
         spline_degree: odd degree of the spline through recorded values.
         positive: whether the value must be positive.
+        optional: whether a component may have no value, so that it is NaN all the time.
         components: how many numbers a value has; None: one a joint.
     """
 
     names: tuple[str, ...]
     spline_degree: int
     positive: bool = False
+    optional: bool = False
     components: int | None = None
 
     @property
@@ -45,7 +47,7 @@ class Signal:
 
 
 POSITION = Signal(("q", "dq", "ddq", "d3q", "d4q"), spline_degree=5)
-STIFFNESS = Signal(("stiffness", "dstiffness", "ddstiffness"), spline_degree=3, positive=True)
+STIFFNESS = Signal(("stiffness", "dstiffness", "ddstiffness"), spline_degree=3, positive=True, optional=True)
 WRENCH = Signal(WRENCH_NAMES, spline_degree=3, components=len(WRENCH_AXES))
 
 

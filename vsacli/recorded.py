@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,7 +55,10 @@ class Recording:
 
 
 def read_recording(
-    path: str | os.PathLike[str], joint_names: Sequence[str], wanted: Sequence[Signal] = JOINT_SIGNALS
+    path: str | os.PathLike[str],
+    joint_names: Sequence[str],
+    wanted: Sequence[Signal] = JOINT_SIGNALS,
+    without_stiffness: Collection[str] = (),
 ) -> Recording:
     """Read signals from a CSV file.
 
@@ -63,15 +66,18 @@ def read_recording(
         path: a file with the columns `time` and those of `column_layout`.
         joint_names: from the base to the tip.
         wanted: the signals to read.
+        without_stiffness: joints for which no stiffness is read.
 
     Raises:
         InputError: with file and line of everything that does not fit.
     """
     table = read_table(path)
     file = table.source.path
-    layout = column_layout(table.columns, joint_names, wanted, file)
+    layout = column_layout(table.columns, joint_names, wanted, file, without_stiffness)
     time = np.ascontiguousarray(table.values[:, table.columns.index(TIME)])
-    profiles = tuple(_profile(signal, time, table, layout) for signal in wanted)
+    profiles = tuple(
+        _profile(signal, signal.components or len(joint_names), time, table, layout) for signal in wanted
+    )
 
     problems = [
         *time_problems(time),
@@ -79,23 +85,35 @@ def read_recording(
     ]
     if problems:
         raise InputError(_located(problem, table, layout) for problem in problems)
-    unused = (
-        signal for signal in SIGNALS if signal not in wanted and not layout.keys().isdisjoint(signal.names)
-    )
-    warnings = tuple(f"{file}: its columns of {signal.names[0]} are not used" for signal in unused)
+    warnings = tuple(f"{file}: {clause}" for clause in _unused(table, layout, wanted))
     return Recording(RecordedTimes(time), profiles, warnings, table.source)
 
 
-def _profile(signal: Signal, time: FloatArray, table: Table, layout: Layout) -> SampledProfile:
-    name, *names = signal.names
-    derivatives = tuple(_rows(table, layout[name]) if name in layout else None for name in names)
-    return SampledProfile(
-        signal=signal, time=time, values=_rows(table, layout[name]), derivatives=derivatives
+def _unused(table: Table, layout: Layout, wanted: Sequence[Signal]) -> Iterator[str]:
+    for signal in SIGNALS:
+        if signal not in wanted and any(layout.get(name) for name in signal.names):
+            yield f"its columns of {signal.names[0]} are not used"
+    used = {TIME, *(table.columns[column] for columns in layout.values() for column in columns.values())}
+    if left := [column for column in table.columns if column not in used]:
+        yield f"not used: {', '.join(left)}; only antagonistic joints take a stiffness"
+
+
+def _profile(
+    signal: Signal, components: int, time: FloatArray, table: Table, layout: Layout
+) -> SampledProfile:
+    values, *derivatives = (
+        _rows(table, layout[name], components) if name in layout else None for name in signal.names
     )
+    assert values is not None, "columns of values are required"
+    return SampledProfile(signal=signal, time=time, values=values, derivatives=tuple(derivatives))
 
 
-def _rows(table: Table, columns: list[int]) -> FloatArray:
-    return np.stack([table.values[:, column] for column in columns])
+def _rows(table: Table, columns: Mapping[int, int], components: int) -> FloatArray:
+    """(components, samples), NaN where a component has no column."""
+    rows = np.full((components, len(table.values)), np.nan)
+    for component, column in columns.items():
+        rows[component] = table.values[:, column]
+    return rows
 
 
 def _located(problem: SampleProblem, table: Table, layout: Layout) -> Problem:
@@ -106,13 +124,15 @@ def _located(problem: SampleProblem, table: Table, layout: Layout) -> Problem:
     return Problem(table.source.path, line, f"{column} {problem.message}")
 
 
-def recorded_trajectory(path: str | os.PathLike[str], joint_names: Sequence[str]) -> Trajectory:
+def recorded_trajectory(
+    path: str | os.PathLike[str], joint_names: Sequence[str], without_stiffness: Collection[str] = ()
+) -> Trajectory:
     """A trajectory whose position and stiffness come from one CSV file, named after the file.
 
     Raises:
         InputError: as `read_recording`.
     """
-    recording = read_recording(path, joint_names)
+    recording = read_recording(path, joint_names, without_stiffness=without_stiffness)
     position, stiffness = recording.profiles
     name, sources = Path(path).stem, [recording.source]
     return Trajectory(recording.times, position, stiffness, name=name, sources=sources)

@@ -52,6 +52,8 @@ class JointReport:
     Attributes:
         name: of the joint.
         type: "revolute" or "prismatic".
+        actuator: "antagonistic", "elastic" or "rigid"; what the last two do not have is NaN: motor 2, margin
+            and corridor, and the stiffness of a rigid joint.
         steps: how many steps have each kind of trouble.
         first_time: when each kind that occurs first does, s.
         worst: the worst step of each kind that occurs; limits one by one.
@@ -69,6 +71,7 @@ class JointReport:
 
     name: str
     type: str
+    actuator: str
     steps: dict[str, int]
     first_time: dict[str, float]
     worst: dict[str, Worst]
@@ -87,6 +90,7 @@ class JointReport:
         return {
             "name": self.name,
             "type": self.type,
+            "actuator": self.actuator,
             "steps": self.steps,
             "first_time": self.first_time,
             "worst": {kind: worst.as_json() for kind, worst in self.worst.items()},

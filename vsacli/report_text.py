@@ -66,7 +66,11 @@ def _table(report: Report) -> Iterator[str]:
     rows: list[tuple[str, ...]] = [
         ("joint", "peak tau_e", "peak motor 1 / 2", "stiffness", "reachable", "margin")
     ]
-    rows += [_row(joint) for joint in report.joints]
+    return aligned(rows + [_row(joint) for joint in report.joints])
+
+
+def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """The lines of a table: the first column to the left, the others to the right."""
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         name, *cells = (
@@ -78,15 +82,23 @@ def _table(report: Report) -> Iterator[str]:
 
 def _row(joint: JointReport) -> tuple[str, ...]:
     torque = TORQUE.unit(joint.type)
-    motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor)
+    motors = " / ".join(_number(peak) for peak in _of_motors(joint, joint.peak_tau_motor))
     return (
         joint.name,
         f"{_number(joint.peak_tau_e)} {torque}",
         f"{motors} {torque}",
         _span(*joint.stiffness),
-        _corridor(*joint.reachable),
-        _percent(joint.margin),
+        *((_corridor(*joint.reachable), _percent(joint.margin)) if _is_antagonistic(joint) else ("-", "-")),
     )
+
+
+def _is_antagonistic(joint: JointReport) -> bool:
+    return joint.actuator == "antagonistic"
+
+
+def _of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
+    """Of a pair of numbers those of the motors that the joint has."""
+    return pair if _is_antagonistic(joint) else pair[:1]
 
 
 def _corridor(lower: float, upper: float) -> str:
@@ -96,6 +108,8 @@ def _corridor(lower: float, upper: float) -> str:
 
 
 def _span(low: float, high: float) -> str:
+    if math.isnan(low):
+        return "-"
     return f"{low:.6g}" if low == high else f"{low:.6g}-{high:.6g}"
 
 
@@ -152,7 +166,7 @@ def _infeasible(joint: JointReport, worst: Worst) -> str:
 
 
 def _singular(joint: JointReport, worst: Worst) -> str:
-    remedy = "raise" if worst.value <= worst.bound else "lower"
+    remedy = "lower" if worst.bound == joint.reachable[1] else "raise"
     return (
         f"stiffness {worst.value:.6g} {worst.unit} at t = {_time(worst.time)} is singular: "
         f"motor torques are undefined at the end of its range, {remedy} it ({_steps(joint, 'singular')})"
@@ -185,25 +199,27 @@ _SENTENCES = {"infeasible": _infeasible, "singular": _singular, "near_singular":
 
 def _start(report: Report) -> Iterator[str]:
     yield _by_joint("start motors at: ", [_start_of(joint) for joint in report.joints])
-    steps = [joint for joint in report.joints if not math.isnan(max(joint.torque_step))]
-    if steps:
-        joint = max(steps, key=lambda each: max(each.torque_step))
-        yield f"torque step at start: {max(joint.torque_step):.3g} {TORQUE.unit(joint.type)} ({joint.name})"
+    steps = [(max(_of_motors(joint, joint.torque_step)), joint) for joint in report.joints]
+    defined = [entry for entry in steps if not math.isnan(entry[0])]
+    if defined:
+        step, joint = max(defined, key=lambda entry: entry[0])
+        yield f"torque step at start: {step:.3g} {TORQUE.unit(joint.type)} ({joint.name})"
 
 
 def _start_of(joint: JointReport) -> str:
-    if any(map(math.isnan, joint.start_theta)):
+    positions = _of_motors(joint, joint.start_theta)
+    if any(map(math.isnan, positions)):
         return f"{joint.name} undefined (first step infeasible)"
-    first, second = joint.start_theta
-    return f"{joint.name} {first:+.4g} {second:+.4g} {POSITION.unit(joint.type)}"
+    return f"{joint.name} {' '.join(f'{theta:+.4g}' for theta in positions)} {POSITION.unit(joint.type)}"
 
 
 def _stops(report: Report) -> Iterator[str]:
-    for joint, drift in zip(report.joints, report.drifts, strict=False):
+    infeasible = {joint.name: joint.steps["infeasible"] for joint in report.joints}
+    for drift in report.drifts:
         if drift.stop is not None:
-            steps = f"infeasible: {_count(joint.steps['infeasible'])}"
             time, reason = _time(drift.stop.time), drift.stop.reason
-            yield f"{joint.name}: its deflections cannot be followed beyond t = {time}: {reason} ({steps})"
+            steps = f"infeasible: {_count(infeasible[drift.joint])}"
+            yield f"{drift.joint}: its deflections cannot be followed beyond t = {time}: {reason} ({steps})"
 
 
 def _drift(report: Report) -> Iterator[str]:

@@ -1,10 +1,11 @@
-"""The robot: a Denavit-Hartenberg chain of links, each joint driven by two motors through two springs."""
+"""The robot: a Denavit-Hartenberg chain of links, each joint with its motors and springs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -191,6 +192,8 @@ class Elastic:
     motor: Motor = value(Record(Motor), "the motor")
     stiffness: float = number(units.STIFFNESS, "stiffness of the transmission", check=POSITIVE)
 
+    no_choice = "its actuator is elastic, with the constant stiffness that the robot file says"
+
     def __post_init__(self) -> None:
         check_fields(self)
 
@@ -201,8 +204,16 @@ class Rigid:
 
     motor: Motor = value(Record(Motor), "the motor")
 
+    no_choice = "its actuator is rigid and has no stiffness"
+
     def __post_init__(self) -> None:
         check_fields(self)
+
+
+Actuator: TypeAlias = Antagonistic | Elastic | Rigid
+
+ACTUATORS: dict[str, type[Actuator]] = {"antagonistic": Antagonistic, "elastic": Elastic, "rigid": Rigid}
+"""Actuators by the name they have in a robot file."""
 
 
 @dataclass(frozen=True)
@@ -230,20 +241,38 @@ class Joint:
     damping: float = number(
         units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
     )
-    actuator: Antagonistic = value(
-        OneOf({"antagonistic": Antagonistic}, not_yet=("elastic", "rigid")), "what drives the joint"
-    )
+    actuator: Actuator = value(OneOf(ACTUATORS), "what drives the joint")
     limits: Limits = value(Record(Limits), "limits of the commanded motion", default=Limits())
 
     unit_variant = "type"
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        problems = []
+        if isinstance(self.actuator, Rigid) and self.limits.stiffness != UNBOUNDED:
+            reason = "a joint with a rigid actuator has no stiffness to limit; leave it out"
+            problems.append(FieldProblem(("limits", "stiffness"), reason))
+        check_fields(self, *problems)
 
     @property
     def is_revolute(self) -> bool:
         """Whether the joint variable is an angle."""
         return self.type == "revolute"
+
+    @property
+    def actuator_type(self) -> str:
+        """The key of its actuator in `ACTUATORS`."""
+        return next(word for word, actuator in ACTUATORS.items() if isinstance(self.actuator, actuator))
+
+    @property
+    def springs(self) -> tuple[SpringLaw, ...]:
+        """The nonlinear springs of its actuator, once if both are one."""
+        laws = self.actuator.spring if isinstance(self.actuator, Antagonistic) else ()
+        return tuple({id(law): law for law in laws}.values())
+
+    def warnings(self) -> Iterator[str]:
+        """What is doubtful though usable, and what the springs say about themselves."""
+        yield from (f"link of joint {self.name}: {doubt}" for doubt in self.link.doubts())
+        yield from (f"spring of joint {self.name}: {note}" for law in self.springs for note in law.notes)
 
 
 @dataclass(frozen=True)
@@ -276,8 +305,21 @@ class Robot:
         return tuple(joint.type for joint in self.joints)
 
     @property
+    def without_stiffness(self) -> dict[str, str]:
+        """The joints for which a trajectory chooses no stiffness, each with the reason, a clause."""
+        return {
+            joint.name: joint.actuator.no_choice
+            for joint in self.joints
+            if not isinstance(joint.actuator, Antagonistic)
+        }
+
+    @property
+    def spring_sources(self) -> tuple[Source, ...]:
+        """Files that springs were read from, each once."""
+        sources = (source for joint in self.joints for law in joint.springs for source in law.sources)
+        return tuple(dict.fromkeys(sources))
+
+    @property
     def warnings(self) -> tuple[str, ...]:
-        """Doubtful but usable physics, one sentence each."""
-        return tuple(
-            f"link of joint {joint.name}: {doubt}" for joint in self.joints for doubt in joint.link.doubts()
-        )
+        """Doubtful but usable physics, and what springs say about themselves, one sentence each."""
+        return tuple(warning for joint in self.joints for warning in joint.warnings())

@@ -26,7 +26,7 @@ class SampledProfile:
     Attributes:
         signal: what is described.
         time: (samples,) in s.
-        values: (components, samples).
+        values: (components, samples); NaN throughout if the signal is optional and a component has none.
         derivatives: for each derivative of the signal the given values, (components, samples), or None.
     """
 
@@ -78,7 +78,13 @@ class SampledProfile:
     def _spline(self) -> BSpline[np.float64]:
         from scipy.interpolate import make_interp_spline
 
-        return make_interp_spline(self.time, self.values.T, k=self.signal.spline_degree)
+        return make_interp_spline(self.time, self.values[self.given].T, k=self.signal.spline_degree)
+
+    @cached_property
+    def given(self) -> BoolArray:
+        """Which components have values, (components,)."""
+        absent: BoolArray = np.all(np.isnan(self.values), axis=1)
+        return ~absent if self.signal.optional else np.ones_like(absent)
 
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
         """Value and derivatives at the samples start..stop-1: what was given, and for the rest the spline."""
@@ -111,12 +117,13 @@ class SampledProfile:
         offset = time - knots[span]
         taylor = [self._spline(knots[used], nu=order).T[:, which] for order in range(degree + 1)]
 
-        rows = np.empty((self.signal.orders, self.components, len(time)))
+        rows = np.full((self.signal.orders, self.components, len(time)), np.nan)
         for order, row in enumerate(rows):
-            row[:] = taylor[degree]
+            total = taylor[degree].copy()
             for power in range(degree - order, 0, -1):
-                row *= offset / power
-                row += taylor[order + power - 1]
+                total *= offset / power
+                total += taylor[order + power - 1]
+            row[self.given] = total
         return rows
 
 
@@ -174,11 +181,12 @@ def value_problems(profile: SampledProfile) -> Iterator[SampleProblem]:
         yield SampleProblem(
             name, f"needs at least {degree + 1} samples for a C{degree - 1} spline, not {count}"
         )
+    given = np.flatnonzero(profile.given).tolist()
     for column, rows in zip(signal.names, (profile.values, *profile.derivatives), strict=True):
-        for joint, row in enumerate([] if rows is None else rows):
+        for joint, row in () if rows is None else zip(given, rows[given], strict=True):
             yield from _breach(column, joint, profile.time, row, np.isfinite(row), "finite")
     if signal.positive:
-        for joint, row in enumerate(profile.values):
+        for joint, row in zip(given, profile.values[given], strict=True):
             yield from _breach(name, joint, profile.time, row, ~(row <= 0), "positive")
 
 

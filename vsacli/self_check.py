@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
+from vsacli.drivetrain import SIDES, motors_and_springs
 from vsacli.feasibility import has, margin
 from vsacli.flags import Flag
 from vsacli.robot import Robot
@@ -84,19 +85,23 @@ class SelfCheck:
 def spring_residual(robot: Robot, block: Block) -> float:
     """Largest scaled residual of (14) on the regular steps, from the laws evaluated at phi.
 
-    Scaled as |sum tau_k - tau_e| / sum |tau_k| and |sum sigma_k - sigma| / sigma.
+    Scaled as |sum tau_k - tau_e| / sum |tau_k| and |sum sigma_k - sigma| / sigma. An elastic joint has one
+    linear law; a rigid one has none, and so no residual.
     """
     errors = []
     for index, joint in enumerate(robot.joints):
+        laws = [law for _, law in motors_and_springs(joint.actuator) if law is not None]
+        if not laws:
+            continue
         regular = ~has(block.flags[:, index], Flag.INFEASIBLE | Flag.SINGULAR)
         phi, tau_e = block.phi[regular, index], block.tau_e[regular, index]
         stiffness = block.stiffness[regular, index]
-        tau = np.stack([law.torque(phi[:, side]) for side, law in enumerate(joint.actuator.laws)])
-        sigma = np.stack([law.stiffness(phi[:, side]) for side, law in enumerate(joint.actuator.laws)])
+        tau = np.stack([law.torque(phi[:, side]) for side, law in enumerate(laws)])
+        sigma = np.stack([law.stiffness(phi[:, side]) for side, law in enumerate(laws)])
         torque_error = np.abs(tau.sum(axis=0) - tau_e)
         size = np.maximum(np.abs(tau).sum(axis=0), np.finfo(float).tiny)
         errors += [torque_error / size, np.abs(sigma.sum(axis=0) - stiffness) / stiffness]
-    return float(np.max(np.concatenate(errors), initial=0.0))
+    return float(np.max(np.concatenate([np.zeros(1), *errors])))
 
 
 def ladder(robot: Robot, trajectory: Trajectory) -> float:
@@ -110,10 +115,12 @@ def ladder(robot: Robot, trajectory: Trajectory) -> float:
     grid = times + steps[:, None, :] * np.arange(-3, 4)[None, :, None]
     block = compute_block(robot, trajectory.at(grid.ravel()))
     smooth = _motors_move_smoothly(block, grid.shape)
+    motors = np.array([len(motors_and_springs(joint.actuator)) for joint in robot.joints])
+    absent = np.arange(SIDES) >= motors[:, None]
 
     def on_grid(name: str) -> FloatArray:
         values: FloatArray = getattr(block, name).reshape(*grid.shape, len(robot.joints), -1)
-        return values
+        return values if name.endswith("tau_e") else np.where(absent, 0.0, values)
 
     errors = [
         _rung_error(

@@ -11,7 +11,7 @@ from vsacli.actuation import other_preload_would_do
 from vsacli.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.feasibility import TOUCHING, excess, has, limit_checks, margin
 from vsacli.report import COUNTED, JointReport, Worst
-from vsacli.robot import Joint
+from vsacli.robot import Antagonistic, Joint
 from vsacli.variables import VARIABLES, Block
 
 REACH = {kind: COUNTED[kind] for kind in ("infeasible", "singular", "near_singular")}
@@ -28,7 +28,7 @@ class JointTally:
         self._first_time: dict[str, float] = {}
         self._worst: dict[str, tuple[float, Worst]] = {}
         self._margin = (math.inf, math.nan, (math.nan, math.nan))
-        self._stiffness = (math.inf, -math.inf)
+        self._stiffness = (math.nan, math.nan)
         self._peaks = np.full(3, np.nan)
         self._start: FloatArray | None = None
         self._other_preload = True
@@ -38,23 +38,31 @@ class JointTally:
         index = self._index
         flags = block.flags[:, index]
         stiffness = block.stiffness[:, index]
-        corridor = block.stiffness_lower[:, index], block.stiffness_upper[:, index]
-        # A step whose torque cannot be carried at all is worse than any margin.
-        gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
 
         if self._start is None:
             self._start = np.stack((block.theta[0, index], _torque_step(block, index)))
         self._count(flags, block.time)
-        self._record_margin(gap, block.time, corridor)
-        self._record_reach(flags, gap, block)
+        if isinstance(self._joint.actuator, Antagonistic):
+            self._add_reach(self._joint.actuator, flags, block)
         self._record_limits(flags, block)
-        self._stiffness = min(self._stiffness[0], stiffness.min()), max(self._stiffness[1], stiffness.max())
+        least, most = self._stiffness
+        self._stiffness = np.fmin(least, stiffness.min()), np.fmax(most, stiffness.max())
         peaks = np.abs(block.tau_e[:, index]), *np.abs(block.tau_motor[:, index]).T
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(values) for values in peaks])
+
+    def _add_reach(self, actuator: Antagonistic, flags: FlagArray, block: Block) -> None:
+        """Merge what there is to say about the corridor."""
+        index = self._index
+        stiffness = block.stiffness[:, index]
+        corridor = block.stiffness_lower[:, index], block.stiffness_upper[:, index]
+        # A step whose torque cannot be carried at all is worse than any margin.
+        gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
+        self._record_margin(gap, block.time, corridor)
+        self._record_reach(flags, gap, block)
         beyond = gap < -TOUCHING
         if self._other_preload and beyond.any():
             demand = block.tau_e[beyond, index], stiffness[beyond]
-            self._other_preload = bool(other_preload_would_do(self._joint.actuator, *demand).all())
+            self._other_preload = bool(other_preload_would_do(actuator, *demand).all())
 
     def report(self) -> JointReport:
         """What was found so far; at least one block must have been added."""
@@ -65,6 +73,7 @@ class JointTally:
         return JointReport(
             name=self._joint.name,
             type=self._joint.type,
+            actuator=self._joint.actuator_type,
             steps=dict(self._steps),
             first_time=dict(self._first_time),
             worst={kind: worst for kind, (_, worst) in self._worst.items()},

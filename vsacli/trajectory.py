@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Protocol
@@ -9,10 +10,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.arrays import FloatArray, over_time
+from vsacli.arrays import BoolArray, FloatArray, over_time
 from vsacli.errors import InputError, Problem
 from vsacli.motion import Motion
-from vsacli.profiles import POSITION, STIFFNESS, WRENCH
+from vsacli.profiles import POSITION, STIFFNESS, WRENCH, Constant, Signal
 from vsacli.samples import SampledProfile, checked_array, time_problems, value_problems
 from vsacli.spec.source import Source
 from vsacli.times import RecordedTimes, Times
@@ -72,7 +73,8 @@ class Trajectory:
 
     Attributes:
         times: the steps.
-        position, stiffness: what happens at them and between them.
+        position, stiffness: what happens at them and between them; the stiffness of a joint for which none is
+            chosen is NaN.
         wrench: what the environment exerts meanwhile; None if nothing.
         name: used in reports and for the name of the result file.
         warnings: what the user should know about times and profiles.
@@ -125,7 +127,7 @@ class Trajectory:
         cls,
         time: npt.ArrayLike,
         q: npt.ArrayLike,
-        stiffness: npt.ArrayLike,
+        stiffness: npt.ArrayLike | None = None,
         *,
         dq: npt.ArrayLike | None = None,
         ddq: npt.ArrayLike | None = None,
@@ -147,7 +149,8 @@ class Trajectory:
         Args:
             time: (samples,) in s, strictly increasing, at least 6.
             q: position, (samples, joints), rad (m), as are its derivatives per s^k.
-            stiffness: joint stiffness, (samples, joints), N m/rad (N/m), as are its derivatives per s^k.
+            stiffness: joint stiffness, (samples, joints), N m/rad (N/m), as are its derivatives per s^k. Only
+                that of antagonistic joints counts; the others' may be NaN, and None if there are no such joints.
             dq: first derivative of q.
             ddq: second derivative of q.
             d3q: third derivative of q.
@@ -166,19 +169,27 @@ class Trajectory:
         """
         times = checked_array("time", time, None)
         position = SampledProfile.from_arrays(POSITION, times, q, dq, ddq, d3q, d4q)
-        stiffnesses = SampledProfile.from_arrays(STIFFNESS, times, stiffness, dstiffness, ddstiffness)
-        wrenches = _recorded_wrench(times, wrench, dwrench, ddwrench)
-        profiles = [position, stiffnesses, *wrenches]
+        stiffnesses = _recorded(STIFFNESS, times, stiffness, dstiffness, ddstiffness)
+        wrenches = _recorded(WRENCH, times, wrench, dwrench, ddwrench)
+        profiles = [position, *stiffnesses, *wrenches]
         problems = [*time_problems(times), *(found for part in profiles for found in value_problems(part))]
         if problems:
             raise InputError(Problem("", 0, str(problem)) for problem in problems)
         exerted = WrenchProfile(wrenches[0], wrench_frame) if wrenches else None
-        return cls(RecordedTimes(times), position, stiffnesses, wrench=exerted, name=name)
+        recorded = RecordedTimes(times)
+        chosen = stiffnesses[0] if stiffnesses else no_stiffness(position.components, recorded)
+        return cls(recorded, position, chosen, wrench=exerted, name=name)
 
     @property
     def joints(self) -> int:
         """Number of joints."""
         return self.position.components
+
+    @property
+    def stiffened(self) -> BoolArray:
+        """The joints for which a stiffness is chosen, (joints,)."""
+        chosen: BoolArray = ~np.isnan(self.block(0, 1).stiffness[0])
+        return chosen
 
     @property
     def samples(self) -> int:
@@ -241,12 +252,18 @@ class Trajectory:
         return time, np.minimum(time - left, right - time)
 
 
-def _recorded_wrench(
-    times: FloatArray, wrench: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
+def no_stiffness(joints: int, times: Times) -> Constant:
+    """The profile of a robot that has no antagonistic joint."""
+    return Constant(signal=STIFFNESS, span=times.span, value=(math.nan,) * joints)
+
+
+def _recorded(
+    signal: Signal, times: FloatArray, values: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
 ) -> list[SampledProfile]:
-    """The profile through samples of a wrench, if there are any."""
-    if wrench is not None:
-        return [SampledProfile.from_arrays(WRENCH, times, wrench, *derivatives)]
+    """The profile through samples of a signal, if there are any."""
+    if values is not None:
+        return [SampledProfile.from_arrays(signal, times, values, *derivatives)]
     if any(given is not None for given in derivatives):
-        raise InputError.one("derivatives of a wrench are given, but not the wrench")
+        name = signal.names[0]
+        raise InputError.one(f"derivatives of a {name} are given, but not the {name}")
     return []

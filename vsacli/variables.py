@@ -6,7 +6,7 @@ The declaration feeds the pipeline, the HDF5 attributes, the CSV headers, the pl
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,9 @@ from vsacli.units import Quantity
 from vsacli.wrench import wrench_columns
 
 MOTORS = (1, 2)
+VARIABLE_STIFFNESS = ("antagonistic",)
+COMPLIANT = (*VARIABLE_STIFFNESS, "elastic")
+EVERY_ACTUATOR = (*COMPLIANT, "rigid")
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,7 @@ class Variable:
         quantity: unit at revolute and prismatic joints, or of moments and forces.
         long_name: a few words.
         equation: number in Buondonno & De Luca (2016), or where the value comes from.
+        actuators: the types of actuator whose joints have it; at the others it is NaN.
     """
 
     name: str
@@ -39,6 +43,7 @@ class Variable:
     quantity: Quantity
     long_name: str
     equation: str
+    actuators: tuple[str, ...] = EVERY_ACTUATOR
 
 
 def _variable(
@@ -47,13 +52,22 @@ def _variable(
     long_name: str,
     equation: str,
     default: Any = dataclasses.MISSING,
+    actuators: tuple[str, ...] = EVERY_ACTUATOR,
 ) -> Any:
-    metadata = {"dims": dims, "quantity": quantity, "long_name": long_name, "equation": equation}
+    metadata = {
+        "dims": dims,
+        "quantity": quantity,
+        "long_name": long_name,
+        "equation": equation,
+        "actuators": actuators,
+    }
     return dataclasses.field(default=default, kw_only=True, metadata=metadata)
 
 
-def _of_joint(quantity: Quantity, long_name: str, equation: str) -> Any:
-    return _variable(("joint",), quantity, long_name, equation)
+def _of_joint(
+    quantity: Quantity, long_name: str, equation: str, actuators: tuple[str, ...] = EVERY_ACTUATOR
+) -> Any:
+    return _variable(("joint",), quantity, long_name, equation, actuators=actuators)
 
 
 def _of_motor(quantity: Quantity, long_name: str, equation: str) -> Any:
@@ -68,8 +82,8 @@ def _of_wrench(quantity: Quantity, long_name: str) -> Any:
 class Block:
     """Every variable over a block of consecutive steps; shapes (samples, joints) or (samples, joints, 2).
 
-    A value that cannot be computed is NaN, and `flags` says why. The wrench, (samples, 6), is None if the
-    trajectory has none.
+    A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have is
+    NaN throughout. The wrench, (samples, 6), is None if the trajectory has none.
     """
 
     time: FloatArray = _variable((), units.TIME, "time", "given")
@@ -80,10 +94,12 @@ class Block:
     d3q: FloatArray = _of_joint(units.JERK, "commanded joint jerk", "given")
     d4q: FloatArray = _of_joint(units.SNAP, "commanded joint snap", "given")
 
-    stiffness: FloatArray = _of_joint(units.STIFFNESS, "commanded joint stiffness", "given")
-    dstiffness: FloatArray = _of_joint(units.STIFFNESS_RATE, "rate of the commanded stiffness", "given")
+    stiffness: FloatArray = _of_joint(units.STIFFNESS, "commanded joint stiffness", "given", COMPLIANT)
+    dstiffness: FloatArray = _of_joint(
+        units.STIFFNESS_RATE, "rate of the commanded stiffness", "given", COMPLIANT
+    )
     ddstiffness: FloatArray = _of_joint(
-        units.STIFFNESS_ACCELERATION, "second derivative of the commanded stiffness", "given"
+        units.STIFFNESS_ACCELERATION, "second derivative of the commanded stiffness", "given", COMPLIANT
     )
 
     wrench: FloatArray | None = _of_wrench(units.WRENCH, "wrench exerted on the end effector")
@@ -107,13 +123,19 @@ class Block:
     tau_motor: FloatArray = _of_motor(units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)")
 
     det_A: FloatArray = _of_joint(  # noqa: N815  (the published name)
-        units.DECOUPLING, "determinant of the decoupling block of the joint", "(67)"
+        units.DECOUPLING, "determinant of the decoupling block of the joint", "(67)", VARIABLE_STIFFNESS
     )
     stiffness_lower: FloatArray = _of_joint(
-        units.STIFFNESS, "smallest stiffness reachable at this elastic torque on the joint's branch", "(14)"
+        units.STIFFNESS,
+        "smallest stiffness reachable at this elastic torque on the joint's branch",
+        "(14)",
+        VARIABLE_STIFFNESS,
     )
     stiffness_upper: FloatArray = _of_joint(
-        units.STIFFNESS, "largest stiffness reachable at this elastic torque on the joint's branch", "(14)"
+        units.STIFFNESS,
+        "largest stiffness reachable at this elastic torque on the joint's branch",
+        "(14)",
+        VARIABLE_STIFFNESS,
     )
     flags: FlagArray = _of_joint(
         units.DIMENSIONLESS, "what is wrong with this step of the joint", "margins of (14)"
@@ -130,20 +152,34 @@ VARIABLES: dict[str, Variable] = {
 """Every variable by name, `time` first."""
 
 
-def select_variables(names: Iterable[str]) -> tuple[Variable, ...]:
+def select_variables(
+    names: Iterable[str], declared: Mapping[str, Variable] = VARIABLES
+) -> tuple[Variable, ...]:
     """The variables of these names, in declared order, `time` left out.
 
     Raises:
         InputError: for each name that is no variable, the nearest one that is.
     """
     wanted = set(names)
-    unknown = sorted(wanted - set(VARIABLES))
+    unknown = sorted(wanted - set(declared))
     if unknown:
         raise InputError(
-            Problem("", 0, f"no variable is called {name!r}{did_you_mean(name, VARIABLES)}")
+            Problem("", 0, f"no variable is called {name!r}{did_you_mean(name, declared)}")
             for name in unknown
         )
-    return tuple(variable for name, variable in VARIABLES.items() if name in wanted and variable.dims)
+    return tuple(variable for name, variable in declared.items() if name in wanted and variable.dims)
+
+
+def existing(variable: Variable, actuators: Iterable[str]) -> list[list[bool]]:
+    """Which columns of a variable of joints exist, for each joint with one of these types of actuator."""
+    motors = MOTORS if "motor" in variable.dims else MOTORS[:1]
+    return [
+        [
+            actuator in variable.actuators and (motor == MOTORS[0] or actuator in VARIABLE_STIFFNESS)
+            for motor in motors
+        ]
+        for actuator in actuators
+    ]
 
 
 def column_names(variable: Variable, joint_names: Iterable[str]) -> list[str]:

@@ -30,14 +30,24 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
     Raises:
         ImpossibleError: no stiffness mends the joint, or it has none to choose.
     """
-    if not isinstance(joint.actuator, Antagonistic):
-        raise ImpossibleError(f"the actuator of {joint.name} has no stiffness to choose")
+    chosen_actuator(joint)
     if reason := path_reason(joint, load.time, load.command):
         raise ImpossibleError(f"no stiffness changes that {reason}")
     admissible = admissible_stiffness(joint, load.command, acceptance.near_singular)
     if np.isnan(admissible.low).any():
         raise ImpossibleError(acceptance.reason(joint, load.time, load.command))
     return admissible
+
+
+def chosen_actuator(joint: Joint) -> Antagonistic:
+    """The actuator of a joint, if a trajectory chooses its stiffness.
+
+    Raises:
+        ImpossibleError: it does not.
+    """
+    if not isinstance(joint.actuator, Antagonistic):
+        raise ImpossibleError(f"the actuator of {joint.name} has no stiffness to choose")
+    return joint.actuator
 
 
 def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -> Range:
@@ -50,27 +60,28 @@ def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -
         command: its elastic torque counts, and its stiffness as a scale.
         near_singular: the margin m.
     """
-    corridor = solve_deflections(joint.actuator, command.tau_e, command.stiffness)
+    actuator = chosen_actuator(joint)
+    corridor = solve_deflections(actuator, command.tau_e, command.stiffness)
     least, most = joint.limits.stiffness
     low = np.maximum(corridor.lower / (1 - near_singular), least)
     high = np.minimum(corridor.upper / (1 + near_singular), most)
-    if all(np.isinf(spring.max_deflection) for spring in joint.actuator.spring):
+    if all(np.isinf(spring.max_deflection) for spring in actuator.spring):
         return Range(low, high)
-    return Range(low, np.minimum(high, _deflection_ceiling(joint, command, corridor.lower)))
+    return Range(low, np.minimum(high, _deflection_ceiling(actuator, command, corridor.lower)))
 
 
-def _deflection_ceiling(joint: Joint, command: Command, lower: FloatArray) -> FloatArray:
+def _deflection_ceiling(actuator: Antagonistic, command: Command, lower: FloatArray) -> FloatArray:
     """The stiffness from `lower` on up to which both deflections keep their limit.
 
     With the stiffness grows the preload: phi_1 increases and phi_2 decreases, or the other way round. What is
     halved is a share x of 0 to 1, which maps to all stiffness above `lower`.
     """
-    limits = np.array([[spring.max_deflection] for spring in joint.actuator.spring])
+    limits = np.array([[spring.max_deflection] for spring in actuator.spring])
     kept, broken = np.zeros_like(lower), np.ones_like(lower)
     for _ in range(HALVINGS):
         share = (kept + broken) / 2
         stiffness = lower + command.stiffness * share / (1 - share)
-        solution = solve_deflections(joint.actuator, command.tau_e, stiffness)
+        solution = solve_deflections(actuator, command.tau_e, stiffness)
         within = np.all(np.abs([solution.phi_1, solution.phi_2]) <= limits, axis=0)
         kept, broken = np.where(within, share, kept), np.where(within, broken, share)
     return lower + command.stiffness * kept / (1 - kept)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vsacli.arrays import FloatArray
 from vsacli.feasibility import NEAR_SINGULAR, check_near_singular
-from vsacli.robot import Joint, Robot
+from vsacli.robot import Antagonistic, Joint, Robot
 from vsacli.suggest.acceptance import Acceptance
 from vsacli.suggest.impossible import ImpossibleError
 from vsacli.suggest.load import Load, joint_loads
@@ -100,6 +100,7 @@ def _stiffness_offset(
         tuple(
             Offset(joint.name, found.get(index, 0.0), STIFFNESS.unit(joint.type))
             for index, joint in enumerate(acceptance.robot.joints)
+            if isinstance(joint.actuator, Antagonistic)
         )
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TextIO
@@ -84,21 +85,27 @@ def _document(trajectory: Trajectory, table: str) -> str:
 def _course(profile: Profile, table: str) -> str:
     match profile:
         case RestToRest(degree=degree, start=start, end=end):
-            return f"type: polynomial, degree: {degree}, start: {list(start)}, end: {list(end)}"
+            return f"type: polynomial, degree: {degree}, start: {_numbers(start)}, end: {_numbers(end)}"
         case Constant(value=value):
-            return f"type: constant, value: {list(value)}"
+            return f"type: constant, value: {_numbers(value)}"
         case _:
             return f"type: csv, file: {json.dumps(table)}"
 
 
+def _numbers(values: Sequence[float]) -> str:
+    return json.dumps([None if math.isnan(value) else value for value in values])
+
+
 def _write_table(trajectory: Trajectory, joint_names: Sequence[str], stream: TextIO) -> None:
     names = [name for signal in _recorded(trajectory) for name in signal.names]
+    chosen = dict.fromkeys(STIFFNESS.names, trajectory.stiffened)
+    headers = [np.array(_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["time", *(column for name in names for column in _columns(name, joint_names))])
+    writer.writerow(["time", *np.concatenate(headers).tolist()])
     for start in range(0, trajectory.samples, BLOCK_SAMPLES):
         motion = trajectory.block(start, start + BLOCK_SAMPLES)
         variables = motion.variables()
-        columns = [motion.time[:, None], *(variables[name] for name in names)]
+        columns = [motion.time[:, None], *(variables[name][:, chosen.get(name, ...)] for name in names)]
         writer.writerows(np.concatenate(columns, axis=1).tolist())
 
 

@@ -1,4 +1,4 @@
-"""From link torque to motor torque, (61)-(74), for one joint over samples."""
+"""Two motors behind nonlinear springs: (14), and (61)-(72) with the decoupling matrix."""
 
 from __future__ import annotations
 
@@ -7,45 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.feasibility import NEAR_SINGULAR, has, limit_checks, limit_flags, reach_flags
+from vsacli.actuation.transmission import Command, Transmission
+from vsacli.arrays import BoolArray, FloatArray
+from vsacli.feasibility import has, reach_flags
 from vsacli.flags import Flag
-from vsacli.robot import Antagonistic, Joint
+from vsacli.robot import Antagonistic
 from vsacli.springs import PairSolution, make_pair
-
-
-class Command(NamedTuple):
-    """What a joint is asked to do and what its link demands of it; arrays (samples,), SI units."""
-
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
-    stiffness: FloatArray
-    dstiffness: FloatArray
-    ddstiffness: FloatArray
-    tau_e: FloatArray
-    dtau_e: FloatArray
-    ddtau_e: FloatArray
-
-
-class Drive(NamedTuple):
-    """What the actuator of a joint has to do for it; (2, samples) for the motors, else (samples,).
-
-    The names are those of the result variables. Where a step is infeasible everything of the motors is NaN,
-    where it is singular what needs the inverse of the decoupling matrix is.
-    """
-
-    phi: FloatArray
-    dphi: FloatArray
-    theta: FloatArray
-    dtheta: FloatArray
-    ddtheta: FloatArray
-    tau_spring: FloatArray
-    tau_motor: FloatArray
-    det_A: FloatArray  # noqa: N815  (the published name)
-    stiffness_lower: FloatArray
-    stiffness_upper: FloatArray
-    flags: FlagArray
 
 
 class _Springs(NamedTuple):
@@ -57,47 +24,28 @@ class _Springs(NamedTuple):
     eta: FloatArray
 
 
-def drive(
-    joint: Joint,
-    command: Command,
-    near_singular: float = NEAR_SINGULAR,
-    followed: FloatArray | None = None,
-) -> Drive:
-    """Motor motion and motor torques of an antagonistic joint, (61)-(74).
-
-    Args:
-        joint: the joint with its two motors and springs.
-        command: commanded motion and stiffness, and the elastic torque with its two derivatives.
-        near_singular: margin below which a step is near-singular.
-        followed: deflections to use instead of the root of (14), (2, samples); a step where they are NaN is
-            infeasible.
-    """
-    solution = solve_deflections(joint.actuator, command.tau_e, command.stiffness)
+def transmit(
+    actuator: Antagonistic, command: Command, near_singular: float, followed: FloatArray | None
+) -> Transmission:
+    """Deflections on the actuator's branch, their rates, and motor accelerations; arguments as of `drive`."""
+    solution = solve_deflections(actuator, command.tau_e, command.stiffness)
     flags = reach_flags(command.stiffness, solution, near_singular)
     phi = solution.deflections if followed is None else followed.copy()  # (61)
     flags[np.isnan(phi[0])] |= np.uint16(Flag.INFEASIBLE)
     phi[:, has(flags, Flag.INFEASIBLE)] = np.nan
-    springs = _springs(joint.actuator, phi)
+    springs = _springs(actuator, phi)
 
     det_a = _determinant(springs)
     divisor = np.where(has(flags, Flag.SINGULAR), np.nan, det_a)
     dphi = _solve(springs, divisor, command.dtau_e, command.dstiffness)  # (68)
-    dtheta = dphi + command.dq  # (69)
-    ddtheta = _solve(springs, divisor, *_beta(springs, dphi, command))  # (72)
-    inertia, damping = _by_motor(joint, "inertia"), _by_motor(joint, "damping")
-    tau_motor = inertia * ddtheta + damping * dtheta + springs.tau  # (73)-(74)
-    values = {**command._asdict(), "phi": phi, "dtheta": dtheta, "tau_motor": tau_motor}
-    for check in limit_checks(joint):
-        of_joint = values[check.variable]
-        flags |= limit_flags(check, of_joint if check.motor is None else of_joint[check.motor - 1])
-    return Drive(
+    return Transmission(
+        stiffness=command.stiffness,
+        dstiffness=command.dstiffness,
+        ddstiffness=command.ddstiffness,
         phi=phi,
         dphi=dphi,
-        theta=phi + command.q,  # (69)
-        dtheta=dtheta,
-        ddtheta=ddtheta,
+        ddtheta=_solve(springs, divisor, *_beta(springs, dphi, command)),  # (72)
         tau_spring=springs.tau,
-        tau_motor=tau_motor,
         det_A=det_a,
         stiffness_lower=solution.lower,
         stiffness_upper=solution.upper,
@@ -163,7 +111,3 @@ def _solve(springs: _Springs, det_a: FloatArray, upper: FloatArray, lower: Float
     """A^-1 (upper, lower) by (67)."""
     (sigma_1, sigma_2), (zeta_1, zeta_2) = springs.sigma, springs.zeta
     return np.stack((zeta_2 * upper - sigma_2 * lower, sigma_1 * lower - zeta_1 * upper)) / det_a
-
-
-def _by_motor(joint: Joint, attribute: str) -> FloatArray:
-    return np.array([[getattr(motor, attribute)] for motor in joint.actuator.motor])
