@@ -16,6 +16,7 @@ class Result:
     """What the figures ask of a stored result; it holds the variables it is given."""
 
     complete = True
+    declared = VARIABLES
 
     def __init__(
         self,
@@ -23,6 +24,7 @@ class Result:
         types: str = "RRR",
         path: str = "run.h5",
         trajectory: str = "rest-to-rest",
+        actuators: Sequence[str] | None = None,
         **variables: np.ndarray,
     ) -> None:
         many = tuple(f"joint_{index + 1}" for index in range(len(types)))
@@ -31,6 +33,7 @@ class Result:
         self.trajectory_name = trajectory
         self.joint_names = ("base", "shoulder", "elbow") if types == "RRR" else many
         self.joint_types = tuple({"R": "revolute", "P": "prismatic"}[letter] for letter in types)
+        self.actuators = tuple(actuators or ["antagonistic"] * len(types))
         self.time = time
         self.samples = time.size
         self._values = variables

@@ -1,7 +1,8 @@
-"""Motions along the edge of what two springs can do: a branch that splits; the singular set, passed and met."""
+"""Motions along the edge of what two springs can do: a branch that splits; the singular set, passed, met."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -14,9 +15,11 @@ from vsacli.arrays import FloatArray
 from vsacli.feasibility import has
 from vsacli.flags import Flag
 from vsacli.pipeline import Result
+from vsacli.profiles import POSITION, RestToRest
 from vsacli.robot import DenavitHartenberg, Inertia, Joint, Link, Robot
 from vsacli.springs import SpringLaw
 from vsacli.springs.cubic import Cubic
+from vsacli.springs.exponential import Exponential
 from vsacli.springs.four_bar import FourBar
 from vsacli.springs.polynomial import Polynomial
 from vsacli.springs.quadratic import Quadratic
@@ -42,7 +45,7 @@ SINKING = """\
 format: vsacli-trajectory/1
 name: sinking
 duration: 60
-rate: 100
+rate: 20
 position: {type: polynomial, degree: 7, start: 0.5, end: 0.3}
 stiffness: {type: constant, value: 1950}
 """
@@ -68,8 +71,8 @@ def test_step_at_which_the_branch_splits_is_named(vsacli, sinking):
     result = inverse_dynamics(robot, load_trajectory(sinking[1], robot))
     over = result.tau_e[:, 0] > SPLIT
     first = int(over.argmax())
-    # Loads grow by some 0.01 N m a step, and the published digits of the split end there.
-    assert joint["first_time"]["infeasible"] == pytest.approx(result.time[first], abs=0.02)
+    # Loads grow by some 0.05 N m a step of 0.05 s; the digits of the split leave one step open.
+    assert joint["first_time"]["infeasible"] == pytest.approx(result.time[first], abs=0.06)
     assert joint["steps"]["infeasible"] == pytest.approx(over.sum(), abs=2)
     assert "arm: stiffness 1950 N m/rad at t =" in vsacli("check-feasibility", *sinking).out
 
@@ -171,3 +174,30 @@ def test_touching_the_singular_set_loses_the_motor_torque_there_only(laws: tuple
     assert np.abs(result.det_A[100, 0]) < 1e-3 * np.abs(result.det_A).max()
     assert result.report.verdict == "singular"
     assert result.report.joints[0].first_time["singular"] == pytest.approx(1.0)
+
+
+# A slide
+
+
+SLIDES: dict[str, tuple[SpringLaw, SpringLaw]] = {
+    "tendons": (Exponential(c=20, a=40), Exponential(c=30, a=35)),
+    "tendon and sinh": (Quadratic(k=2e5), Sinh(k=25, a=40)),
+    "four-bar and cubic": (FourBar(k=900, ratio=2.2), Cubic(k=2000, k_c=4e5)),
+}
+
+
+@pytest.mark.parametrize("laws", SLIDES.values(), ids=SLIDES)
+def test_springs_of_a_slide(laws: tuple[SpringLaw, SpringLaw]):
+    joint = dataclasses.replace(arm(laws).joints[0], type="prismatic")
+    robot = Robot(name="lift", joints=(joint,))
+    time = np.linspace(0, 1, 101)
+    path = RestToRest(signal=POSITION, span=(0.0, 1.0), degree=9, start=(0.0,), end=(0.2,)).at(time)
+    q, dq, ddq, d3q, d4q = (order.T for order in path)
+    stiffness = np.full_like(q, 9000.0)
+    result = inverse_dynamics(
+        robot, Trajectory.from_samples(time, q, stiffness, dq=dq, ddq=ddq, d3q=d3q, d4q=d4q)
+    )
+    assert result.report.verdict == "ok"
+    # The weight and the inertia of 1 kg, in N, and no more than the damping beside.
+    np.testing.assert_allclose(result.tau_e, 9.81 + ddq + 0.1 * dq, rtol=1e-12)
+    np.testing.assert_allclose(result.tau_spring.sum(axis=2), result.tau_e, rtol=0, atol=1e-10)

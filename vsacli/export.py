@@ -188,16 +188,17 @@ def _existing(result: StoredResult, variable: Variable) -> BoolArray:
 
 def _undefined(values: FloatArray | FlagArray, there: BoolArray) -> BoolArray:
     """(samples, joints): whether a value that the joint has is NaN."""
-    missing = np.isnan(values).reshape(len(values), *there.shape)
-    return np.any(missing & there, axis=-1)
+    missing: BoolArray = np.isnan(values).reshape(len(values), *there.shape)
+    undefined: BoolArray = np.any(missing & there, axis=-1)
+    return undefined
 
 
 def _cells(values: FloatArray | FlagArray, there: BoolArray) -> list[list[Any]]:
     """The columns of a variable that are there, as numbers; NaN becomes None, which csv leaves empty."""
-    flat = values.reshape(len(values), -1).T[there.ravel()]
+    flat: np.ndarray[Any, Any] = values.reshape(len(values), -1).T[there.ravel()]
     missing = np.isnan(flat)
-    if not missing.any():
-        return flat.tolist()
-    cells = flat.astype(object)
-    cells[missing] = None
-    return cells.tolist()
+    if missing.any():
+        flat = flat.astype(object)
+        flat[missing] = None
+    columns: list[list[Any]] = flat.tolist()
+    return columns

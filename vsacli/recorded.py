@@ -134,5 +134,11 @@ def recorded_trajectory(
     """
     recording = read_recording(path, joint_names, without_stiffness=without_stiffness)
     position, stiffness = recording.profiles
-    name, sources = Path(path).stem, [recording.source]
-    return Trajectory(recording.times, position, stiffness, name=name, sources=sources)
+    return Trajectory(
+        recording.times,
+        position,
+        stiffness,
+        name=Path(path).stem,
+        warnings=recording.warnings,
+        sources=[recording.source],
+    )

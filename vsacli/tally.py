@@ -11,8 +11,8 @@ from vsacli.actuation import other_preload_would_do
 from vsacli.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.feasibility import TOUCHING, excess, has, limit_checks, margin
 from vsacli.report import COUNTED, JointReport, Worst
-from vsacli.robot import Antagonistic, Joint
-from vsacli.variables import VARIABLES, Block
+from vsacli.robot import Antagonistic, Joint, Rigid
+from vsacli.variables import MOTORS, VARIABLES, Block
 
 REACH = {kind: COUNTED[kind] for kind in ("infeasible", "singular", "near_singular")}
 """Kinds of trouble whose worst step is the one with the smallest margin."""
@@ -40,7 +40,7 @@ class JointTally:
         stiffness = block.stiffness[:, index]
 
         if self._start is None:
-            self._start = np.stack((block.theta[0, index], _torque_step(block, index)))
+            self._start = np.stack((block.theta[0, index], self._torque_step(block)))
         self._count(flags, block.time)
         if isinstance(self._joint.actuator, Antagonistic):
             self._add_reach(self._joint.actuator, flags, block)
@@ -135,6 +135,13 @@ class JointTally:
                 self._first_time[label] = min(first, self._first_time.get(label, first))  # either motor
                 self._keep(over[step], Worst(label, float(block.time[step]), value, bound, unit, check.motor))
 
+    def _torque_step(self, block: Block) -> FloatArray:
+        """Of motors behind springs, whose torques do not jump."""
+        if isinstance(self._joint.actuator, Rigid):
+            return np.full(len(MOTORS), np.nan)
+        step: FloatArray = np.abs(block.tau_motor[0, self._index] - block.tau_spring[0, self._index])
+        return step
+
     def _keep(self, badness: float, worst: Worst) -> None:
         if worst.kind not in self._worst or badness > self._worst[worst.kind][0]:
             self._worst[worst.kind] = (badness, worst)
@@ -144,8 +151,3 @@ def _worst_step(hit: BoolArray, badness: FloatArray) -> Iterator[int]:
     """The step with the largest badness among those hit, if there is one."""
     if hit.any():
         yield int(np.where(hit, badness, -np.inf).argmax())
-
-
-def _torque_step(block: Block, index: int) -> FloatArray:
-    step: FloatArray = np.abs(block.tau_motor[0, index] - block.tau_spring[0, index])
-    return step

@@ -150,7 +150,7 @@ class Trajectory:
             time: (samples,) in s, strictly increasing, at least 6.
             q: position, (samples, joints), rad (m), as are its derivatives per s^k.
             stiffness: joint stiffness, (samples, joints), N m/rad (N/m), as are its derivatives per s^k. Only
-                that of antagonistic joints counts; the others' may be NaN, and None if there are no such joints.
+                that of antagonistic joints counts; others may have NaN, and None will do if there are none.
             dq: first derivative of q.
             ddq: second derivative of q.
             d3q: third derivative of q.

@@ -82,8 +82,8 @@ def _of_wrench(quantity: Quantity, long_name: str) -> Any:
 class Block:
     """Every variable over a block of consecutive steps; shapes (samples, joints) or (samples, joints, 2).
 
-    A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have is
-    NaN throughout. The wrench, (samples, 6), is None if the trajectory has none.
+    A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have
+    is NaN throughout. The wrench, (samples, 6), is None if the trajectory has none.
     """
 
     time: FloatArray = _variable((), units.TIME, "time", "given")

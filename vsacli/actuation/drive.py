@@ -12,15 +12,15 @@ from vsacli.actuation.transmission import Command, Transmission
 from vsacli.arrays import FlagArray, FloatArray
 from vsacli.drivetrain import SIDES, motors_and_springs
 from vsacli.feasibility import NEAR_SINGULAR, limit_checks, limit_flags
-from vsacli.robot import Antagonistic, Elastic, Joint, Motor, Rigid
+from vsacli.robot import Antagonistic, Elastic, Joint, Rigid
 
 
 class Drive(NamedTuple):
     """Stiffness, motor motion and motor torques of a joint; (2, samples) for the motors, else (samples,).
 
     The names are those of the result variables. Where a step is infeasible everything of the motors is NaN,
-    where it is singular what needs the inverse of the decoupling matrix is. What the actuator does not have is
-    NaN throughout.
+    where it is singular what needs the inverse of the decoupling matrix is. What the actuator does not have
+    is NaN throughout.
     """
 
     stiffness: FloatArray

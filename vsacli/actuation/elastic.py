@@ -7,7 +7,7 @@ from vsacli.robot import Elastic
 
 
 def transmit(actuator: Elastic, command: Command) -> Transmission:
-    """theta = q + tau_e/K and its derivatives."""
+    """Deflection tau_e/K, and its derivatives."""
     stiffness = actuator.stiffness
     return single_motor(
         command,

@@ -10,7 +10,7 @@ from vsacli.actuation.transmission import Command, Transmission, single_motor
 
 
 def transmit(command: Command) -> Transmission:
-    """theta = q; there is no stiffness, and so no derivative of one."""
+    """No deflection; there is no stiffness, and so no derivative of one."""
     still = np.zeros_like(command.q)
     return single_motor(
         command, stiffness=math.nan, stiffness_rates=math.nan, phi=still, dphi=still, ddtheta=command.ddq

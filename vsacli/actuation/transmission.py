@@ -1,4 +1,4 @@
-"""What every actuator has in common: what it is asked to do, and what lies between its joint and its motors."""
+"""What every actuator has in common: what it is asked to do, and what lies between joint and motors."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ def single_motor(
         command: what the joint is asked to do.
         stiffness: the same at every step, NaN if the joint has none.
         stiffness_rates: its derivatives, zero or NaN.
-        phi, dphi: deflection of the transmission and its rate, (samples,).
+        phi: deflection of the transmission, (samples,).
+        dphi: its rate, (samples,).
         ddtheta: acceleration of the motor, (samples,).
     """
     none = np.full_like(command.q, np.nan)

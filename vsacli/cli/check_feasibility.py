@@ -101,8 +101,9 @@ def check_feasibility(
             refuse_input_as_output(path, (source.path for part in inputs for source in part.sources))
     stem = run_stem(robot, trajectory)
     if plot_folder is not None:
-        from vsacli.plots import FEASIBILITY, check_figures
+        from vsacli.plots import FEASIBILITY, check_drawable, check_figures
 
+        check_drawable([joint.actuator_type for joint in inputs[0].joints])
         check_figures([FEASIBILITY], plot_folder, stem, overwrite=overwrite)
     run = Run(
         *inputs,

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vsacli.arrays import BoolArray
 from vsacli.errors import InputError
 from vsacli.plots.curves import Failures, read_curves
 from vsacli.plots.drawing import draw_bands, draw_curve, line_handle
 from vsacli.plots.layout import (
     PANEL_WIDTH,
-    AxesGrid,
     add_title,
     complete,
     folding,
@@ -24,7 +25,7 @@ from vsacli.plots.layout import (
 from vsacli.plots.style import house_style, line_style
 from vsacli.store.reader import StoredResult
 from vsacli.units import TORQUE
-from vsacli.variables import MOTORS
+from vsacli.variables import MOTORS, VARIABLES, existing
 
 COMPARISON = "compare"
 """Name of the figure; the file is called `<stem>-compare`."""
@@ -61,11 +62,13 @@ def _joints(result: StoredResult) -> str:
 
 
 def _comparison(results: Sequence[StoredResult]) -> Figure:
-    joints, motors = len(results[0].joint_names), len(MOTORS)
+    there = _motors(results)
+    joints, columns = there.shape
     rows, folds = folding(joints, MOST_ROWS)
-    figure = Figure((folds * motors * PANEL_WIDTH, 1.6 * rows + 1.2), layout="constrained")
+    figure = Figure((folds * columns * PANEL_WIDTH, 1.6 * rows + 1.2), layout="constrained")
     time = np.sort(np.concatenate([result.time[[0, -1]] for result in results]))
-    panels = joint_panels(figure.add_gridspec()[0], time, joints, MOST_ROWS, motors)
+    grid = joint_panels(figure.add_gridspec()[0], time, there, MOST_ROWS)
+    panels = [row[exists].tolist() for row, exists in zip(grid, there, strict=True)]
     _annotate(panels, results[0])
     handles = [line_handle(line_style(index), label) for index, label in enumerate(distinct_labels(results))]
     for index, result in enumerate(results):
@@ -74,19 +77,26 @@ def _comparison(results: Sequence[StoredResult]) -> Figure:
     return complete(figure, f"{robots}, motor torques", handles)
 
 
-def _annotate(panels: AxesGrid, result: StoredResult) -> None:
+def _motors(results: Sequence[StoredResult]) -> BoolArray:
+    """Which motors any of the results has at each joint, (joints, 1 or 2)."""
+    there = np.any([existing(VARIABLES["tau_motor"], result.actuators) for result in results], axis=0)
+    columns = int(np.count_nonzero(np.any(there, axis=0)))
+    return np.asarray(there)[:, :columns]
+
+
+def _annotate(panels: list[list[Axes]], result: StoredResult) -> None:
     for row, name, joint_type in zip(panels, result.joint_names, result.joint_types, strict=True):
-        for axes, motor in zip(row, MOTORS, strict=True):
+        for axes, motor in zip(row, MOTORS, strict=False):
             add_title(axes, f"{name}, motor {motor}")
             axes.set_ylabel(rf"$\tau_{motor}$ [{TORQUE.unit(joint_type)}]")
 
 
-def _overlay(panels: AxesGrid, result: StoredResult, index: int) -> list[Artist]:
+def _overlay(panels: list[list[Axes]], result: StoredResult, index: int) -> list[Artist]:
     """Draw one of the results over all panels; returns what a legend shows for its bands."""
     failures = Failures.of(result)
     handles: list[Artist] = []
     for joint, curves in enumerate(read_curves(result, ["tau_motor"])):
-        for axes, torque in zip(panels[joint], curves.values, strict=True):
+        for axes, torque in zip(panels[joint], curves.values, strict=False):
             draw_curve(axes, curves.time, torque, index, line_style(index))
             handles += draw_bands(axes, failures.time, *failures.among([joint]))
     return handles

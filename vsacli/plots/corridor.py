@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from vsacli.plots.layout import add_title, joint_panels
 from vsacli.plots.style import line_style
 from vsacli.store.reader import StoredResult
 from vsacli.units import STIFFNESS
+from vsacli.variables import VARIABLES, existing
 
 MOST_ROWS = 5
 BOUNDS = ("stiffness_lower", "stiffness_upper")
@@ -31,14 +33,21 @@ _AREA: dict[str, Any] = {"facecolor": "#8fc1ec", "alpha": 0.4, "linewidth": 0, "
 _EDGE: dict[str, Any] = {"color": "#6f9fc8", "linewidth": 0.9, "zorder": 1}
 
 
+def compliant_joints(actuators: Sequence[str]) -> list[int]:
+    """The joints that have a stiffness, by the types of their actuators."""
+    there = existing(VARIABLES["stiffness"], actuators)
+    return [joint for joint, [has_stiffness] in enumerate(there) if has_stiffness]
+
+
 def draw_corridors(place: SubplotSpec, result: StoredResult, failures: Failures) -> list[Artist]:
-    """Draw one panel per joint; returns what a legend shows for them."""
+    """Draw one panel per joint with a stiffness, of which there is one; returns what a legend shows."""
     bounds = [name for name in BOUNDS if set(BOUNDS) <= set(result.variables)]
-    joints = read_curves(result, ["stiffness", *bounds])
-    panels = joint_panels(place, failures.time, len(joints), MOST_ROWS, 1)[:, 0]
+    joints = compliant_joints(result.actuators)
+    curves = read_curves(result, ["stiffness", *bounds])
+    panels = joint_panels(place, failures.time, np.ones((len(joints), 1), dtype=bool), MOST_ROWS)[:, 0]
     handles: list[Artist] = []
-    for joint, (axes, curves) in enumerate(zip(panels, joints, strict=True)):
-        handles += _draw_stiffness(axes, curves, joint)
+    for joint, axes in zip(joints, panels, strict=True):
+        handles += _draw_stiffness(axes, curves[joint], joint)
         handles += draw_bands(axes, failures.time, *failures.among([joint]))
         add_title(axes, result.joint_names[joint])
         axes.set_ylabel(rf"$\sigma$ [{STIFFNESS.unit(result.joint_types[joint])}]")
@@ -54,6 +63,8 @@ def _draw_stiffness(axes: Axes, curves: Curves, joint: int) -> list[Artist]:
         return []
     lower, upper = bounds
     carried = ~np.isnan(lower)
+    if not carried.any():
+        return []
     axes.fill_between(curves.time, np.maximum(lower, bottom), np.minimum(upper, top), carried, **_AREA)
     for bound in bounds:
         axes.plot(curves.time, np.where(np.isinf(bound), np.nan, bound), **_EDGE)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from matplotlib.figure import Figure
 
-from vsacli.plots.corridor import MOST_ROWS, draw_corridors
+from vsacli.errors import InputError
+from vsacli.plots.corridor import MOST_ROWS, compliant_joints, draw_corridors
 from vsacli.plots.curves import Failures
 from vsacli.plots.layout import PANEL_WIDTH, complete, folding, result_title
 from vsacli.plots.style import house_style
@@ -20,9 +23,19 @@ PANEL_HEIGHT = 1.7
 """Inches."""
 
 
+def check_drawable(actuators: Sequence[str]) -> None:
+    """Refuse a robot whose joints, by the types of their actuators, have no stiffness to draw.
+
+    Raises:
+        InputError: they have not.
+    """
+    if not compliant_joints(actuators):
+        raise InputError.one("there is no stiffness to plot: all joints are rigid")
+
+
 def plot_feasibility(result: StoredResult) -> Figure:
     """Draw the commanded stiffness of each joint inside what its load allows, bad stretches shaded."""
-    rows, folds = folding(len(result.joint_names), MOST_ROWS)
+    rows, folds = folding(len(compliant_joints(result.actuators)), MOST_ROWS)
     width = 2 * PANEL_WIDTH if folds == 1 else PANEL_WIDTH * folds
     with house_style():
         figure = Figure((width, PANEL_HEIGHT * rows + 1), layout="constrained")

@@ -6,12 +6,13 @@ from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
 from vsacli.errors import InputError
-from vsacli.plots.corridor import MOST_ROWS, draw_corridors
+from vsacli.plots.corridor import MOST_ROWS, compliant_joints, draw_corridors
 from vsacli.plots.curves import Failures, read_curves
 from vsacli.plots.drawing import draw_bands, draw_curve, line_handle
 from vsacli.plots.layout import (
@@ -26,7 +27,7 @@ from vsacli.plots.layout import (
 from vsacli.plots.style import house_style, line_style
 from vsacli.store.reader import StoredResult
 from vsacli.units import POSITION, TORQUE
-from vsacli.variables import MOTORS
+from vsacli.variables import MOTORS, existing
 
 PANEL_HEIGHT = 2.3
 """Inches."""
@@ -73,8 +74,11 @@ def omitted_figures(variables: Collection[str]) -> dict[str, str]:
 
 
 def _motion(result: StoredResult, failures: Failures) -> Figure:
-    """Fig. 1: positions at the left, stiffness at the right."""
-    rows, folds = folding(len(result.joint_names), MOST_ROWS)
+    """Fig. 1: positions at the left, stiffness at the right if any joint has one."""
+    compliant = compliant_joints(result.actuators)
+    if not compliant:
+        return grouped_figure(result, failures, "q", [_position_label])
+    rows, folds = folding(len(compliant), MOST_ROWS)
     widths = (PANEL_WIDTH, PANEL_WIDTH if folds == 1 else NARROW_WIDTH * folds)
     height = max(PANEL_HEIGHT * len(panel_groups(result.joint_types)), 1.4 * rows)
     figure = Figure((sum(widths), height + 1), layout="constrained")
@@ -95,7 +99,7 @@ def _elastic_torque(result: StoredResult, failures: Failures) -> Figure:
 
 
 def grouped_figure(result: StoredResult, failures: Failures, name: str, labels: Sequence[Label]) -> Figure:
-    """A figure of one variable, with a column of panels for each of its curves."""
+    """A figure of one variable that some joint has, with a column of panels for each of its curves."""
     height = PANEL_HEIGHT * len(panel_groups(result.joint_types)) + 1
     figure = Figure((2 * PANEL_WIDTH, height), layout="constrained")
     handles = _draw_groups(figure.add_gridspec()[0], result, failures, name, labels)
@@ -105,19 +109,20 @@ def grouped_figure(result: StoredResult, failures: Failures, name: str, labels: 
 def _draw_groups(
     place: SubplotSpec, result: StoredResult, failures: Failures, name: str, labels: Sequence[Label]
 ) -> list[Artist]:
-    """Draw a variable, a row of panels for each group of joints; returns what a legend shows."""
-    groups = panel_groups(result.joint_types)
+    """Draw a variable, a row of panels for each group of joints that have it; returns what a legend shows."""
+    there = np.array(existing(result.declared[name], result.actuators))
+    drawn = np.flatnonzero(there.any(axis=0)).tolist()
+    groups = [group for group in panel_groups(result.joint_types) if there[group].any()]
     joints = read_curves(result, [name])
-    panels = place.subgridspec(len(groups), len(labels)).subplots(squeeze=False)
+    panels = place.subgridspec(len(groups), len(drawn)).subplots(squeeze=False)
     handles = [line_handle(line_style(joint), name) for joint, name in enumerate(result.joint_names)]
     for group, row in zip(groups, panels, strict=True):
-        for curve, (axes, label) in enumerate(zip(row, labels, strict=True)):
-            for joint in group:
+        for curve, axes in zip(drawn, row, strict=True):
+            for joint in [joint for joint in group if there[joint, curve]]:
                 draw_curve(axes, joints[joint].time, joints[joint].values[curve], joint, line_style(joint))
             handles += draw_bands(axes, failures.time, *failures.among(group))
-            axes.set_ylabel(label(result.joint_types[group[0]]))
-    for column in panels.T:
-        share_time(column, failures.time)
+            axes.set_ylabel(labels[curve](result.joint_types[group[0]]))
+    share_time(panels, np.array([there[group][:, drawn].any(axis=0) for group in groups]), failures.time)
     return handles
 
 

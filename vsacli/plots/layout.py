@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
-from vsacli.arrays import FloatArray
+from vsacli.arrays import BoolArray, FloatArray
 from vsacli.plots.style import shortened
 from vsacli.store.reader import StoredResult
 from vsacli.units import TIME
@@ -47,29 +47,38 @@ def folding(joints: int, most_rows: int) -> tuple[int, int]:
     return math.ceil(joints / folds), folds
 
 
-def joint_panels(place: SubplotSpec, time: FloatArray, joints: int, most_rows: int, columns: int) -> AxesGrid:
+def joint_panels(place: SubplotSpec, time: FloatArray, present: BoolArray, most_rows: int) -> AxesGrid:
     """Panels of each joint, (joints, columns), with a common time axis from column to column.
 
     Args:
         place: where they go.
         time: what the time axes span, ascending, s.
-        joints: number of joints, one below the other.
+        present: (joints, columns), which panels there are, one joint below the other; others are removed.
         most_rows: joints below each other before the next begins beside them.
-        columns: panels of a joint.
     """
+    joints, columns = present.shape
     rows, folds = folding(joints, most_rows)
     grid = place.subgridspec(rows, folds * columns).subplots(squeeze=False)
     panels = grid.reshape(rows, folds, columns).swapaxes(0, 1).reshape(-1, columns)
     for unused in panels[joints:].flat:
         unused.remove()
     for first in range(0, joints, rows):
-        for column in panels[first : min(first + rows, joints)].T:
-            share_time(column, time)
+        fold = slice(first, min(first + rows, joints))
+        share_time(panels[fold], present[fold], time)
     return panels[:joints]
 
 
-def share_time(column: Sequence[Axes], time: FloatArray) -> None:
-    """Let panels, top to bottom, share a time axis over this span, labelled below the last."""
+def share_time(panels: AxesGrid, present: BoolArray, time: FloatArray) -> None:
+    """Remove the panels that are not present; those of each column share a time axis over this span."""
+    for unused in panels[~present]:
+        unused.remove()
+    for column, there in zip(panels.T, present.T, strict=True):
+        if there.any():
+            _share_time(column[there], time)
+
+
+def _share_time(column: Sequence[Axes], time: FloatArray) -> None:
+    """Let panels, top to bottom, share a time axis, labelled below the last."""
     for axes in column[:-1]:
         axes.sharex(column[-1])
         axes.tick_params(labelbottom=False)

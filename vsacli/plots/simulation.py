@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from vsacli.plots.curves import Failures
@@ -12,7 +13,7 @@ from vsacli.plots.figures import grouped_figure
 from vsacli.plots.style import house_style
 from vsacli.store.simulation import StoredSimulation
 from vsacli.units import POSITION, STIFFNESS, TORQUE
-from vsacli.variables import MOTORS
+from vsacli.variables import MOTORS, existing
 
 
 def plot_simulation(simulation: StoredSimulation) -> dict[str, Figure]:
@@ -22,6 +23,7 @@ def plot_simulation(simulation: StoredSimulation) -> dict[str, Figure]:
         return {
             name: grouped_figure(simulation, failures, variable, labels)
             for name, (variable, labels) in _FIGURES.items()
+            if np.any(existing(simulation.declared[variable], simulation.actuators))
         }
 
 
