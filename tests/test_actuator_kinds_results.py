@@ -124,10 +124,13 @@ def test_a_wrong_deflection_of_an_elastic_joint_fails(
     assert not check.passed
 
 
-def test_a_missing_number_fails(robot: Robot, motion: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_numbers_fail(robot: Robot, motion: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
     def spoiled(joint, *arguments):
         driven = drive(joint, *arguments)
-        return driven._replace(theta=driven.theta * (np.nan if joint.actuator_type == "rigid" else 1))
+        if joint.actuator_type != "rigid":
+            return driven
+        none = np.full_like(driven.theta, np.nan)
+        return driven._replace(theta=none, dtheta=none, ddtheta=none)
 
     monkeypatch.setattr("vsacli.steps.drive", spoiled)
     assert not inverse_dynamics(robot, motion).report.self_check.passed
