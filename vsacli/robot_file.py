@@ -4,11 +4,32 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from dataclasses import dataclass
 
+from vsacli.errors import InputError
+from vsacli.modified_dh import as_standard
 from vsacli.robot import Robot
+from vsacli.spec.fields import choice, declared
 from vsacli.spec.reading import read_document
 
 FORMAT = "vsacli-robot/1"
+
+
+@dataclass(frozen=True)
+class RobotFile(Robot):
+    """The content of a robot file: rows and link frames are of the convention that it names."""
+
+    convention: str = choice(
+        ("standard", "modified"),
+        "Denavit-Hartenberg convention of all rows and link frames; a modified row i holds a_{i-1}, "
+        "alpha_{i-1}, d_i, theta_i",
+        default="standard",
+    )
+
+    def robot(self) -> Robot:
+        """The robot, with standard rows and link frames whatever the convention of the file."""
+        robot = Robot(**{name: getattr(self, name) for name in declared(Robot)}, sources=self.sources)
+        return as_standard(robot) if self.convention == "modified" else robot
 
 
 def load_robot(path: str | os.PathLike[str]) -> Robot:
@@ -17,5 +38,10 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
     Raises:
         InputError: with every problem of the file, each with its line.
     """
-    robot, source = read_document(path, Robot, FORMAT)
+    document, source = read_document(path, RobotFile, FORMAT)
+    try:
+        robot = document.robot()
+    except InputError as error:
+        reason = f"its modified rows have no standard ones: {error}"
+        raise InputError.one(reason, source.path) from None
     return dataclasses.replace(robot, sources=(source, *robot.spring_sources))

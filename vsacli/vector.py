@@ -7,6 +7,8 @@ text serves every geometry without a branch on a value.
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 Scalar = Any
@@ -16,6 +18,12 @@ Scalar = Any
 def exact(number: float) -> Scalar:
     """The number, as a Python integer if it is one of the constants that fold."""
     return int(number) if number in (0, 1, -1) else number
+
+
+def trigonometric(function: Callable[[float], float], angle: float) -> Scalar:
+    """Cosine or sine of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
+    number = function(angle)
+    return 0 if abs(number) <= sys.float_info.epsilon * max(1.0, abs(angle)) else exact(number)
 
 
 def add(a: Scalar, b: Scalar) -> Scalar:

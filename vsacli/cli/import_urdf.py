@@ -1,0 +1,103 @@
+"""`vsacli import-urdf`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.options import example, overwrite_option
+from vsacli.cli.running import refuse_input_as_output
+
+ACTUATOR_TYPES = ("antagonistic", "elastic", "rigid")
+
+
+def _spring(_context: click.Context, _parameter: click.Parameter, written: str) -> tuple[float, float]:
+    try:
+        k, k_c = (float(word) for word in written.split(","))
+    except ValueError:
+        raise click.BadParameter("expected two numbers, k and k_c, e.g. 400,2000") from None
+    return k, k_c
+
+
+@click.command(
+    "import-urdf",
+    short_help="Make a robot file from a serial chain of a URDF.",
+    epilog=example("vsacli import-urdf robots/desk_arm.urdf --tip flange -o desk_arm.yaml"),
+)
+@click.argument("urdf")
+@click.option("--base", metavar="LINK", help="Link that stands still; by default the root.")
+@click.option("--tip", metavar="LINK", help="Link of the end effector; needed if there is a choice.")
+@click.option("-o", "--output", metavar="FILE", help="Robot file; by default URDF.yaml in this folder.")
+@click.option(
+    "--actuator",
+    type=click.Choice(ACTUATOR_TYPES),
+    default="antagonistic",
+    show_default=True,
+    help="Placeholder: what drives every joint.",
+)
+@click.option(
+    "--motor-inertia",
+    metavar="KG_M2",
+    type=float,
+    default=1.0,
+    show_default=True,
+    help="Placeholder: of each motor, joint side of its gear.",
+)
+@click.option(
+    "--stiffness",
+    metavar="NM/RAD",
+    type=float,
+    default=1000.0,
+    show_default=True,
+    help="Placeholder: of elastic joints.",
+)
+@click.option(
+    "--spring",
+    metavar="K,KC",
+    default="400,2000",
+    show_default=True,
+    callback=_spring,
+    help="Placeholder: cubic springs of antagonistic joints.",
+)
+@click.option(
+    "--snap",
+    metavar="RAD",
+    type=click.FloatRange(0, 0.1),
+    default=1e-4,
+    show_default=True,
+    help="Make axes closer to parallel so, if their common normal is far away.",
+)
+@overwrite_option
+@talk_options
+def import_urdf(
+    urdf: str,
+    base: str | None,
+    tip: str | None,
+    output: str | None,
+    actuator: str,
+    motor_inertia: float,
+    stiffness: float,
+    spring: tuple[float, float],
+    snap: float,
+    overwrite: bool,
+    talk: Talk,
+) -> None:
+    """Make a robot file with standard Denavit-Hartenberg rows from a serial chain of a URDF.
+
+    Links behind fixed joints, and side branches at position zero, are lumped with the link that carries them.
+    Prints the rows, what was left out or changed, and how far the kinematics stray from the URDF's. A URDF
+    says nothing about motors and springs: these are placeholders, marked in the file.
+    """
+    from vsacli.store.atomic import check_target
+    from vsacli.urdf import Placeholders, convert, render, write_robot
+
+    path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
+    refuse_input_as_output(path, [urdf])
+    placeholders = Placeholders(actuator, motor_inertia, stiffness, spring)
+    check_target(path, overwrite=overwrite)
+    conversion = convert(urdf, base, tip, placeholders, snap)
+    write_robot(conversion, path, overwrite=overwrite)
+    click.echo(render(conversion))
+    talk.note(f"wrote {path}")
