@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import singledispatch
-from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.arrays import FloatArray, IndexArray
-from vsacli.robot import Antagonistic, Elastic, Motor, Rigid, Robot
+from vsacli.arrays import FloatArray
+from vsacli.decoupling_matrix import Springs, determinant, spring_state
+from vsacli.motor import JointMotor
+from vsacli.robot import Antagonistic, Elastic, Rigid, Robot
 from vsacli.springs import SpringLaw
 from vsacli.springs.polynomial import Polynomial
 
@@ -21,37 +22,24 @@ SIDES = 2
 
 
 @singledispatch
-def motors_and_springs(actuator: object) -> list[tuple[Motor, SpringLaw | None]]:
+def motors_and_springs(actuator: object) -> list[tuple[JointMotor, SpringLaw | None]]:
     """Each motor of an actuator with the spring between it and the link; None if there is none."""
     raise TypeError(f"{type(actuator).__name__} is no actuator")
 
 
 @motors_and_springs.register
-def _(actuator: Antagonistic) -> list[tuple[Motor, SpringLaw | None]]:
-    return list(zip(actuator.motor, actuator.laws, strict=True))
+def _(actuator: Antagonistic) -> list[tuple[JointMotor, SpringLaw | None]]:
+    return [(motor.at_joint, law) for motor, law in zip(actuator.motor, actuator.laws, strict=True)]
 
 
 @motors_and_springs.register
-def _(actuator: Elastic) -> list[tuple[Motor, SpringLaw | None]]:
-    return [(actuator.motor, Polynomial(c1=actuator.stiffness))]
+def _(actuator: Elastic) -> list[tuple[JointMotor, SpringLaw | None]]:
+    return [(actuator.motor.at_joint, Polynomial(c1=actuator.stiffness))]
 
 
 @motors_and_springs.register
-def _(actuator: Rigid) -> list[tuple[Motor, SpringLaw | None]]:
-    return [(actuator.motor, None)]
-
-
-class Springs(NamedTuple):
-    """Torque, stiffness, slope and curvature of each spring, (62)-(64), (66); (..., springs)."""
-
-    tau: FloatArray
-    sigma: FloatArray
-    zeta: FloatArray
-    eta: FloatArray
-
-    def of(self, members: IndexArray) -> Springs:
-        """Some of the springs."""
-        return Springs(*(values[..., members] for values in self))
+def _(actuator: Rigid) -> list[tuple[JointMotor, SpringLaw | None]]:
+    return [(actuator.motor.at_joint, None)]
 
 
 class Drivetrain:
@@ -131,17 +119,19 @@ class Drivetrain:
 
     def springs(self, phi: FloatArray) -> Springs:
         """The springs at their deflections, (..., springs)."""
-        return Springs(
-            tau=self.torque(phi),
-            sigma=self._each(phi, lambda law, part: law.stiffness(part)),
-            zeta=self._each(phi, lambda law, part: law.slope(part)),
-            eta=self._each(phi, lambda law, part: law.curvature(part)),
-        )
+        result = Springs(*(np.empty_like(phi) for _ in Springs._fields))
+        for law, members in self._groups:
+            for values, of_law in zip(result, spring_state(law, phi[..., members]), strict=True):
+                values[..., members] = of_law
+        return result
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Elastic energy of each joint, (..., joints), from the deflections (..., springs)."""
+        return self.joint_sum(self._each(phi, lambda law, part: law.energy(part)))
 
     def decoupling_determinant(self, springs: Springs) -> FloatArray:
         """Det A (67) of the joints that have two springs, (..., pairs)."""
-        one, two = springs.of(self.first), springs.of(self.second)
-        return one.sigma * two.zeta - two.sigma * one.zeta
+        return determinant(springs.of(self.first), springs.of(self.second))
 
     def _each(self, phi: FloatArray, value: Callable[[SpringLaw, FloatArray], FloatArray]) -> FloatArray:
         result = np.empty_like(phi)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, Literal, TextIO, TypeAlias
 
 import numpy as np
 
@@ -15,9 +16,13 @@ from vsacli.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.errors import InputError, VsacliError
 from vsacli.store.atomic import AtomicFile, reporting_storage_errors
 from vsacli.store.reader import StoredResult
-from vsacli.variables import Variable, column_names, existing, select_variables
+from vsacli.variables import VARIABLES, Variable, column_names, existing, select_variables
 
 DEFAULT_VARIABLES = ("tau_motor",)
+Side: TypeAlias = Literal["joint", "motor"]
+"""Of the gear of a motor."""
+GEARED = {"theta": 1, "dtheta": 1, "ddtheta": 1, "tau_motor": -1}
+"""What the gear changes: the power of its ratio by which the value on the motor's shaft is larger."""
 CELLS = 2**18
 """Values of a variable held in memory at a time."""
 RATE_TOLERANCE = 1e-6
@@ -59,6 +64,7 @@ def export_csv(
     *,
     rate: float | None = None,
     allow_nan: bool = False,
+    side: Side = "joint",
 ) -> None:
     """Write time and variables as CSV with a header line; floats read back bit for bit.
 
@@ -70,29 +76,30 @@ def export_csv(
         variables: names, exported in declared order.
         rate: samples per second, the stored rate or a whole fraction of it; all samples by default.
         allow_nan: leave the cells of undefined samples empty instead of refusing.
+        side: of the gear on which motion and torque of the motors are given. On the side "motor" they are in
+            rad and N m at any joint, and their columns end in `_shaft_1` and `_shaft_2`.
 
     Raises:
-        InputError: a variable is not in the file, or the rate is not possible.
+        InputError: a variable is not in the file, the rate is not possible, or a gear ratio is not known.
         UndefinedSamplesError: a sample is NaN and `allow_nan` is false.
     """
     selected = select_variables(variables)
     stride = 1 if rate is None else _stride(result, rate)
+    shaft = {variable.name for variable in selected if side == "motor"} & GEARED.keys()
+    if shaft:
+        _check_geared(result)
     if not allow_nan:
         _check_defined(result, selected, stride)
-    headers = [
-        name
-        for variable in selected
-        for name, there in zip(
-            column_names(variable, result.joint_names), _existing(result, variable).flat, strict=True
-        )
-        if there
-    ]
+    headers = [name for variable in selected for name in _headers(result, variable, variable.name in shaft)]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *headers])
     for start, stop in _spans(result, selected, stride):
         columns = [result.time[start:stop:stride].tolist()]
         for variable in selected:
-            columns += _cells(result.read(variable.name, start, stop)[::stride], _existing(result, variable))
+            values = result.read(variable.name, start, stop)[::stride]
+            if variable.name in shaft:
+                values = values * result.gear_ratio ** GEARED[variable.name]
+            columns += _cells(values, _existing(result, variable))
         writer.writerows(zip(*columns, strict=True))
 
 
@@ -103,6 +110,7 @@ def export_csv_file(
     *,
     rate: float | None = None,
     allow_nan: bool = False,
+    side: Side = "joint",
     overwrite: bool = False,
 ) -> None:
     """Do `export_csv` into a file that appears only when it is complete.
@@ -113,8 +121,28 @@ def export_csv_file(
     """
     with AtomicFile(path, overwrite=overwrite) as file:
         with reporting_storage_errors(path), file.temporary.open("w", encoding="utf-8", newline="") as stream:
-            export_csv(result, stream, variables, rate=rate, allow_nan=allow_nan)
+            export_csv(result, stream, variables, rate=rate, allow_nan=allow_nan, side=side)
         file.publish()
+
+
+def _headers(result: StoredResult, variable: Variable, on_shaft: bool) -> Iterator[str]:
+    """Names of the columns that a variable has."""
+    name = f"{variable.name}_shaft" if on_shaft else variable.name
+    columns = column_names(replace(variable, name=name), result.joint_names)
+    return compress(columns, _existing(result, variable).flat)
+
+
+def _check_geared(result: StoredResult) -> None:
+    """Refuse to guess what happens in a gear of unknown ratio."""
+    there = _existing(result, VARIABLES["tau_motor"])
+    unknown = np.any(np.isnan(result.gear_ratio) & there, axis=1).tolist()
+    if any(unknown):
+        joints = ", ".join(compress(result.joint_names, unknown))
+        message = (
+            f"the robot file gives no gear_ratio at {joints}, so what happens on the motors' shafts is not "
+            "known; add it (1 without a gear) and run invdyn again, or export with --side joint"
+        )
+        raise InputError.one(message, result.path)
 
 
 def _stride(result: StoredResult, rate: float) -> int:

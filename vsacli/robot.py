@@ -12,10 +12,10 @@ import numpy as np
 from vsacli import units
 from vsacli.arrays import FloatArray
 from vsacli.errors import FieldProblem
+from vsacli.motor import Motor
 from vsacli.spec.fields import (
     NON_NEGATIVE,
     POSITIVE,
-    POSITIVE_OR_INFINITE,
     Items,
     OneOf,
     Pair,
@@ -131,29 +131,6 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Motor:
-    """A motor, seen on the joint side of its gear."""
-
-    inertia: float = number(
-        units.MOTOR_INERTIA, "inertia of the drive, joint side of the gear", check=POSITIVE
-    )
-    damping: float = number(
-        units.DAMPING, "viscous damping, joint side of the gear", check=NON_NEGATIVE, default=0.0
-    )
-    max_torque: float = number(
-        units.TORQUE, "largest |torque|; flagged beyond", check=POSITIVE_OR_INFINITE, default=math.inf
-    )
-    max_velocity: float = number(
-        units.VELOCITY, "largest |velocity|; flagged beyond", check=POSITIVE_OR_INFINITE, default=math.inf
-    )
-
-    not_yet = ("gear_ratio",)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-
-@dataclass(frozen=True)
 class Antagonistic:
     """Two motors, each pulling the link through a nonlinear spring of its own."""
 
@@ -236,7 +213,7 @@ class Joint:
 
     name: str = text("name of the joint, used in reports and CSV headers", identifier=True)
     type: str = choice(("revolute", "prismatic"), "kind of joint")
-    dh: DenavitHartenberg = value(Record(DenavitHartenberg), "standard Denavit-Hartenberg row")
+    dh: DenavitHartenberg = value(Record(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
     link: Link = value(Record(Link), "the link the joint moves")
     damping: float = number(
         units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
@@ -288,8 +265,6 @@ class Robot:
     tool: Pose = value(Record(Pose), "end effector in the last DH frame (frame N)", default=Pose())
     joints: tuple[Joint, ...] = value(Items(Record(Joint), unique="name"), "joints from the base to the tip")
     sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
-
-    not_yet = ("convention",)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -26,6 +26,13 @@ from vsacli.errors import StorageError
 @click.option(
     "--rate", metavar="HZ", type=float, help="Samples per second, a whole fraction of the stored rate."
 )
+@click.option(
+    "--side",
+    type=click.Choice(["joint", "motor"]),
+    default="joint",
+    show_default=True,
+    help="Of the gear, on which motion and torque of the motors are given.",
+)
 @click.option("--allow-nan", is_flag=True, help="Leave cells without a value empty.")
 @overwrite_option
 @talk_options
@@ -34,6 +41,7 @@ def export(
     output: str | None,
     variables: tuple[str, ...] | None,
     rate: float | None,
+    side: str,
     allow_nan: bool,
     overwrite: bool,
     talk: Talk,
@@ -42,11 +50,14 @@ def export(
 
     Refuses samples that have no value (infeasible or singular steps) with exit code 3 and writes nothing,
     unless --allow-nan.
+
+    With --side motor, motion and torque of the motors are those of their shafts, in rad and N m at any joint;
+    every motor needs a gear_ratio in the robot file. What is not of a motor stays as it is.
     """
     from vsacli.export import DEFAULT_VARIABLES, UndefinedSamplesError, export_csv, export_csv_file
     from vsacli.store.reader import open_result
 
-    options: dict[str, Any] = {"rate": rate, "allow_nan": allow_nan}
+    options: dict[str, Any] = {"rate": rate, "allow_nan": allow_nan, "side": side}
     try:
         with open_result(result) as stored:
             talk.detail(described(stored))

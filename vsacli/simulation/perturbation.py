@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from vsacli.errors import InputError
-from vsacli.robot import Antagonistic, Elastic, Inertia, Joint, Link, Motor, Rigid, Robot
+from vsacli.motor import Motor
+from vsacli.robot import Antagonistic, Elastic, Inertia, Joint, Link, Rigid, Robot
 from vsacli.spec.fields import Number, declared
 from vsacli.springs import SpringLaw
 

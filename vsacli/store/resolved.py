@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from vsacli.motor import Motor
 from vsacli.robot import Robot
 from vsacli.spec.fields import (
     Choice,
@@ -76,7 +77,7 @@ def _of_kind(kind: Kind, content: Any, field: Field) -> Iterable[ResolvedField]:
         case TableFile():
             return [_leaf((), None, field, content.source.path)]
         case Record():
-            return _of_record(content)
+            return _of_record(content.at_joint if isinstance(content, Motor) else content)
         case OneOf():
             return _of_variant(kind, content, field)
         case Pair(item):

@@ -1,0 +1,48 @@
+"""`vsacli examples`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import click
+
+from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.options import example, overwrite_option
+
+if TYPE_CHECKING:
+    from vsacli.examples import Example
+
+
+@click.command(
+    "examples",
+    short_help="List the robots and trajectories that come along, or copy them.",
+    epilog=example("vsacli examples puma_560 scara_4 --copy my-robots"),
+)
+@click.argument("names", metavar="[ROBOT]...", nargs=-1)
+@click.option("--copy", "folder", metavar="FOLDER", help="Copy them there instead.")
+@overwrite_option
+@talk_options
+def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: Talk) -> None:
+    """List the robots that come along, all or those named, each with the trajectories made for it.
+
+    With --copy, they go into robots/ and trajectories/ of a folder together with the tables they need;
+    without names, every file that comes along does. Nothing is copied if one of the files exists there,
+    unless --overwrite.
+    """
+    from vsacli.examples import copy_examples
+    from vsacli.examples import examples as shipped
+
+    if folder is None:
+        click.echo("\n".join(line for each in shipped(names) for line in _lines(each)))
+        talk.note("get them with vsacli examples --copy FOLDER, or vsacli examples ROBOT... --copy FOLDER")
+        return
+    for path in copy_examples(names, folder, overwrite=overwrite):
+        talk.note(f"wrote {path}")
+
+
+def _lines(shown: Example) -> Iterator[str]:
+    letters = "".join("R" if joint.is_revolute else "P" for joint in shown.robot.joints)
+    yield f"{shown.name} ({letters}): {shown.robot.description}"
+    for motion in shown.motions:
+        yield f"    {motion.name}: {motion.description}"
