@@ -1,4 +1,4 @@
-"""The figures of one result, after Figs. 1-3 of Buondonno & De Luca (2016)."""
+"""The figures of one result, after Figs. 1-3 of Buondonno & De Luca (2016), and its energy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from vsacli.plots.layout import (
 )
 from vsacli.plots.style import house_style, line_style
 from vsacli.store.reader import StoredResult
-from vsacli.units import POSITION, TORQUE
+from vsacli.units import ENERGY, POSITION, TORQUE
 from vsacli.variables import MOTORS, existing
 
 PANEL_HEIGHT = 2.3
@@ -98,6 +98,21 @@ def _elastic_torque(result: StoredResult, failures: Failures) -> Figure:
     return grouped_figure(result, failures, "tau_e", [_elastic_label])
 
 
+def _energy(result: StoredResult, failures: Failures) -> Figure:
+    """Energy in the springs at the left, if there are any; beside it what each motor has worked."""
+    motors = int(
+        np.count_nonzero(np.any(existing(result.declared["motor_energy"], result.actuators), axis=0))
+    )
+    if not compliant_joints(result.actuators):
+        return grouped_figure(result, failures, "motor_energy", _WORK_LABELS)
+    height = PANEL_HEIGHT * len(panel_groups(result.joint_types)) + 1
+    figure = Figure(((1 + motors) * PANEL_WIDTH, height), layout="constrained")
+    grid = figure.add_gridspec(1, 2, width_ratios=(1, motors))
+    handles = _draw_groups(grid[0], result, failures, "elastic_energy", [_elastic_energy_label])
+    handles += _draw_groups(grid[1], result, failures, "motor_energy", _WORK_LABELS)
+    return complete(figure, result_title(result), handles)
+
+
 def grouped_figure(result: StoredResult, failures: Failures, name: str, labels: Sequence[Label]) -> Figure:
     """A figure of one variable that some joint has, with a column of panels for each of its curves."""
     height = PANEL_HEIGHT * len(panel_groups(result.joint_types)) + 1
@@ -138,6 +153,17 @@ def _elastic_label(joint_type: str) -> str:
     return rf"elastic {_force(joint_type)} $\tau_e$ [{TORQUE.unit(joint_type)}]"
 
 
+def _elastic_energy_label(_joint_type: str) -> str:
+    return f"elastic energy [{ENERGY}]"
+
+
+def _work_label(motor: int, _joint_type: str) -> str:
+    return f"work of motor {motor} [{ENERGY}]"
+
+
+_WORK_LABELS = [partial(_work_label, motor) for motor in MOTORS]
+
+
 def _force(joint_type: str) -> str:
     return "torque" if joint_type == "revolute" else "force"
 
@@ -146,4 +172,5 @@ _FIGURES = {
     "motion": (("q", "stiffness"), _motion),
     "motor-torque": (("tau_motor",), _motor_torque),
     "elastic-torque": (("tau_e",), _elastic_torque),
+    "energy": (("elastic_energy", "motor_energy"), _energy),
 }

@@ -42,6 +42,9 @@ class History:
     dtheta_actual: FloatArray
     tau_spring_actual: FloatArray
     tau_motor_actual: FloatArray
+    elastic_energy_actual: FloatArray
+    motor_power_actual: FloatArray
+    motor_energy_actual: FloatArray
     det_A_actual: FloatArray  # noqa: N815  (the published name)
     q_error: FloatArray
     dq_error: FloatArray
@@ -77,6 +80,8 @@ def _actual(loop: ClosedLoop, course: Course) -> dict[str, FloatArray]:
     springs = drivetrain.springs(phi)
     tau_e = plant.link_torque(phase.dq, ddq, springs.tau, torque)
     still = np.zeros_like(phase.q)
+    theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)
+    tau_motor = drivetrain.of_joints(torque)
     return {
         "q": phase.q,
         "dq": phase.dq,
@@ -86,12 +91,21 @@ def _actual(loop: ClosedLoop, course: Course) -> dict[str, FloatArray]:
         "tau_e": tau_e,
         "phi": drivetrain.merged(phi, still),
         "dphi": drivetrain.merged(dphi, still),
-        "theta": drivetrain.merged(phase.theta, phase.q),
-        "dtheta": drivetrain.merged(phase.dtheta, phase.dq),
+        "theta": theta,
+        "dtheta": dtheta,
         "tau_spring": drivetrain.merged(springs.tau, tau_e),
-        "tau_motor": drivetrain.of_joints(torque),
+        "tau_motor": tau_motor,
+        "elastic_energy": drivetrain.energy(phi),
+        "motor_power": tau_motor * dtheta,
+        "motor_energy": _work(theta, tau_motor, held=course.held),
         "det_A": _by_joint(drivetrain, drivetrain.decoupling_determinant(springs)),
     }
+
+
+def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
+    """Of motors up to each step, (samples, ...); the torque is held between steps, or linear."""
+    given = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
+    return np.cumsum(np.concatenate((0 * torque[:1], given * np.diff(theta, axis=0))), axis=0)
 
 
 def _by_joint(drivetrain: Drivetrain, of_pairs: FloatArray) -> FloatArray:

@@ -44,13 +44,17 @@ class Tolerances:
 
 
 class Course(NamedTuple):
-    """How a run went: times (samples,), states (samples, entries), torques asked for (samples, motors)."""
+    """How a run went: times (samples,), states (samples, entries), torques asked for (samples, motors).
+
+    `held` says whether the torques stay the same from step to step.
+    """
 
     time: FloatArray
     states: FloatArray
     demand: FloatArray
     ending: Ending | None
     evaluations: int
+    held: bool = False
 
 
 class Integrator:
@@ -125,4 +129,4 @@ def sampled(loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: 
         if ending is not None:
             break
     course = (np.concatenate(reached), np.concatenate(states), np.array(demands)[: sum(map(len, reached))])
-    return Course(*course, ending, integrator.evaluations)
+    return Course(*course, ending, integrator.evaluations, held=True)

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.arrays import FloatArray
+from vsacli.arrays import FloatArray, by_joint
+from vsacli.energy import EnergyMeter, Flow, JointEnergy
 from vsacli.feasibility import excess, has, limit_checks
 from vsacli.flags import LIMITS, Flag
 from vsacli.report import VERDICTS, Worst, finite
-from vsacli.robot import Joint
+from vsacli.robot import Joint, Robot
 from vsacli.simulation.history import History
 from vsacli.simulation.variables import SIMULATION_VARIABLES, actual
 
@@ -54,6 +55,7 @@ class JointTracking:
         flags: every bit that a step has.
         steps_over_limit: how many steps have a limit exceeded.
         worst: the worst excess of each limit, by its name.
+        energy: work of the motors, elastic energy, co-contraction.
     """
 
     name: str
@@ -64,6 +66,7 @@ class JointTracking:
     flags: Flag
     steps_over_limit: int
     worst: dict[str, Worst]
+    energy: JointEnergy
 
     def as_json(self) -> dict[str, Any]:
         """Plain values under the published keys."""
@@ -75,11 +78,33 @@ class JointTracking:
             "peak": {"tau_motor": list(self.peak_tau_motor)},
             "steps": {"over_limit": self.steps_over_limit},
             "worst": {name: worst.as_json() for name, worst in self.worst.items()},
+            "energy": self.energy.as_json(),
         }
 
 
-def joint_tracking(joint: Joint, index: int, history: History) -> JointTracking:
-    """What a history says about a joint."""
+def joint_trackings(robot: Robot, history: History) -> tuple[JointTracking, ...]:
+    """What a history says about each joint."""
+    energies = enumerate(_energies(robot, history))
+    return tuple(_tracking(robot.joints[index], index, history, energy) for index, energy in energies)
+
+
+def _energies(robot: Robot, history: History) -> list[JointEnergy]:
+    time, work, power, tau_spring, elastic_energy = (
+        _led(getattr(history, name))
+        for name in ("time", *map(actual, ("motor_energy", "motor_power", "tau_spring", "elastic_energy")))
+    )
+    meter = EnergyMeter()
+    meter.add(Flow(np.diff(time), np.diff(work), power, tau_spring, elastic_energy))
+    return meter.report(robot)
+
+
+def _led(values: FloatArray) -> FloatArray:
+    """(..., samples + 1) from (samples, ...), the first step twice: a run may end with it."""
+    rows = by_joint(values)
+    return np.concatenate((rows[..., :1], rows), axis=-1)
+
+
+def _tracking(joint: Joint, index: int, history: History, energy: JointEnergy) -> JointTracking:
     flags = history.flags[:, index]
     first, second = np.fmax.reduce(np.abs(history.tau_motor_actual[:, index]), axis=0).tolist()
     return JointTracking(
@@ -91,6 +116,7 @@ def joint_tracking(joint: Joint, index: int, history: History) -> JointTracking:
         flags=Flag(int(np.bitwise_or.reduce(flags))),
         steps_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
         worst=_worst(joint, index, history),
+        energy=energy,
     )
 
 

@@ -15,7 +15,7 @@ from vsacli.simulation.controllers import Feedforward, LinearizingFeedback
 from vsacli.simulation.history import History, history
 from vsacli.simulation.integration import Course, Integrator, Progress, Tolerances, continuous, sampled
 from vsacli.simulation.reference import Reference
-from vsacli.simulation.report import Deviation, SimulationReport, joint_tracking
+from vsacli.simulation.report import Deviation, SimulationReport, joint_trackings
 from vsacli.simulation.start import InitialError, start_state
 from vsacli.trajectory import Trajectory
 
@@ -90,7 +90,7 @@ def simulate(
         ending=None if course.ending is None else course.ending.described(robot.joint_names),
         evaluations=course.evaluations,
         warnings=(*robot.warnings, *trajectory.warnings),
-        joints=tuple(joint_tracking(joint, index, past) for index, joint in enumerate(robot.joints)),
+        joints=joint_trackings(robot, past),
         with_full_state=_with_full_state(robot, trajectory, setup),
     )
     return Simulation(past, report)

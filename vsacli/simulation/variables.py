@@ -10,7 +10,8 @@ from vsacli.variables import VARIABLES, Variable
 COMMANDED = ("q", "dq", "ddq", "stiffness", "dstiffness")
 ACTUAL = (
     *COMMANDED,
-    *("tau_e", "phi", "dphi", "theta", "dtheta", "tau_spring", "tau_motor", "det_A"),
+    *("tau_e", "phi", "dphi", "theta", "dtheta", "tau_spring", "tau_motor"),
+    *("elastic_energy", "motor_power", "motor_energy", "det_A"),
 )
 ERRORS = ("q", "dq", "stiffness", "dstiffness")
 
