@@ -1,0 +1,75 @@
+"""Measure vsacli beside its peers, all in one run: `python tests/benchmarks`.
+
+Needs the extra `bench` and gcc. `--write` puts what was found into docs/performance.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # the oracles and samples of the tests
+
+import actuation
+import commands
+import growth
+import kernel
+import page
+import stages
+from machine import description
+from subjects import ROOT
+
+PAGE = ROOT / "docs" / "performance.md"
+FIGURE = ROOT / "docs" / "images" / "performance-growth.png"
+PART = re.compile(r"(<!-- measured: (?P<name>\S+) -->\n).*?(<!-- end of measured part -->)", re.DOTALL)
+
+SAMPLES = 200_000
+PYTHON_SAMPLES = 5_000
+ACTUATION_SAMPLES = 20_000
+LONG_RUN = 2_000_000
+
+
+def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
+    """Name and text of each part of the page, as it is found."""
+    yield "machine", description() + "\n"
+    yield "kernel", page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats))
+    yield "stages", page.stage_table(stages.split(SAMPLES, repeats))
+    yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, repeats))
+    yield "startup", page.startup_table(commands.startup(3 * repeats))
+    memory = commands.peak_memory(LONG_RUN) / 1e6
+    yield (
+        "memory",
+        f"{LONG_RUN:,} samples with `--variables tau_motor,flags`: at most {memory:.0f} MB resident.",
+    )
+    found = growth.measure(repeats)
+    growth.draw(found, figure)
+    yield "growth", page.growth_sentence(found)
+
+
+def main() -> None:
+    """Run what the command line says."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=3, help="rounds, of which the medians count")
+    parser.add_argument("--write", action="store_true", help=f"write the results into {PAGE.name}")
+    options = parser.parse_args()
+
+    parts: dict[str, str] = {}
+    for name, text in measured(options.repeats, figure=FIGURE if options.write else Path("growth.png")):
+        sys.stdout.write(f"{name}\n\n{text}\n\n")
+        sys.stdout.flush()
+        parts[name] = text
+    if options.write:
+        rewrite(lambda name: parts[name])
+
+
+def rewrite(part: Callable[[str], str]) -> None:
+    """Put each part into its place on the page."""
+    text = PAGE.read_text(encoding="utf-8")
+    PAGE.write_text(PART.sub(lambda m: f"{m[1]}\n{part(m['name'])}\n\n{m[3]}", text), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

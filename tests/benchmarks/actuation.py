@@ -1,0 +1,91 @@
+"""What the actuation of a joint takes with each kind of springs, beside the recursion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from spring_samples import SPRINGS
+from subjects import motion, seven_joints
+from timing import medians
+
+from vsacli.actuation import Command, drive
+from vsacli.actuation.antagonistic import solve_deflections
+from vsacli.arrays import FloatArray
+from vsacli.newton_euler import link_torques
+from vsacli.robot import Antagonistic, Joint, Motor
+from vsacli.springs import SpringLaw
+
+JOINTS = 7
+SHARES = {"light": 0.1, "heavy": 0.99}
+"""Largest elastic torque as a share of what the stiffness allows."""
+
+STIFFNESS_LEVELS = np.linspace(1.2, 2.5, 50)
+"""Stiffness demanded, as a multiple of the least without load."""
+
+
+class Actuation(NamedTuple):
+    """Microseconds a joint and sample, and how many times the recursion's share of a joint that is."""
+
+    springs: str
+    load: str
+    seconds: float
+    ratio: float
+
+
+def pairs() -> dict[str, tuple[SpringLaw, SpringLaw]]:
+    """Springs of every law: two alike, and two whose constants differ."""
+    found = {}
+    for name, ((one, _), (other, _)) in SPRINGS.items():
+        found[f"{name}, alike"] = one, one
+        found[f"{name}, unlike"] = one, other
+    return found
+
+
+def compare(samples: int, repeats: int) -> list[Actuation]:
+    """Time the recursion and the actuation with each pair of springs, in turn."""
+    robot, moving = seven_joints(), motion(JOINTS, samples)
+    ways = {"recursion": lambda: link_torques(robot, *moving)}
+    for name, springs in pairs().items():
+        joint = _joint(robot.joints[0], springs)
+        for load, share in SHARES.items():
+            command = _command(joint.actuator, samples, share)
+            ways[f"{name}; {load}"] = lambda joint=joint, command=command: drive(joint, command)
+    seconds: Mapping[str, float] = medians(ways, repeats)
+    of_joint = seconds["recursion"] / JOINTS
+    return [
+        Actuation(*name.split("; "), taken / samples, taken / of_joint)
+        for name, taken in seconds.items()
+        if name != "recursion"
+    ]
+
+
+def _joint(joint: Joint, springs: tuple[SpringLaw, SpringLaw]) -> Joint:
+    motors = (Motor(inertia=0.01), Motor(inertia=0.01))
+    return replace(joint, actuator=Antagonistic(motor=motors, spring=springs))
+
+
+def _command(actuator: Antagonistic, samples: int, share: float) -> Command:
+    """Random demands that can be met: stiffness, and loads up to a share of the largest it can carry."""
+    random = np.random.default_rng(0)
+    still = np.zeros(samples)
+    least = solve_deflections(actuator, np.zeros(1), np.ones(1)).lower[0]
+    levels = max(least, 10.0) * STIFFNESS_LEVELS
+    level = random.integers(len(levels), size=samples)
+    tau_e = share * _largest_load(actuator, levels)[level] * random.uniform(-1, 1, samples)
+    return Command(still, still, still, levels[level], still, still, tau_e, still, still)
+
+
+def _largest_load(actuator: Antagonistic, stiffness: FloatArray) -> FloatArray:
+    """About the largest |tau_e| that the stiffness allows in either direction, by bisection."""
+    low, high = np.zeros_like(stiffness), 10 * stiffness
+    for _ in range(30):
+        middle = (low + high) / 2
+        fits = np.ones(stiffness.shape, dtype=bool)
+        for sign in (-1, 1):
+            solution = solve_deflections(actuator, sign * middle, stiffness)
+            fits &= (solution.lower <= stiffness) & (stiffness <= solution.upper)
+        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+    return low

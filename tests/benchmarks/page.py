@@ -1,0 +1,74 @@
+"""The figures as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from actuation import JOINTS, Actuation
+from growth import Growth
+from kernel import CASADI, Kernel
+from stages import Stages
+from timing import Seconds
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def micro(seconds: float) -> str:
+    """Microseconds, two digits."""
+    return f"{seconds * 1e6:.2g}"
+
+
+def kernel_table(kernels: Iterable[Kernel]) -> str:
+    """The ways to the link torques, against casadi."""
+    kernels = list(kernels)
+    peer = next(kernel.seconds for kernel in kernels if kernel.name == CASADI)
+    header = ("tau_e, dtau_e, ddtau_e of the 7R arm", "µs a sample", "ratio", "largest difference")
+    return table(
+        header, ([k.name, micro(k.seconds), f"{k.seconds / peer:.2g}", _differences(k)] for k in kernels)
+    )
+
+
+def _differences(kernel: Kernel) -> str:
+    return "-" if kernel.differences is None else ", ".join(f"{error:.0e}" for error in kernel.differences)
+
+
+def stage_table(stages: Stages) -> str:
+    """The stages of a run, against computing."""
+    rows = [
+        *stages._asdict().items(),
+        ("recursion, actuation and bookkeeping", stages.computing),
+    ]
+    header = ("stage, 7R arm", "µs a sample", "of computing")
+    return table(header, ([name, micro(took), f"{took / stages.computing:.0%}"] for name, took in rows))
+
+
+def actuation_table(found: Iterable[Actuation]) -> str:
+    """The springs, against the recursion."""
+    header = ("springs", "load", "µs a joint and sample", f"of the recursion ({JOINTS} joints)")
+    return table(header, ([a.springs, a.load, micro(a.seconds), f"{a.ratio:.2g}"] for a in found))
+
+
+def startup_table(taken: Seconds) -> str:
+    """The commands, against the imports they need."""
+    of = {"vsacli --help": "import click", "the paper's job": "import numpy, h5py, yaml, click"}
+    rows = (
+        [
+            f"`{name}`" if name not in ("the paper's job",) else name,
+            f"{seconds * 1e3:.0f}",
+            f"{seconds / taken[of[name]]:.2f} of `{of[name]}`" if name in of else "",
+        ]
+        for name, seconds in taken.items()
+    )
+    return table(("command", "ms", "ratio"), rows)
+
+
+def growth_sentence(growth: Growth) -> str:
+    """How nearly the cost is linear in the joints."""
+    return (
+        f"From 10 to {max(growth.by_joints)} joints the cost of a joint and sample varies by "
+        f"{growth.spread:.0%} at one fixed block size."
+    )
