@@ -45,7 +45,7 @@ def measure(repeats: int) -> Growth:
 
 
 def _cpu_seconds(robot: Robot, samples: int, rounds: int) -> Callable[[], float]:
-    """What takes the processor's time of one evaluation, on average over rounds: other programs do not count."""
+    """One evaluation in seconds of processor time, which other programs do not count in; mean of rounds."""
     moving = motion(len(robot.joints), samples)
 
     def way() -> float:
