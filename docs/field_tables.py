@@ -121,6 +121,8 @@ def _fields(cls: type, prefix: str) -> Iterator[Row | Choices]:
                 yield Choices(key, kind)
             case Pair(OneOf() as kind):
                 yield Choices(key, kind)
+            case Items(OneOf() as kind):
+                yield Choices(f"{key}[]", kind)
 
 
 def _value(field: Field) -> str:
@@ -159,8 +161,10 @@ def _nested(kind: Kind) -> str:
             return f"mapping; `type`: {' or '.join(f'`{name}`' for name in variants)}"
         case Pair(item):
             return f"{_kind(item)}; or a list of two"
-        case Items():
+        case Items(Record() | OneOf()):
             return "list"
+        case Items(item):
+            return f"list, each {_kind(item)}"
     raise TypeError(f"no words for the kind {kind}")
 
 

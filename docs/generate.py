@@ -10,20 +10,26 @@ import re
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import textwrap
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
+import click
 from click.testing import CliRunner
 from field_tables import record_sections, table, variant_sections
+from noise_study import draw, table_rows
 
+from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.cli.exit_codes import Exit
 from vsacli.cli.main import vsacli
 from vsacli.columns import JOINT_SIGNALS
 from vsacli.control.poles import PolesFile
+from vsacli.examples import Example, examples, opening_comment
 from vsacli.flags import Flag
-from vsacli.robot import Robot
+from vsacli.robot_file import RobotFile
 from vsacli.simulation.variables import SIMULATION_VARIABLES
 from vsacli.springs import LAWS
 from vsacli.trajectory_file import TrajectoryFile
@@ -38,7 +44,10 @@ IMAGES = ROOT / "docs" / "images"
 SHOWN = (
     "rest_to_rest-motion.png",
     "rest_to_rest-motor-torque.png",
+    "rest_to_rest-energy.png",
     "rest_to_rest_soft-rest_to_rest_stiff-compare.png",
+    "rest_to_rest-rest_to_rest_soft-rest_to_rest_stiff-compare.png",
+    "vsa_3r_pick_and_place-motion.png",
 )
 """Figures on the pages."""
 
@@ -48,16 +57,24 @@ PART = re.compile(rf"(<!-- generated: (?P<name>\S+) -->\n).*?({END})", re.DOTALL
 
 
 def commands() -> str:
-    """The help of `vsacli` and of each command."""
-    names = ["", *vsacli.commands]
+    """The help of `vsacli`, of each command, and of the commands in a group."""
     return "\n".join(
-        f"## `{f'vsacli {name}'.strip()}`\n\n```text\n{command_help(name)}```\n" for name in names
+        f"## `{' '.join(['vsacli', *words])}`\n\n```text\n{command_help(words)}```\n"
+        for words in ([], *command_words(vsacli))
     )
 
 
-def command_help(name: str) -> str:
-    """What `vsacli NAME --help` prints."""
-    arguments = [name, "--help"] if name else ["--help"]
+def command_words(group: click.Group) -> Iterator[list[str]]:
+    """What to type for each command of a group, without the name of the group."""
+    for name, command in group.commands.items():
+        yield [name]
+        if isinstance(command, click.Group):
+            yield from ([name, *words] for words in command_words(command))
+
+
+def command_help(words: Sequence[str]) -> str:
+    """What `vsacli WORDS --help` prints."""
+    arguments = [*words, "--help"]
     return CliRunner().invoke(vsacli, arguments, prog_name="vsacli", terminal_width=HELP_WIDTH).stdout
 
 
@@ -68,7 +85,7 @@ def exit_codes() -> str:
 
 def robot_fields() -> str:
     """Fields of a robot file but for its springs."""
-    return record_sections(Robot, elsewhere=[LAWS])
+    return record_sections(RobotFile, elsewhere=[LAWS])
 
 
 def spring_fields() -> str:
@@ -141,7 +158,72 @@ def flags() -> str:
     )
 
 
+def robots() -> str:
+    """The robots that come along: a table, and what each file says about its numbers."""
+    shown = examples()
+    rows = table(("robot", "joints", "actuators", "trajectories"), map(_robot_row, shown))
+    return "\n".join([rows, *(f"## {example.name}\n\n{_origin(example)}\n" for example in shown)])
+
+
+def _robot_row(example: Example) -> tuple[str, ...]:
+    joints = example.robot.joints
+    kinds = Counter(joint.actuator_type for joint in joints)
+    return (
+        f"[{example.name}](../robots/{example.path.name})",
+        "".join("R" if joint.is_revolute else "P" for joint in joints),
+        ", ".join(f"{count} {kind}" for kind, count in kinds.items()),
+        ", ".join(f"[{motion.name}](../trajectories/{motion.path.name})" for motion in example.motions),
+    )
+
+
+def _origin(example: Example) -> str:
+    """The comment of its file, without what all files say of their units."""
+    comment = re.sub(r" ?Numbers are SI;[^.]*\.", "", opening_comment(example.path))
+    return textwrap.fill(comment, 118, break_long_words=False, break_on_hyphens=False)
+
+
+def stiffness_cost() -> str:
+    """What the motors of the 3R arm do for the same motion at a low, a rising and a high stiffness."""
+    return table(
+        (
+            "stiffness, N m/rad",
+            "peak motor torque",
+            "co-contraction, rms",
+            "spent",
+            "taken back",
+            "work",
+            "in the springs",
+        ),
+        map(_cost, ("rest_to_rest_soft", "rest_to_rest", "rest_to_rest_stiff")),
+    )
+
+
+def _cost(name: str) -> tuple[str, ...]:
+    robot = load_robot(ROBOT)
+    result = inverse_dynamics(robot, load_trajectory(ROOT / "trajectories" / f"{name}.yaml", robot))
+    energies = [joint.energy for joint in result.report.joints]
+    spent, recovered = (sum(each) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True))
+    low, high = (result.elastic_energy[step].sum() for step in (0, -1))
+    base = result.report.joints[0]
+    return (
+        " to ".join(f"{value:.0f}" for value in dict.fromkeys(base.stiffness)),
+        f"{max(base.peak_tau_motor):.1f} N m",
+        f"{base.energy.co_contraction:.1f} N m",
+        f"{spent:.1f} J",
+        f"{recovered:.1f} J",
+        f"{spent - recovered:.1f} J",
+        " to ".join(f"{energy:.1f}" for energy in (low, high)) + " J",
+    )
+
+
+def noise_study() -> str:
+    """Error of the fourth derivative over rate and noise of a record."""
+    header = ("samples", "noise", "knots", "doubtful at each end", "error of d4q, `lsq`", "`interpolate`")
+    return table(header, table_rows())
+
+
 PARTS: dict[str, Callable[[], str]] = {
+    "noise-study": noise_study,
     "commands": commands,
     "exit-codes": exit_codes,
     "robot-fields": robot_fields,
@@ -149,7 +231,9 @@ PARTS: dict[str, Callable[[], str]] = {
     "trajectory-fields": trajectory_fields,
     "csv-columns": csv_columns,
     "pole-fields": pole_fields,
+    "stiffness-cost": stiffness_cost,
     "simulation-variables": simulation_variables,
+    "robots": robots,
     "variables": variables,
     "flags": flags,
 }
@@ -169,12 +253,15 @@ def stale(pages: Iterable[Path] = PAGES) -> list[Path]:
 def draw_images() -> None:
     """Draw the pictures of the pages with the tool itself."""
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
-        for name in ("rest_to_rest", "rest_to_rest_soft", "rest_to_rest_stiff"):
+        for name in ("rest_to_rest", "rest_to_rest_soft", "rest_to_rest_stiff", "vsa_3r_pick_and_place"):
             _run("invdyn", ROBOT, ROOT / "trajectories" / f"{name}.yaml", "-o", f"{name}.h5")
         _run("plot", "rest_to_rest.h5")
+        _run("plot", "vsa_3r_pick_and_place.h5")
         _run("plot", "rest_to_rest_soft.h5", "rest_to_rest_stiff.h5")
+        _run("plot", "rest_to_rest.h5", "rest_to_rest_soft.h5", "rest_to_rest_stiff.h5")
         for name in SHOWN:
             shutil.copy(name, IMAGES)
+    draw(IMAGES / "recorded-noise.png")
 
 
 def _run(*arguments: Any) -> None:

@@ -12,7 +12,7 @@ from oracles.scalar_vsa import Actuation, Curve, Side, actuation
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.arrays import FloatArray
-from vsacli.pipeline import Result
+from vsacli.result import Result
 from vsacli.robot import Antagonistic, Joint, Motor, Robot
 from vsacli.springs.cubic import Cubic
 from vsacli.trajectory import Trajectory

@@ -21,7 +21,7 @@ from vsacli.steps import compute_block
 from vsacli.variables import VARIABLES, Block
 
 NAN = np.nan
-OF_MOTORS = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor")
+OF_MOTORS = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "motor_power")
 OF_STIFFNESS = ("stiffness", "dstiffness", "ddstiffness")
 OF_CORRIDOR = ("det_A", "stiffness_lower", "stiffness_upper")
 

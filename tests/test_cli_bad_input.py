@@ -27,7 +27,6 @@ ROBOT_EDITS = {
     "Python tag": (("name: vsa-3r", "name: !!python/name:os.system vsa"), ["5: !!python/name:os.system"]),
     "NaN": (("mass: 9.0478", "mass: .nan"), ["13: only finite numbers"]),
     "word": (("mass: 9.0478", "mass: heavy"), ["13: mass: expected a number in kg, found 'heavy'"]),
-    "not yet": (("gravity:", "convention: modified\ngravity:"), ["7: 'convention' is not supported yet"]),
     "other format": (("robot/1", "robot/2"), ["4: format: expected 'vsacli-robot/1'"]),
     "two problems": (
         ("damping: 1e-5                 # N m s/rad, b", "damping: -1e-5\n    dampping: 0"),

@@ -10,7 +10,7 @@ import pytest
 from cli_samples import REST_TO_REST, ROBOT, SEVEN_JOINTS, SEVEN_JOINTS_MOTION, contents, installed
 
 from vsacli import pipeline, steps
-from vsacli.newton_euler import link_torques
+from vsacli.newton_euler import LinkTorques
 
 GRAVITY = 9.81
 SPRING, HARDENING = 400.0, 2000.0
@@ -177,7 +177,7 @@ def test_no_variables_at_all_is_a_usage_error(vsacli, tmp_path, motion):
 
 def test_plot_also_draws_the_figures(vsacli, tmp_path, motion):
     done = vsacli("invdyn", ROBOT, motion, "-o", "r.h5", "--plot", "figures")
-    names = [f"figures/r-{name}.png" for name in ("motion", "motor-torque", "elastic-torque")]
+    names = [f"figures/r-{name}.png" for name in ("motion", "motor-torque", "elastic-torque", "energy")]
     assert done.err.splitlines() == ["wrote r.h5", *(f"wrote {name}" for name in names)]
     assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in names)
 
@@ -188,15 +188,17 @@ def test_quiet_and_verbose_change_stderr_alone(vsacli, motion):
     )
     assert plain.out == quiet.out == verbose.out
     assert quiet.err == ""
-    assert verbose.err == "vsa-3r: 3 joints; rest-to-rest: 401 steps over 4 s\n" + plain.err
+    notes = "vsa-3r: 3 joints; rest-to-rest: 401 steps over 4 s\nNumPy computes: 401 samples are few\n"
+    assert verbose.err == notes + plain.err
 
 
 def test_derivative_wrong_by_one_percent_fails_the_self_check(vsacli, tmp_path, motion, monkeypatch):
-    def broken(*arguments):
-        tau_e, dtau_e, ddtau_e = link_torques(*arguments)
-        return tau_e, dtau_e, 1.01 * ddtau_e
+    class Broken(LinkTorques):
+        def __call__(self, rows):
+            *others, ddtau_e = super().__call__(rows)
+            return [*others, 1.01 * ddtau_e]
 
-    monkeypatch.setattr(steps, "link_torques", broken)
+    monkeypatch.setattr(steps, "LinkTorques", Broken)
     done = vsacli("invdyn", ROBOT, motion)
     assert done.code == 1
     assert "SELF CHECK FAILED" in done.out.splitlines()[0]

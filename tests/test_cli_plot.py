@@ -8,7 +8,7 @@ import shutil
 import pytest
 from cli_samples import ROBOT, contents, installed
 
-NAMES = ("motion", "motor-torque", "elastic-torque")
+NAMES = ("motion", "motor-torque", "elastic-torque", "energy")
 
 
 def test_installed_command_draws_a_result(tmp_path, feasible_result):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 
 import h5py
 import numpy as np
 import pytest
 import xarray
-from cli_samples import ROBOT, contents, edited
+from cli_samples import REPOSITORY, ROBOT, contents, edited
 
 from vsacli.cli.exit_codes import Exit
 from vsacli.errors import InputError
@@ -126,6 +127,35 @@ def test_what_cannot_be_simulated_is_refused(vsacli, quick, tmp_path, arguments,
     assert message in done.err
     assert "Traceback" not in done.err
     assert contents(tmp_path) == before
+
+
+def test_a_rigid_joint_among_others_is_refused_by_name(vsacli, tmp_path):
+    done = vsacli(
+        "simulate", REPOSITORY / "robots/mixed_3r.yaml", REPOSITORY / "trajectories/mixed_3r.yaml", *FEEDBACK
+    )
+    assert done.code == Exit.USAGE
+    assert "feedback linearization needs springs at all joints or at none: base is rigid" in done.err
+    assert contents(tmp_path) == {}
+
+
+@pytest.mark.parametrize(
+    ("wrench", "message"),
+    [
+        ("{frame: base, type: constant, value: [1, 2, 3, 4, 5]}", "expected 6 numbers, found 5"),
+        (
+            "{frame: base, type: polynomial, degree: 1, start: [0, 0, 0, 0, 0, 0], end: [1, 0, 0, 0, 0, 0]}",
+            "the wrench must be twice differentiable",
+        ),
+    ],
+    ids=["too short", "not smooth"],
+)
+def test_a_wrench_that_cannot_act_is_refused(vsacli, quick, tmp_path, wrench, message):
+    quick.write_text(f"{quick.read_text()}\nwrench: {wrench}\n")
+    done = vsacli("simulate", ROBOT, quick)
+    assert done.code == Exit.USAGE
+    assert re.match(r"\S*quick.yaml:\d+: ", done.err)
+    assert message in done.err
+    assert not list(tmp_path.glob("*.h5"))
 
 
 def test_files_that_exist_are_kept(vsacli, quick, tmp_path):

@@ -21,7 +21,8 @@ from vsacli.arrays import FloatArray
 from vsacli.drivetrain import Drivetrain
 from vsacli.energy import integrals, positive_part
 from vsacli.flags import Flag
-from vsacli.pipeline import Result, Run
+from vsacli.pipeline import Run
+from vsacli.result import Result
 from vsacli.robot import Robot
 from vsacli.trajectory import Trajectory
 

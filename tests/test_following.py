@@ -18,8 +18,9 @@ from vsacli.feasibility import TOUCHING, has
 from vsacli.flags import Flag
 from vsacli.following import follow
 from vsacli.following.task import REASONS, SINGULAR, STALLED, UNREACHABLE, Task
-from vsacli.pipeline import Result, Run
+from vsacli.pipeline import Run
 from vsacli.report_text import render
+from vsacli.result import Result
 from vsacli.robot import Elastic, Motor, Robot
 from vsacli.springs.cubic import Cubic
 from vsacli.springs.exponential import Exponential
@@ -73,7 +74,7 @@ def recorded(samples: int, noise: float = 0.0) -> Trajectory:
     time = np.linspace(0, 2, samples)
     smooth = motion(end=(1275.0, 1275.0)).at(time)
     rough = noise * np.random.default_rng(5).standard_normal(smooth.q.shape)
-    return Trajectory.from_samples(time, smooth.q + rough, smooth.stiffness)
+    return Trajectory.from_samples(time, smooth.q + rough, smooth.stiffness, fit="interpolate")
 
 
 def followed(robot: Robot, trajectory: Trajectory, tolerance: float = 1e-12) -> Result:
@@ -106,6 +107,9 @@ class Dip:
 
     def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
         return self.at(time)
+
+    def summary(self) -> None:
+        return None
 
     def stretched(self, factor: float) -> Dip:
         raise AssertionError(f"nobody stretches this by {factor}")
@@ -174,7 +178,7 @@ def test_result_does_not_depend_on_the_blocks():
         Run(ARM, trajectory, following=following, block_samples=samples) for samples in (201, 7)
     )
     (whole,), pieces = list(at_once), list(by_seven)
-    assert at_once.report() == by_seven.report()
+    assert at_once.report().as_json() == by_seven.report().as_json()
     for name in MOTOR_VARIABLES:
         joined = np.concatenate([getattr(piece, name) for piece in pieces])
         np.testing.assert_array_equal(joined, getattr(whole, name))
@@ -203,10 +207,10 @@ def test_long_recording_drifts_a_little(monkeypatch):
     monkeypatch.setattr("vsacli.following.integration.MOST_PIECES", 20)
     smooth, rough = (followed(ARM, recorded(101, noise)) for noise in (0.0, 1e-5))
     # A tolerance of 1e-6 of 0.1 rad a step; and steps of 0.1 s, in which a smooth motion changes little.
-    assert TINY < max(drifts(smooth)) < 1e-7
+    assert TINY < max(drifts(smooth)) < 1e-9
     assert smooth.report.verdict == "ok"
-    # Kinks of the spline inside a step are seen by some of the 12 stages only.
-    assert max(drifts(rough)) > 1e-7
+    # What the spline does with the noise inside a step is seen by some of the 12 stages only.
+    assert max(drifts(rough)) > 1e-9
 
 
 def test_touching_the_singular_set_ends_the_way(touching: Result):

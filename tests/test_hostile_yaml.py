@@ -4,7 +4,8 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hostile import YAML, damaged, fuzz
+from hypothesis import given
 from hypothesis import strategies as st
 
 from vsacli.errors import InputError
@@ -151,23 +152,6 @@ def test_many_wrong_keys_of_great_length_are_cut_short():
     assert len(str(caught.value)) < 10_000
 
 
-FRAGMENTS = (
-    st.sampled_from("{}[]'#~\n\t\0\u2028\ufeff")
-    | st.sampled_from(["&a ", "*a", "<<: ", "- ", "? ", ": ", "!!int ", "---\n", "%Y\n", "|\n"])
-    | st.sampled_from(["on", "1e999", "1e308", "-1", "90 deg", "1/0", ""])
-)
-
-
-@st.composite
-def damaged(draw, text):
-    """The text with a few pieces of it replaced by fragments of syntax or by noise."""
-    for _ in range(draw(st.integers(1, 4))):
-        start = draw(st.integers(0, len(text)))
-        length = draw(st.integers(0, 12))
-        text = text[:start] + draw(FRAGMENTS | st.text(max_size=8)) + text[start + length :]
-    return text
-
-
 def problems_of(load, name):
     try:
         load(name)
@@ -176,18 +160,15 @@ def problems_of(load, name):
     return ()
 
 
-fuzz = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
-@fuzz
-@given(st.binary(max_size=300) | damaged(EXAMPLE).map(str.encode))
+@fuzz(150)
+@given(st.binary(max_size=300) | damaged(EXAMPLE, YAML).map(str.encode))
 def test_any_robot_is_read_or_refused(content):
     Path("fuzz.yaml").write_bytes(content)
     assert all(problem.file == "fuzz.yaml" for problem in problems_of(load_robot, "fuzz.yaml"))
 
 
-@fuzz
-@given(damaged(TRAJECTORY).map(str.encode))
+@fuzz(150)
+@given(damaged(TRAJECTORY, YAML).map(str.encode))
 def test_any_trajectory_is_read_or_refused(content):
     robot = load_robot(ROOT / "robots" / "rp_2.yaml")
     Path("fuzz.yaml").write_bytes(content)

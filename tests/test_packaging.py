@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import re
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
+from cli_samples import contents
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -33,7 +36,7 @@ def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> No
     examples = {
         f"vsacli/{name}"
         for folder in ("robots", "trajectories")
-        for pattern in ("*.yaml", "*.csv")
+        for pattern in ("*.yaml", "*.csv", "*.urdf")
         for name in files_below(REPOSITORY / folder, pattern)
     }
     assert {"vsacli/robots/vsa_3r.yaml", "vsacli/trajectories/rest_to_rest.yaml"} <= examples
@@ -44,6 +47,24 @@ def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> No
 def test_the_examples_in_the_wheel_are_those_of_the_repository(wheel: zipfile.Path) -> None:
     packed = (wheel / "vsacli" / "robots" / "vsa_3r.yaml").read_text(encoding="utf-8")
     assert packed == (REPOSITORY / "robots" / "vsa_3r.yaml").read_text(encoding="utf-8")
+
+
+def test_what_is_installed_lists_and_copies_its_examples(wheel: zipfile.Path, tmp_path: Path) -> None:
+    wheel.root.extractall(tmp_path / "installed")
+    command = [sys.executable, "-m", "vsacli", "examples"]
+    options: dict[str, Any] = {
+        "cwd": tmp_path,
+        "env": {**os.environ, "PYTHONPATH": str(tmp_path / "installed")},
+        "capture_output": True,
+        "text": True,
+        "check": True,
+    }
+    listed = subprocess.run(command, **options).stdout
+    names = re.findall(r"^(\w+) \(", listed, re.MULTILINE)
+    assert names == sorted(path.stem for path in (REPOSITORY / "robots").glob("*.yaml"))
+    subprocess.run([*command, "--copy", "mine"], **options)
+    for folder in ("robots", "trajectories"):
+        assert contents(tmp_path / "mine" / folder) == contents(REPOSITORY / folder)
 
 
 def test_the_readme_is_the_description(wheel: zipfile.Path) -> None:

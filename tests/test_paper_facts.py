@@ -15,7 +15,7 @@ from robots import vsa_3r
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuation import drive
 from vsacli.arrays import FloatArray
-from vsacli.pipeline import Result
+from vsacli.result import Result
 from vsacli.springs import make_pair
 from vsacli.steps import compute_block
 

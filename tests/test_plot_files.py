@@ -64,7 +64,7 @@ def test_a_stored_result_is_drawn(tmp_path: Path) -> None:
     with open_result(write_result(tmp_path / "run.h5", random_block(5000, 2))) as result:
         figures = plot_result(result)
         comparison = compare_results([result, result])
-    assert list(figures) == ["motion", "motor-torque", "elastic-torque"]
+    assert list(figures) == ["motion", "motor-torque", "elastic-torque", "energy"]
     assert comparison.get_suptitle() == "two, motor torques"
 
 

@@ -251,7 +251,7 @@ def test_figures_without_their_variables_are_left_out_with_a_reason() -> None:
     result = without(rest_to_rest(), "q", "stiffness", "tau_e")
     assert list(plot_result(result)) == ["motor-torque"]
     reasons = omitted_figures(result.variables)
-    assert list(reasons) == ["motion", "elastic-torque"]
+    assert list(reasons) == ["motion", "elastic-torque", "energy"]
     expected = "figure motion needs q and stiffness, which this result was written without (--variables)"
     assert reasons["motion"] == expected
 

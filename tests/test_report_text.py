@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 
 import pytest
 
+from vsacli.energy import JointEnergy
 from vsacli.report import COUNTED, JointReport, Report, Worst
 from vsacli.report_text import render, sentences
 from vsacli.self_check import SelfCheck
@@ -30,6 +30,7 @@ QUIET = JointReport(
     start_theta=(0.0727618, -0.0551276),
     torque_step=(0.35, 0.42),
     other_preload=False,
+    energy=JointEnergy(9.66, 20.4, 11.2, 61.2, 2.84),
 )
 
 
@@ -43,14 +44,13 @@ def report(*joints: JointReport, **changes: object) -> Report:
         self_check=SelfCheck(spring_residual=4e-15, ladder=4.2e-11),
         joints=joints or (QUIET,),
     )
-    return replace(whole, **changes)
+    return whole._replace(**changes)
 
 
 def troubled(worst: Worst, steps: int = 412, first: float = 3.588, **changes: object) -> JointReport:
     """The elbow with one kind of trouble."""
     counted = worst.kind if worst.kind in COUNTED else "over_limit"
-    return replace(
-        QUIET,
+    return QUIET._replace(
         steps={**QUIET.steps, counted: steps},
         first_time={worst.kind: first, counted: first},
         worst={worst.kind: worst},
@@ -73,8 +73,7 @@ def line(text: str, start: str) -> str:
 
 
 def test_whole_report_of_a_run_without_trouble():
-    slide = replace(
-        QUIET,
+    slide = QUIET._replace(
         name="slide",
         type="prismatic",
         reachable=(8009.5, 20000.0),
@@ -82,6 +81,7 @@ def test_whole_report_of_a_run_without_trouble():
         start_theta=(0.0317, 0.00602),
         torque_step=(0.1, 0.2),
         margin=0.11,
+        energy=JointEnergy(12.04, 20.4, 11.2, 31.0, 5.0),
     )
     assert render(report(QUIET, slide)).splitlines() == [
         "vsa-3r, rest-to-rest: 4001 steps, 4 s                                       OK",
@@ -90,8 +90,33 @@ def test_whole_report_of_a_run_without_trouble():
         "slide       7.55 N      98.9 / 91.6 N        9000   8009.5-20000.0   11.00 %",
         "start motors at: elbow +0.07276 -0.05513 rad, slide +0.0317 +0.00602 m",
         "torque step at start: 0.42 N m (elbow)",
+        "energy: motors spend 40.8 J, take back 22.4 J; springs hold up to 12.0 J (slide)",
+        "co-contraction: up to 61.2 N m rms for each motor (elbow), its load takes 2.84 N m",
         "self-check passed (4e-11, bound 1e-08)",
     ]
+
+
+@pytest.mark.parametrize(
+    ("energy", "expected"),
+    [
+        (JointEnergy(9.66, NAN, NAN, NAN, NAN), []),
+        (
+            JointEnergy(0.0, 3.0, 1.0, NAN, NAN),
+            ["energy: motors spend 3 J, take back 1 J; springs hold up to 0 J (elbow)"],
+        ),
+    ],
+    ids=["a step without torques", "one motor"],
+)
+def test_energy_that_does_not_exist_is_not_mentioned(energy, expected):
+    lines = render(report(QUIET._replace(energy=energy))).splitlines()
+    assert [line for line in lines if line.startswith(("energy", "co-contraction"))] == expected
+
+
+def test_energies_are_summed_only_if_every_joint_has_them():
+    lines = render(report(QUIET._replace(energy=JointEnergy(NAN, NAN, NAN, NAN, NAN)), QUIET)).splitlines()
+    assert not [line for line in lines if line.startswith("energy")]
+    [line] = [line for line in lines if line.startswith("co-contraction")]
+    assert "61.2 N m" in line
 
 
 def test_headline_counts_the_joints_concerned():
@@ -158,7 +183,7 @@ def test_what_else_would_help_is_said():
         "; the opposite preload would reach it"
     )
     slack = too_soft(790, 803.1)
-    slack = replace(slack, steps={**slack.steps, "slack": 7})
+    slack = slack._replace(steps={**slack.steps, "slack": 7})
     assert sentence(slack).endswith("; a tendon goes slack at 7 steps")
 
 
@@ -185,8 +210,8 @@ def test_near_singular_step_is_a_warning():
         (Worst("velocity_limit", 2.0, -4.0, -3.0, "m/s"), "velocity is -4 m/s at t = 2.000 s, below its"),
         (Worst("stiffness_limit", 2.0, 9.0, 8.0, "N/m"), "stiffness is 9 N/m at t = 2.000 s, above its"),
         (Worst("deflection_limit", 2.0, 0.3, 0.2, "rad", 1), "deflection of spring 1 is 0.3 rad at"),
-        (Worst("motor_velocity_limit", 2.0, 9.0, 8.0, "rad/s", 2), "velocity of motor 2 is 9 rad/s at"),
-        (Worst("motor_torque_limit", 2.0, -95.0, -90.0, "N m", 2), "torque of motor 2 is -95 N m at"),
+        (Worst("motor_velocity_limit", 2.0, 9.0, 8.0, "rad/s", 2), "joint-side velocity of motor 2 is 9"),
+        (Worst("motor_torque_limit", 2.0, -95.0, -90.0, "N m", 2), "joint-side torque of motor 2 is -95 N m"),
     ],
     ids=lambda value: value.kind if isinstance(value, Worst) else "",
 )  # fmt: skip
@@ -206,17 +231,17 @@ def test_times_between_milliseconds_are_told_apart():
     [(0.2, "20.00 %"), (-0.0272, "-2.72 %"), (-6.8e-6, "-0.0007 %"), (0.0, "0.00 %"), (1.2e-10, "1e-08 %")],
 )
 def test_small_margins_do_not_round_to_zero(margin, shown):
-    row = line(render(report(replace(QUIET, margin=margin))), "elbow ")
+    row = line(render(report(QUIET._replace(margin=margin))), "elbow ")
     assert row.endswith(f"  {shown}")
 
 
 def test_peak_that_never_existed_is_a_dash():
-    row = line(render(report(replace(QUIET, peak_tau_motor=(NAN, NAN)))), "elbow ")
+    row = line(render(report(QUIET._replace(peak_tau_motor=(NAN, NAN)))), "elbow ")
     assert "- / - N m" in row
 
 
 def test_starts_of_many_joints_are_three_to_a_line():
-    joints = [replace(QUIET, name=f"joint_{number}") for number in range(1, 8)]
+    joints = [QUIET._replace(name=f"joint_{number}") for number in range(1, 8)]
     text = render(report(*joints))
     start = text[text.index("start motors at: ") : text.index("torque step")]
     lines = start.splitlines()
@@ -226,13 +251,13 @@ def test_starts_of_many_joints_are_three_to_a_line():
 
 
 def test_start_at_an_infeasible_step_is_undefined():
-    text = render(report(replace(QUIET, start_theta=(NAN, NAN), torque_step=(NAN, NAN))))
+    text = render(report(QUIET._replace(start_theta=(NAN, NAN), torque_step=(NAN, NAN))))
     assert line(text, "start motors") == "start motors at: elbow undefined (first step infeasible)"
     assert "torque step" not in text
 
 
 def test_start_at_a_singular_step_has_no_torque_step():
-    text = render(report(replace(QUIET, torque_step=(NAN, NAN))))
+    text = render(report(QUIET._replace(torque_step=(NAN, NAN))))
     assert line(text, "start motors") == "start motors at: elbow +0.07276 -0.05513 rad"
     assert "torque step" not in text
 

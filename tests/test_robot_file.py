@@ -134,12 +134,6 @@ def test_a_spring_shared_by_an_alias(load):
             "      mass: 2\n      mass: 3\n",
             "10: duplicate key 'mass'; it stands on line 9",
         ),
-        ("name: rig", "name: rig\nconvention: modified", "3: 'convention' is not supported yet"),
-        (
-            "motor: {inertia: 3.2",
-            "motor: {gear_ratio: 9, inertia: 3.2",
-            "15: 'gear_ratio' is not supported yet",
-        ),
         # words
         ("name: rig", "name: on", "2: name: expected a text, found 'on', a boolean in YAML"),
         ("name: rig", "name:", "2: name: expected a text, found nothing"),
@@ -259,6 +253,17 @@ def test_table_one_of_the_paper():
 
 
 @pytest.mark.parametrize("path", sorted(ROBOTS.glob("*.yaml")), ids=lambda path: path.stem)
-def test_the_shipped_robots_raise_no_doubts(path):
-    links = [joint.link for joint in load_robot(path).joints]
-    assert [list(link.doubts()) for link in links] == [[]] * len(links)
+def test_the_shipped_robots_raise_no_doubts_but_those_that_were_published(path):
+    published = {
+        "puma_560": (
+            "link of joint waist: its mass is zero",
+            "link of joint waist: its inertia breaks the triangle inequality: 0.35 > 0 + 0 by 0.35 kg m^2",
+            "link of joint elbow: its inertia breaks the triangle inequality: 0.086 > 0.0125 + 0.066 by "
+            "0.0075 kg m^2",
+        )
+    }
+    robot = load_robot(path)
+    doubts = [
+        f"link of joint {joint.name}: {doubt}" for joint in robot.joints for doubt in joint.link.doubts()
+    ]
+    assert tuple(doubts) == published.get(path.stem, ())

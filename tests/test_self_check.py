@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ from robots import random_robot, vsa_3r
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuation import Drive, drive
 from vsacli.arrays import FloatArray
-from vsacli.newton_euler import link_torques
+from vsacli.newton_euler import LinkTorques
 from vsacli.profiles import POSITION, STIFFNESS, Constant, RestToRest
 from vsacli.report import Report
 from vsacli.robot import Robot
@@ -139,7 +139,6 @@ def test_recorded_motion_passes(rate: int):
 # Wrong results
 
 
-Torques = tuple[FloatArray, FloatArray, FloatArray]
 Defect = Callable[[FloatArray], FloatArray]
 
 
@@ -148,12 +147,14 @@ def spoil_torque(
 ) -> None:
     """Let the recursion return a derivative of tau_e, (samples, joints), with a defect."""
 
-    def spoiled(*arguments: FloatArray) -> Torques:
-        torques = list(link_torques(*arguments))
-        torques[order] = spoil(torques[order])
-        return torques[0], torques[1], torques[2]
+    class Spoiled(LinkTorques):
+        def __call__(self, rows: Sequence[FloatArray]) -> list[FloatArray]:
+            torques, joints = super().__call__(rows), len(self.robot.joints)
+            part = slice(order * joints, (order + 1) * joints)
+            torques[part] = list(spoil(np.stack(torques[part], axis=-1)).T)
+            return torques
 
-    monkeypatch.setattr("vsacli.steps.link_torques", spoiled)
+    monkeypatch.setattr("vsacli.steps.LinkTorques", Spoiled)
 
 
 def spoil_drive(

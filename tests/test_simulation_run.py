@@ -52,7 +52,7 @@ def test_motors_saturate():
     worst = base.worst["motor_torque_limit"]
     assert abs(worst.bound) == limit
     assert abs(worst.value) == np.abs(past.tau_motor[:, 0]).max()
-    assert f"base: torque of motor {worst.motor} is {worst.value:.6g} N m at" in render(simulation.report)
+    assert f"base: joint-side torque of motor {worst.motor} is {worst.value:.6g}" in render(simulation.report)
 
 
 def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():

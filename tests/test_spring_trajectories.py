@@ -14,8 +14,8 @@ from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.arrays import FloatArray
 from vsacli.feasibility import has
 from vsacli.flags import Flag
-from vsacli.pipeline import Result
 from vsacli.profiles import POSITION, RestToRest
+from vsacli.result import Result
 from vsacli.robot import DenavitHartenberg, Inertia, Joint, Link, Robot
 from vsacli.springs import SpringLaw
 from vsacli.springs.cubic import Cubic

@@ -97,15 +97,6 @@ def test_deflection_keeps_its_digits_at_the_smallest_torques():
     np.testing.assert_allclose(SPRING.deflection(torque), torque / 400, rtol=4 * EPS)
 
 
-def test_hardening_peak_is_the_maximum_of_the_relative_hardening():
-    low, high = SPRING.hardening_peak
-    phi = np.linspace(0, 1, 100_001)
-    largest = phi[SPRING.hardening(phi).argmax()]
-    # The grid is 1e-5 rad wide; the slope of the torque there is 4K/3.
-    assert high == pytest.approx(SPRING.torque(largest), abs=1e-5 * 800)
-    assert low == -high
-
-
 @pytest.mark.parametrize(("k", "k_c"), [(0, 2000), (-400, 2000), (400, 0), (400, math.inf), (math.nan, 2000)])
 def test_constants_must_be_positive(k: float, k_c: float):
     with pytest.raises(InputError, match="must be positive"):

@@ -286,12 +286,13 @@ def test_the_robot_is_stored_as_arrays_of_its_declared_fields(path):
         assert joints["limits_stiffness"][...].tolist() == [[-np.inf, np.inf]] * 2
 
 
-def test_joints_with_different_fields_share_the_arrays(monkeypatch):
-    @dataclass(frozen=True)
-    class Hooke(Cubic):
-        reach: float = number(POSITION, "a field that the cubic law lacks")
+@dataclass(frozen=True)
+class Hooke(Cubic):
+    reach: float = number(POSITION, "a field that the cubic law lacks")
 
-    monkeypatch.setitem(LAWS, "hooke", Hooke)
+
+def test_joints_with_different_fields_share_the_arrays(monkeypatch):
+    monkeypatch.setitem(LAWS.homes, "hooke", f"{__name__}:Hooke")
     mixed = robot()
     odd = dataclasses.replace(
         mixed.joints[0].actuator, spring=(Hooke(k=1, k_c=1, reach=0.5), Cubic(k=2, k_c=2))

@@ -10,10 +10,12 @@ from robots import vsa_3r
 from vsacli import load_trajectory
 from vsacli.errors import InputError, StorageError
 from vsacli.pipeline import inverse_dynamics
-from vsacli.profiles import POSITION, Constant, RestToRest
+from vsacli.profiles import POSITION, WRENCH, Constant, RestToRest
+from vsacli.profiles.chain import stepwise
+from vsacli.profiles.via_points import ViaPoints
 from vsacli.suggest import StiffnessProfile, check_fixed_target, suggest, write_fixed
 from vsacli.suggest.restiffened import restiffened
-from vsacli.trajectory import Trajectory
+from vsacli.trajectory import Trajectory, WrenchProfile
 
 
 def still_and_soft():
@@ -30,12 +32,24 @@ def samples_of(trajectory, *given):
     return Trajectory.from_samples(motion.time + 3.0, motion.q, motion.stiffness, **columns)
 
 
+def through_points(trajectory):
+    """The motion through a point, with a wrench in steps: formulas that the file does not declare."""
+    span, nothing = trajectory.times.span, (0.0,) * 6
+    points = ((0.0, 0.0, 0.0), (0.1, 0.1, -0.1), (0.1, 0.3, 0.2))
+    position = ViaPoints(signal=POSITION, span=span, degree=9, shares=(0.0, 0.6, 1.0), points=points)
+    push = stepwise(WRENCH, span, 5, [nothing, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)], [(0.1, 0.4)])
+    return Trajectory(
+        trajectory.times, position, trajectory.stiffness, wrench=WrenchProfile(push, "base"), name="via"
+    )
+
+
 SOFT = rest_to_rest(0.5, rate=200)
 TASKS = {
     "polynomial": SOFT,
     "constant": still_and_soft(),
     "recorded": samples_of(SOFT),
     "recorded with derivatives": samples_of(SOFT, "dq", "ddq", "d3q", "d4q"),
+    "via points and steps": through_points(SOFT),
     "pushed": pushed(SOFT),
     "pushed and recorded": samples_of(pushed(SOFT, "end_effector")),
 }

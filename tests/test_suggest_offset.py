@@ -189,7 +189,7 @@ def test_limits_of_the_motion_are_none_of_the_stiffness(limits, expected):
 def test_motor_velocity_that_no_stiffness_brings_down():
     robot = changed(BASE, motor={"max_velocity": 1.0})
     assert reason(robot, rest_to_rest(1.0)).startswith(
-        "none keeps every limit of base; as it is, the velocity of motor 1 of base, 3.2972 rad/s at t = 0.504"
+        "none keeps every limit of base; as it is, the joint-side velocity of motor 1 of base, 3.2972 rad/s"
     )
 
 

@@ -191,5 +191,5 @@ def test_limits_of_the_motion_are_none_of_the_stiffness():
 def test_motor_limit_that_no_profile_keeps():
     robot = changed(BASE, motor={"max_velocity": 1.0})
     assert reason(robot, rest_to_rest(1.0)).startswith(
-        "none that was tried keeps every limit of base; with the nearest, the velocity of motor 1 of base"
+        "none that was tried keeps every limit of base; with the nearest, the joint-side velocity of motor 1"
     )

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from vsacli.errors import InputError
 from vsacli.spec.source import MAX_DOCUMENT_BYTES
-from vsacli.spec.table import MAX_HEADER, line_of, read_table
+from vsacli.spec.table import CHUNK, MAX_HEADER, read_table
 
 
 @pytest.fixture
@@ -40,6 +40,10 @@ def problems(path):
         "a,b\r\n1,2\r\n3,4e-1\r\n",
         "\ufeffa,b\n1,2\n3,.4\n",
         " a , b\n 1 ,\t2\n+3, 0.40\n\n\n",
+        "a;b\n1; 2\n3;.4\n",
+        "a\tb\n1\t 2\n3\t.4\n",
+        "a,b\r1,2\r3,.4\r",
+        "# grün\n\na,b # both\n#1\n1,2\n\n# 0,0\n3,.4 # the last, with a comma\n#",
     ],
 )
 def test_tables_that_are_accepted(csv, content):
@@ -71,11 +75,25 @@ def test_text_of_large_files_is_not_kept(csv, size, kept):
     assert source.text == (content if kept else None)
 
 
-def test_line_of_a_row(csv):
-    assert problems(csv("a\n0\n1\n2\nx\n"))[0][0] == line_of(3)
+@pytest.mark.parametrize("content", ["a\n0\n1\n2\n3\n", "#\n\na\n# 0\n0\n1 #\n\r\n2\n\n\n3"])
+def test_line_of_a_row(csv, content):
+    path = csv(content)
+    table = read_table(path)
+    numbers = {line.partition("#")[0].strip(): i for i, line in enumerate(content.splitlines(), 1)}
+    assert [table.line_of(row) for row in range(4)] == [numbers[str(row)] for row in range(4)]
+    path.unlink()
+    assert table.line_of(2) == numbers["2"]
+    assert read_table(csv(content)).line_of(4) == 0
 
 
-@pytest.mark.parametrize("content", ["", "\n", "\ufeff", "  \n1\n", b"\r\n"])
+def test_line_of_a_row_whose_file_has_gone(csv):
+    path = csv("a\n1\n")
+    table = read_table(path)
+    path.unlink()
+    assert table.line_of(0) == 0
+
+
+@pytest.mark.parametrize("content", ["", "\n", "\ufeff", "  \n1\n", b"\r\n", "# a,b\n\n"])
 def test_missing_header(csv, content):
     assert problems(csv(content)) == [
         (1, "expected a header line with the names of the columns, found nothing")
@@ -86,8 +104,8 @@ def test_missing_header(csv, content):
     ("content", "message"),
     [
         ("0.0,1.0\n0.1,2.0\n", "expected a header line with the names of the columns, found numbers"),
-        ("a;b\n1;2\n", "expected commas between the columns, found ';'"),
-        ("a\tb\n1\t2\n", r"expected commas between the columns, found '\t'"),
+        ("time q1\n1 2\n", "expected commas, semicolons or tabs between the columns, found blanks"),
+        ("a,b\0\n1,2\n", "expected a header line in UTF-8, found other bytes"),
         (b"a,\xff\n1,2\n", "expected a header line in UTF-8, found other bytes"),
         ("a,b\n1,2\n".encode("utf-16"), "expected a header line in UTF-8, found other bytes"),
     ],
@@ -109,42 +127,66 @@ def test_no_rows(csv, content):
     assert problems(csv(content)) == [(0, "there are no rows below the header")]
 
 
-def test_all_problems_of_the_rows_at_once(csv):
+def test_header_in_a_comment_is_recognised(csv):
+    assert problems(csv("# written today\n# a,b\n1,2\n")) == [
+        (
+            3,
+            "expected a header line with the names of the columns, found numbers;"
+            " if line 2 is meant, remove its '#'",
+        )
+    ]
+
+
+def test_first_problem_of_each_kind(csv):
     content = b"time,q\n0,1\n0.1,1,2\n\n0.2\nx,nan\n0.3,1e999\n0.4,\xff\n1_0,\n0x10,1,\n"
     assert problems(csv(content)) == [
-        (3, "expected 2 values as in the header, found 3"),
-        (4, "the line is empty"),
-        (5, "expected 2 values as in the header, found 1"),
-        (6, "column 'time': expected a finite number, found 'x'"),
-        (6, "column 'q': expected a finite number, found 'nan'"),
-        (7, "column 'q': expected a finite number, found '1e999'"),
-        (8, "column 'q': expected a finite number, found '\ufffd'"),
-        (9, "column 'time': expected a finite number, found '1_0'"),
-        (9, "column 'q': expected a finite number, found ''"),
-        (10, "expected 2 values as in the header, found 3"),
+        (3, "expected 2 values as in the header, found 3 (the first of 3 such lines)"),
+        (6, "column 'time': expected a finite number, found 'x' (the first of 2 such lines)"),
+        (6, "column 'q': expected a finite number, found 'nan' (the first of 4 such lines)"),
     ]
 
 
 @pytest.mark.parametrize(
-    "cell", ["nan", "-inf", "Infinity", "1e400", '"1"', "1 2", "1d5", "true", "٣", "1\0"]
+    ("content", "found"),
+    [
+        (
+            "a;b\n1;2\n3,5;4\n",
+            "column 'a': expected a finite number, found '3,5';"
+            " decimal commas are not understood, write a point",
+        ),
+        (
+            "a,b\n1,2\n3,5,4,5\n",
+            "expected 2 values as in the header, found 4; decimal commas are not understood, write points",
+        ),
+    ],
+)
+def test_decimal_commas_are_refused(csv, content, found):
+    assert problems(csv(content)) == [(3, found)]
+
+
+@pytest.mark.parametrize(
+    "cell", ["nan", "-inf", "Infinity", "1e400", '"1"', "1 2", "1d5", "true", "٣", "9" * 400]
 )
 def test_every_cell_is_a_finite_number(csv, cell):
     assert problems(csv(f"a,b\n1,2\n3,{cell}\n5,6\n")) == [
-        (3, f"column 'b': expected a finite number, found {cell!r}")
+        (3, f"column 'b': expected a finite number, found {cell[:40]!r}")
     ]
 
 
 def test_rows_that_all_have_the_wrong_length(csv):
     assert problems(csv("a,b,c\n1,2\n3,4\n")) == [
-        (2, "expected 3 values as in the header, found 2"),
-        (3, "expected 3 values as in the header, found 2"),
+        (2, "expected 3 values as in the header, found 2 (the first of 2 such lines)"),
     ]
 
 
 def test_many_problems_are_cut_short(csv):
-    found = problems(csv("a\n" + "x\n" * 1000))
-    assert [line for line, _ in found] == [*range(2, 12), 0]
-    assert found[-1][1] == "more than 10 problems; reading stopped there"
+    assert problems(csv("a\n" + "x\n" * 5000)) == [
+        (2, "column 'a': expected a finite number, found 'x' (the first of 1000 or more such lines)")
+    ]
+    names = [f"c{i}" for i in range(30)]
+    found = problems(csv(",".join(names) + "\n" + ",".join("x" * 30) + "\n"))
+    assert [line for line, _ in found] == [2] * 10 + [0]
+    assert found[-1][1] == "more than 10 kinds of problems; reading stopped there"
 
 
 def test_long_cell_is_cut_short(csv):
@@ -174,21 +216,51 @@ def test_large_binary_file_is_refused_from_its_first_line(tmp_path, unit):
     assert peak < 40 * MAX_HEADER  # a few copies of the longest header, not of the file
 
 
+@pytest.mark.parametrize("unit", [b"\0", b"1,", b"#", b"1", b"\xff"])
+def test_large_binary_file_under_a_valid_header_is_refused_early(tmp_path, unit):
+    path = tmp_path / "noise.csv"
+    path.write_bytes(b"a,b\n" + unit * (20_000_000 // len(unit)))
+    tracemalloc.start()
+    found = problems(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    nul = "holds NUL characters, which no table of numbers has"
+    assert found == [(2, nul if unit == b"\0" else "the line is longer than 1,000,000 characters")]
+    assert peak < 5 * CHUNK
+
+
+def test_values_are_those_of_numpy(tmp_path):
+    path = tmp_path / "long.csv"
+    values = np.random.default_rng(1).normal(size=(3 * CHUNK // 60, 3))  # several chunks
+    np.savetxt(path, values, delimiter=",", header="a,b,c", comments="")
+    np.testing.assert_array_equal(read_table(path).values, np.loadtxt(path, delimiter=",", skiprows=1))
+
+
 def reference(content):
     """The table by Python alone, or None if it is to be refused."""
-    header, *rows = content.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    while rows and not rows[-1]:
-        rows.pop()
-    names = [name.strip() for name in header.split(",")]
+    lines = content.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    filled = [line.partition("#")[0] for line in lines if line and not line.startswith("#")]
+    if not filled:
+        return None
+    header, *rows = filled
+    separator = ";" if ";" in header else ","
+    names = [name.strip() for name in header.split(separator)]
     try:
-        values = [[float(cell) for cell in row.split(",")] for row in rows]
+        values = [[float(cell) for cell in row.split(separator)] for row in rows]
     except ValueError:
         return None
     numbers = [number for row in values for number in row]
     regular = all(len(row) == len(names) for row in values) and all(map(math.isfinite, numbers))
     plain = all(row.isascii() and "_" not in row for row in rows)
-    named = all(names) and len(set(names)) == len(names) and names not in (["a;b"], ["1", "2"])
+    named = all(names) and len(set(names)) == len(names) and not all(map(is_finite, names))
     return values if regular and plain and named and rows else None
+
+
+def is_finite(name):
+    try:
+        return math.isfinite(float(name)) and "_" not in name
+    except ValueError:
+        return False
 
 
 NUMBERS = ["0", "1.5", "-2e3", " 7 ", ".5", "1.", "\t3", "+4", "1e-999"]
@@ -198,7 +270,7 @@ lines = st.lists(cells, min_size=1, max_size=3).map(",".join)
 likely_tables = st.builds(
     lambda header, rows, end, bom: ("\ufeff" if bom else "") + end.join([header, *rows]),
     st.sampled_from(["a", "a,b", " a ,b,c", "a,a", "a,", "", "1,2", "a;b"]),
-    st.lists(lines | st.just("1,2") | st.just("1") | st.just(""), max_size=6),
+    st.lists(lines | st.sampled_from(["1,2", "1", "", "# 9", "1,2# 3", "1;2"]), max_size=6),
     st.sampled_from(["\n", "\r\n", "\r"]),
     st.booleans(),
 )

@@ -9,7 +9,7 @@ import pytest
 
 from vsacli.errors import InputError
 from vsacli.profiles import POSITION, STIFFNESS, Constant, RestToRest
-from vsacli.samples import SampledProfile
+from vsacli.samples import SampledProfile, Samples
 from vsacli.spec.source import Source
 from vsacli.times import RecordedTimes, UniformTimes
 from vsacli.trajectory import Trajectory
@@ -112,18 +112,21 @@ def test_missing_derivatives_approach_the_true_ones():
     original = polynomial(rate=200.0)
     copy = sampled(original)
     assert copy.warnings == (
-        "dq, ddq, d3q, d4q come from a C4 spline through q",
-        "dstiffness, ddstiffness come from a C2 spline through stiffness",
+        "dq, ddq, d3q, d4q come from a C6 spline through q;"
+        " derivatives are doubtful in the first 0.035 s and the last 0.035 s",  # 7 steps
+        "dstiffness, ddstiffness come from a C4 spline through stiffness;"
+        " derivatives are doubtful in the first 0.025 s and the last 0.025 s",  # 5 steps
     )
     ours, theirs = copy.block(0, 401), original.block(0, 401)
     # a cubic stiffness is its own spline up to rounding, amplified by 1 / step^2
     for order, name in enumerate(STIFFNESS.names):
         error = np.abs(getattr(ours, name) - getattr(theirs, name)).max()
         assert error < 100 * EPS * 2400 * 200**order
-    # degree 7 is not: error step^(6-order) |d6q|, that 50400 * 2.5 / 2^6 at the ends, where the constant is 3
+    # so is a position of degree 7; rounding is amplified 850 times at the ends, inside 37 times
     for order, name in enumerate(POSITION.names):
-        error = np.abs(getattr(ours, name) - getattr(theirs, name)).max()
-        assert error < 3 * (50400 * 2.5 / 2**6) / 200 ** (6 - order) + 100 * EPS * 200**order
+        error = np.abs(getattr(ours, name) - getattr(theirs, name))
+        assert error.max() < 1000 * EPS * 3 * 200**order
+        assert error[10:-10].max() < 100 * EPS * 3 * 200**order
 
 
 @pytest.mark.parametrize("recorded", ["position", "stiffness"])
@@ -132,7 +135,8 @@ def test_recorded_and_closed_form_parts_mix(recorded):
     whole = original.block(0, 101)
     parts = {"position": original.position, "stiffness": original.stiffness}
     signal, values = {"position": (POSITION, whole.q), "stiffness": (STIFFNESS, whole.stiffness)}[recorded]
-    parts[recorded] = SampledProfile.from_arrays(signal, whole.time, values, *[None] * (signal.orders - 1))
+    record = Samples.from_arrays(signal, whole.time, values, *[None] * (signal.orders - 1))
+    parts[recorded] = SampledProfile.of(record)
     mixed = Trajectory(RecordedTimes(whole.time), **parts, name="mixed")
     block = mixed.block(30, 60)
     for name in ("q", "stiffness"):
@@ -158,7 +162,7 @@ def test_check_points_of_many_knots_are_the_middles_of_their_spans():
 
 
 @pytest.mark.parametrize("count", [1, 7, 50])
-@pytest.mark.parametrize("samples", [6, 8, 30])
+@pytest.mark.parametrize("samples", [8, 10, 30])
 def test_check_points_keep_within_one_analytic_piece(samples, count):
     trajectory = random_samples(samples)
     time, reach = trajectory.check_points(count)
@@ -176,25 +180,25 @@ def test_check_points_keep_within_one_analytic_piece(samples, count):
 def test_differences_within_reach_confirm_the_derivatives():
     trajectory = random_samples(200, joints=2)
     time, reach = trajectory.check_points(40)
-    step = reach / 3
-    stencil = [trajectory.at(time + k * step) for k in range(-3, 4)]
+    step = reach / 4
+    stencil = [trajectory.at(time + k * step) for k in range(-4, 5)]
     for names in (POSITION.names, STIFFNESS.names):
         for name, derivative in pairwise(names):
-            weights = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
+            weights = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
             difference = (
                 sum(w * getattr(m, name) for w, m in zip(weights, stencil, strict=True)) / step[:, None]
             )
-            peak = np.abs(getattr(stencil[3], name)).max()
-            # the formula is exact for degree 5: rounding of the values and of the times (up to 200) is left
-            bound = 20 * EPS * (peak + 200 * np.abs(getattr(stencil[3], derivative)).max()) / step.min()
-            np.testing.assert_allclose(difference, getattr(stencil[3], derivative), rtol=0, atol=bound)
+            peak = np.abs(getattr(stencil[4], name)).max()
+            # the formula is exact for degree 7: rounding of the values and of the times (up to 200) is left
+            bound = 20 * EPS * (peak + 200 * np.abs(getattr(stencil[4], derivative)).max()) / step.min()
+            np.testing.assert_allclose(difference, getattr(stencil[4], derivative), rtol=0, atol=bound)
 
 
 def test_from_samples_names_everything_that_does_not_fit():
-    time = np.array([0.0, 0.1, 0.2, 0.2, 0.4, 0.5])
-    q = np.zeros((6, 2))
+    time = np.array([0.0, 0.1, 0.2, 0.2, 0.4, 0.5, 0.6, 0.7])
+    q = np.zeros((8, 2))
     q[4, 1] = np.nan
-    stiffness = np.full((6, 2), 800.0)
+    stiffness = np.full((8, 2), 800.0)
     stiffness[1, 0] = -3
     with pytest.raises(InputError) as caught:
         Trajectory.from_samples(time, q, stiffness)
@@ -224,7 +228,7 @@ def test_from_samples_checks_shapes(changed, message):
 
 
 def test_from_samples_needs_samples():
-    with pytest.raises(InputError, match="q needs at least 6 samples for a C4 spline, not 0"):
+    with pytest.raises(InputError, match="q needs at least 8 samples for a C6 spline, not 0"):
         Trajectory.from_samples([], np.zeros((0, 2)), np.ones((0, 2)))
 
 
@@ -232,14 +236,15 @@ def test_scipy_is_loaded_only_for_splines():
     script = """
 import sys
 import numpy as np
-from vsacli.trajectory import Trajectory
-time = np.arange(8.0)
-zero, one = np.zeros((8, 1)), np.ones((8, 1))
-full = dict(dq=zero, ddq=zero, d3q=zero, d4q=zero, dstiffness=zero, ddstiffness=zero)
-complete = Trajectory.from_samples(time, zero, one, **full)
-complete.block(0, 8), complete.check_points(3)
+from vsacli.profiles import POSITION, Constant
+from vsacli.times import UniformTimes
+from vsacli.trajectory import Trajectory, no_stiffness
+times = UniformTimes(7.0, 1.0)
+still = Constant(signal=POSITION, span=times.span, value=(0.0,))
+closed = Trajectory(times, still, no_stiffness(1, times), name="still")
+closed.block(0, 8), closed.check_points(3), closed.at(np.arange(8.0))
 assert "scipy" not in sys.modules
-complete.at(time)
+Trajectory.from_samples(np.arange(8.0), np.zeros((8, 1)))
 assert "scipy" in sys.modules
 """
     subprocess.run([sys.executable, "-c", script], check=True)

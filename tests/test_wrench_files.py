@@ -78,11 +78,14 @@ def test_a_polynomial_wrench(load, degree: int) -> None:
 def test_a_recorded_wrench(load) -> None:
     table = push_table(*WRENCH_AXES)
     write_table("push.csv", table)
-    trajectory = load(RECORDED + "wrench: {frame: base, type: csv, file: push.csv}\n")
+    trajectory = load(RECORDED + "wrench: {frame: base, type: csv, file: push.csv, fit: interpolate}\n")
     block = trajectory.block(0, 21)
     np.testing.assert_array_equal(block.wrench.wrench.T, [table[axis] for axis in WRENCH_AXES])
     np.testing.assert_array_equal(block.time, table["time"])
-    assert trajectory.warnings == ("dwrench, ddwrench come from a C2 spline through wrench",)
+    assert trajectory.warnings == (
+        "dwrench, ddwrench come from a C4 spline through wrench;"
+        " derivatives are doubtful in the first 0.5 s and the last 0.5 s",  # 5 steps of 0.1 s
+    )
     assert [source.path for source in trajectory.sources] == ["move.yaml", "push.csv"]
 
 
@@ -91,7 +94,8 @@ def test_a_recorded_wrench_with_derivatives_beside_a_recorded_motion(load) -> No
     joints = [f"{joint}.q" for joint in vsa_3r().joint_names]
     table = push_table(*WRENCH_AXES, *derivatives, *joints)
     write_table("all.csv", table)
-    text = "format: vsacli-trajectory/1\nname: reach\nposition: {type: csv, file: all.csv}\n"
+    text = "format: vsacli-trajectory/1\nname: reach\n"
+    text += "position: {type: csv, file: all.csv, fit: interpolate}\n"
     text += "stiffness: {type: constant, value: 900}\nwrench: {frame: base, type: csv, file: all.csv}\n"
     block = load(text).block(0, 21)
     np.testing.assert_array_equal(block.wrench.ddwrench.T, [table[f"dd{axis}"] for axis in WRENCH_AXES])
@@ -132,7 +136,7 @@ def test_columns_of_a_wrench_that_nobody_asked_for_are_noted(load) -> None:
         ),
         (
             "{frame: base, type: sine}",
-            "move.yaml:7: wrench.type: unknown word 'sine'; valid: polynomial, constant",
+            "move.yaml:7: wrench.type: unknown word 'sine'; valid: polynomial, steps, constant",
         ),
         (
             "{frame: base, type: polynomial, degree: 1, start: [0, 0, 0, 0, 0, 0], end: [0, 0, 0, 0, 0, 0]}",

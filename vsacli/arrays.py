@@ -7,13 +7,19 @@ runs along the samples of one joint.
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
+from typing import TYPE_CHECKING, Any
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
-FlagArray = npt.NDArray[np.uint16]
-IndexArray = npt.NDArray[np.intp]
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike  # numpy.typing takes as long to import as all of this package's types
+
+_AnyShape = tuple[Any, ...]
+FloatArray = np.ndarray[_AnyShape, np.dtype[np.float64]]
+BoolArray = np.ndarray[_AnyShape, np.dtype[np.bool_]]
+FlagArray = np.ndarray[_AnyShape, np.dtype[np.uint16]]
+IndexArray = np.ndarray[_AnyShape, np.dtype[np.intp]]
+AnyArray = np.ndarray[_AnyShape, np.dtype[Any]]
 
 
 def over_time(rows: FloatArray) -> FloatArray:
@@ -21,6 +27,6 @@ def over_time(rows: FloatArray) -> FloatArray:
     return np.moveaxis(rows, -1, 0)
 
 
-def by_joint(array: npt.ArrayLike) -> FloatArray:
+def by_joint(array: ArrayLike) -> FloatArray:
     """The inverse of `over_time`, with contiguous samples; copies only an array laid out otherwise."""
     return np.ascontiguousarray(np.moveaxis(np.asarray(array, dtype=np.float64), 0, -1))

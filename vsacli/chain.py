@@ -14,10 +14,12 @@ import numpy as np
 
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
+from vsacli.motor import Motor
 from vsacli.newton_euler import base_gravity, joint_state, link_constants, tip_load
 from vsacli.recursion import TipLoad, TorqueDerivatives, recursion
-from vsacli.robot import Limits, Motor, Rigid, Robot
-from vsacli.tracing import Program, Symbol, Tape
+from vsacli.robot import Limits, Rigid, Robot
+from vsacli.tracing import Program, Symbol, Tape, TracedArray
+from vsacli.tracing.linear import solve_positive_definite
 from vsacli.vector import ZERO, Scalar, Vector
 from vsacli.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
 
@@ -44,7 +46,7 @@ class Chain:
         """M(q), ([samples,] joints, joints): column k is the recursion's torque at q'' = e_k alone."""
         row, column = self._lower
         entries = self._inertia(q)
-        matrix = np.empty((*q.shape, q.shape[-1]))
+        matrix = np.empty_like(q, shape=(*q.shape, q.shape[-1]))
         matrix[..., row, column] = matrix[..., column, row] = entries
         return matrix
 
@@ -79,7 +81,10 @@ class Chain:
 
         Raises:
             InputError: the matrix is not positive definite; names the first joint whose leading minor fails.
+                A recorded program gives NaN instead.
         """
+        if isinstance(matrix, TracedArray):
+            return solve_positive_definite(matrix, torque, SMALLEST_PIVOT)
         self._check_positive_definite(matrix)
         return np.asarray(np.linalg.solve(matrix, torque[..., None])[..., 0], dtype=np.float64)
 
@@ -146,7 +151,8 @@ def _inertia_program(robot: Robot) -> Program:
         _torques(robot, q, [(0, int(joint == moving), 0, 0) for joint in numbers], ZERO, None)
         for moving in numbers
     ]
-    return tape.program([columns[column][row].tau for row in numbers for column in range(row + 1)])
+    lower = [columns[column][row].tau for row in numbers for column in range(row + 1)]
+    return Program(tape.listing(lower))
 
 
 def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -> Program:
@@ -157,7 +163,7 @@ def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -
     rates = [tape.inputs(joints) if order < orders else [0] * joints for order in range(4)]
     tip = None if frame is None else _load(tape, robot, frame, ("tau", "dtau", "ddtau").index(output))
     torques = _torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), tip)
-    return tape.program([getattr(torque, output) for torque in torques])
+    return Program(tape.listing([getattr(torque, output) for torque in torques]))
 
 
 def _load(tape: Tape, robot: Robot, frame: str, order: int) -> TipLoad:

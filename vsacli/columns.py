@@ -1,20 +1,23 @@
-"""Which column of a recorded trajectory is which quantity of which joint."""
+"""Which column of a recorded trajectory is which quantity of which joint, and in which unit."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from vsacli.errors import InputError, Problem
 from vsacli.profiles import POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.suggestions import did_you_mean
-from vsacli.wrench import wrench_columns
+from vsacli.unit_expressions import conversion_factor
+from vsacli.units import Quantity
+from vsacli.variables import VARIABLES
+from vsacli.wrench import WRENCH_AXES, wrench_columns
 
 TIME = "time"
 JOINT_SIGNALS = (POSITION, STIFFNESS)
 SIGNALS = (*JOINT_SIGNALS, WRENCH)
-
-Layout = dict[str, dict[int, int]]
-"""For each quantity that a table has, e.g. `dq`, the index of a column by that of its joint (wrench axis)."""
 
 Way = dict[str, dict[int, str]]
 """For each quantity the names of its columns, by index of the joint (wrench axis)."""
@@ -23,54 +26,95 @@ _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
 _WRENCH_WAY: Way = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
 
+_HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        index: its place, from 0.
+        name: from the header, without the unit.
+        factor: what its numbers are multiplied by to be SI.
+    """
+
+    index: int
+    name: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where quantities stand in a table.
+
+    Attributes:
+        time: the column of the times.
+        quantities: for each quantity that the table has, e.g. `dq`, the columns by index of the joint (axis).
+        unused: names of the other columns.
+    """
+
+    time: Column
+    quantities: Mapping[str, Mapping[int, Column]]
+    unused: tuple[str, ...]
+
 
 def column_layout(
     header: Sequence[str],
-    joint_names: Sequence[str],
+    joints: Mapping[str, str],
     wanted: Sequence[Signal],
     file: str,
+    line: int = 1,
     without_stiffness: Collection[str] = (),
 ) -> Layout:
     """Where the quantities stand in a table.
 
     Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one way
-    throughout. Those of the wrench are named by `wrench_columns`.
+    throughout. Those of the wrench are named by `wrench_columns`. A unit in brackets may follow any name.
 
     Args:
         header: names of all columns, none twice.
-        joint_names: the joints, each of which must have a column of each quantity that any joint has.
+        joints: names with types, base to tip; each must have a column of each quantity that any joint has.
         wanted: signals whose values must be there; their derivatives are optional.
         file: named in errors.
+        line: of the header, likewise.
         without_stiffness: joints that need no stiffness; columns of it are admitted, but not in the layout.
 
     Raises:
         InputError: all that is wrong with the header.
     """
-    everything = [column for pattern in _PATTERNS for column in _all(_columns(pattern, joint_names))]
-    ways = [_columns(pattern, joint_names, without_stiffness) for pattern in _PATTERNS]
-    used = [way for way in ways if any(column in header for column in _all(way))]
+    headings = [_HEADING.fullmatch(text) for text in header]
+    names = [text if match is None else match["name"] for text, match in zip(header, headings, strict=True)]
+    everything = [column for pattern in _PATTERNS for column in _all(_columns(pattern, joints))]
+    ways = [_columns(pattern, joints, without_stiffness) for pattern in _PATTERNS]
+    used = [way for way in ways if any(column in names for column in _all(way))]
     way = used[0] if used else ways[0]
     expected = [TIME, *_all(way), *(_all(_WRENCH_WAY) if WRENCH in wanted else ())]
 
-    problems = list(_strangers(header, expected, {TIME, *everything, *_all(_WRENCH_WAY)}))
+    problems = list(_strangers(names, expected, {TIME, *everything, *_all(_WRENCH_WAY)}))
+    problems += [f"column {name!r} appears {n} times" for name, n in Counter(names).items() if n > 1]
     way = way | _WRENCH_WAY
     if len(used) == len(ways):
-        examples = " and ".join(
-            repr(next(column for column in header if column in _all(way))) for way in ways
-        )
+        examples = " and ".join(repr(next(column for column in names if column in _all(way))) for way in ways)
         problems.append(f"columns are named both by joint and by number ({examples}); use one way")
     else:
-        problems += _gaps(header, way, {signal.names[0] for signal in wanted})
+        problems += _gaps(names, way, {signal.names[0] for signal in wanted})
+    units = [None if match is None else match["unit"] for match in headings]
+    columns = dict(_measured(names, units, way, joints, problems))
     if problems:
-        raise InputError(Problem(file, 1, problem) for problem in problems)
-    return {
-        name: {index: header.index(column) for index, column in columns.items()}
-        for name, columns in way.items()
-        if all(column in header for column in columns.values())
-    }
+        raise InputError(Problem(file, line, problem) for problem in problems)
+    return Layout(
+        time=columns[TIME],
+        quantities={
+            name: {index: columns[column] for index, column in of_joints.items()}
+            for name, of_joints in way.items()
+            if all(column in columns for column in of_joints.values())
+        },
+        unused=tuple(name for name in names if name not in columns),
+    )
 
 
-def _columns(pattern: str, joint_names: Sequence[str], without_stiffness: Collection[str] = ()) -> Way:
+def _columns(pattern: str, joint_names: Collection[str], without_stiffness: Collection[str] = ()) -> Way:
     """The columns of the joints."""
     return {
         name: {
@@ -104,3 +148,32 @@ def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[
         elif absent and len(absent) < len(columns):
             every = "axes" if name in WRENCH.names else "joints"
             yield f"there is no column {', '.join(absent)}; {name} is given for all {every} or for none"
+
+
+def _measured(
+    names: Sequence[str],
+    units: Sequence[str | None],
+    way: Way,
+    joints: Mapping[str, str],
+    problems: list[str],
+) -> Iterator[tuple[str, Column]]:
+    """The columns that are used, by name; notes units that cannot be converted."""
+    expected = {TIME: VARIABLES[TIME].quantity.unit("")}
+    for quantity, columns in way.items():
+        for index, column in columns.items():
+            expected[column] = _unit(VARIABLES[quantity].quantity, quantity, index, tuple(joints.values()))
+    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
+        if name in expected:
+            try:
+                factor = 1.0 if unit is None else conversion_factor(unit, expected[name])
+            except InputError as error:
+                problems.append(f"column {name!r}: {error}")
+            else:
+                yield name, Column(place, name, factor)
+
+
+def _unit(quantity: Quantity, name: str, index: int, joint_types: Sequence[str]) -> str:
+    """Of one column; the axes of a wrench are forces, then moments."""
+    if name not in WRENCH.names:
+        return quantity.unit(joint_types[index])
+    return quantity.prismatic if WRENCH_AXES[index].startswith("f") else quantity.revolute

@@ -15,7 +15,6 @@ from vsacli.decoupling_matrix import Springs, determinant, spring_state
 from vsacli.motor import JointMotor
 from vsacli.robot import Antagonistic, Elastic, Rigid, Robot
 from vsacli.springs import SpringLaw
-from vsacli.springs.polynomial import Polynomial
 
 SIDES = 2
 """Motors that a joint has at most."""
@@ -34,6 +33,8 @@ def _(actuator: Antagonistic) -> list[tuple[JointMotor, SpringLaw | None]]:
 
 @motors_and_springs.register
 def _(actuator: Elastic) -> list[tuple[JointMotor, SpringLaw | None]]:
+    from vsacli.springs.polynomial import Polynomial
+
     return [(actuator.motor.at_joint, Polynomial(c1=actuator.stiffness))]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +13,7 @@ from vsacli.robot import Robot
 from vsacli.variables import Block
 
 
-@dataclass(frozen=True)
-class JointEnergy:
+class JointEnergy(NamedTuple):
     """Energy of a joint over a run; but for the peak, NaN if the torques of a step do not exist.
 
     The torques of two springs split: tau_1^2 + tau_2^2 = tau_e^2/2 + (tau_1 - tau_2)^2/2. The first part
@@ -44,7 +42,7 @@ class JointEnergy:
 
     def as_json(self) -> dict[str, float]:
         """Plain values under the published keys."""
-        return {**vars(self), "co_contraction_share": self.co_contraction_share}
+        return {**self._asdict(), "co_contraction_share": self.co_contraction_share}
 
 
 class Flow(NamedTuple):

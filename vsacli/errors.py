@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 
 class VsacliError(Exception):
     """Root of every error the tool raises on purpose."""
 
 
-@dataclass(frozen=True, order=True)
-class Problem:
+class Problem(NamedTuple):
     """One thing wrong with an input: where it stands and what is expected there.
 
     Attributes:
@@ -43,15 +42,34 @@ class InputError(VsacliError, ValueError):
         return cls([Problem(str(file), line, message)])
 
 
-@dataclass(frozen=True)
-class FieldProblem:
-    """A field of a record that cannot hold its value; `path` leads to it, e.g. ("inertia", "xx")."""
+class FieldProblem(NamedTuple):
+    """A field of a record that cannot hold its value.
+
+    Attributes:
+        path: leads to the field, e.g. ("inertia", "xx"); numbers are indices in lists, and of joints.
+        message: as in `Problem`.
+        joint: index of the joint it concerns, if it is one of them; a file reader knows its name.
+    """
 
     path: tuple[str | int, ...]
     message: str
+    joint: int | None = None
 
     def __str__(self) -> str:
-        return ": ".join([".".join(map(str, self.path)), self.message] if self.path else [self.message])
+        return self._sentence(map(str, self.path), None if self.joint is None else str(self.joint + 1))
+
+    def in_file(self, joints: Sequence[str]) -> str:
+        """The same sentence with names of joints, and without indices in lists, since the line is known."""
+        keys = (step for step in self.path if isinstance(step, str))
+        return self._sentence(keys, None if self.joint is None else joints[self.joint])
+
+    def _sentence(self, path: Iterable[str], joint: str | None) -> str:
+        where = " of joint ".join(filter(None, [".".join(path), joint]))
+        return f"{where}: {self.message}" if where else self.message
+
+    def inside(self, *outer: str | int) -> FieldProblem:
+        """The same, seen from a record that holds this one; `outer` leads to it."""
+        return self._replace(path=(*outer, *self.path))
 
 
 class InvalidRecordError(InputError):

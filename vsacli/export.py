@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
 from typing import Any, Literal, TextIO, TypeAlias
@@ -128,7 +128,7 @@ def export_csv_file(
 def _headers(result: StoredResult, variable: Variable, on_shaft: bool) -> Iterator[str]:
     """Names of the columns that a variable has."""
     name = f"{variable.name}_shaft" if on_shaft else variable.name
-    columns = column_names(replace(variable, name=name), result.joint_names)
+    columns = column_names(variable._replace(name=name), result.joint_names)
     return compress(columns, _existing(result, variable).flat)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import operator
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -41,20 +43,41 @@ def check_near_singular(threshold: float) -> None:
         )
 
 
-def reach_flags(
-    stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR
-) -> FlagArray:
-    """Bits INFEASIBLE, SINGULAR and NEAR_SINGULAR (below that margin) of the steps of a joint, (samples,)."""
+class Reach(NamedTuple):
+    """Whether a stiffness is within reach, and how near to a singular matrix A; arrays (samples,)."""
+
+    infeasible: BoolArray
+    slack: BoolArray
+    singular: BoolArray
+    near_singular: BoolArray
+
+    @property
+    def flags(self) -> FlagArray:
+        """The bits of the same names."""
+        bits = (Flag.INFEASIBLE, Flag.SLACK, Flag.SINGULAR, Flag.NEAR_SINGULAR)
+        first, *others = (_bit(flag, where) for flag, where in zip(bits, self, strict=True))
+        return reduce(operator.or_, others, first)
+
+
+def reach(stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR) -> Reach:
+    """Reach of the steps of a joint; near-singular is what has a smaller margin than that."""
     gap = margin(stiffness, solution.lower, solution.upper)
     at_lower = stiffness - solution.lower <= solution.upper - stiffness
     critical = np.where(at_lower, solution.lower_critical, solution.upper_critical)
-    infeasible = ~(gap >= -TOUCHING)
-    return (
-        _bit(Flag.INFEASIBLE, infeasible)
-        | _bit(Flag.SLACK, infeasible & at_lower & solution.slack_below)
-        | _bit(Flag.SINGULAR, critical & (np.abs(gap) <= TOUCHING))
-        | _bit(Flag.NEAR_SINGULAR, critical & (gap > TOUCHING) & (gap < near_singular))
+    infeasible = ~((gap >= -TOUCHING) & (stiffness > 0))
+    return Reach(
+        infeasible=infeasible,
+        slack=infeasible & at_lower & solution.slack_below,
+        singular=critical & (np.abs(gap) <= TOUCHING),
+        near_singular=critical & (gap > TOUCHING) & (gap < near_singular),
     )
+
+
+def reach_flags(
+    stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR
+) -> FlagArray:
+    """Bits INFEASIBLE, SLACK, SINGULAR and NEAR_SINGULAR of the steps of a joint, (samples,)."""
+    return reach(stiffness, solution, near_singular).flags
 
 
 class LimitCheck(NamedTuple):
@@ -109,7 +132,7 @@ def has(flags: FlagArray, bits: Flag) -> BoolArray:
 
 
 def _bit(flag: Flag, where: BoolArray) -> FlagArray:
-    return where.astype(np.uint16) * np.uint16(flag)
+    return np.where(where, np.uint16(flag), np.uint16(0))
 
 
 def _symmetric(bound: float) -> tuple[float, float]:

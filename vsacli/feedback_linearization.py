@@ -51,11 +51,8 @@ class FeedbackLinearization:
 
     def __init__(self, robot: Robot, gains: Gains, frame: str | None = None) -> None:
         self.plant = Plant(robot, frame)
-        sprung = self.plant.drivetrain.sprung
-        if sprung.any() and not sprung.all():
-            raise InputError.one(_mixed(robot, self.plant))
-        gains.check_fit(len(robot.joints), POSITION_ORDER if sprung.all() else RIGID_ORDER)
-        self.law = Decoupling(self.plant, gains) if sprung.all() else ComputedTorque(self.plant, gains)
+        gains.check_fit(len(robot.joints), position_order(robot, self.plant))
+        self.law = control_law(self.plant, gains)
 
     def __call__(self, state: State, reference: Motion, integral: Integral | None = None) -> FloatArray:
         """Motor torques, ([samples,] joints, 2); see `feedback_linearization`."""
@@ -63,6 +60,23 @@ class FeedbackLinearization:
         zero = np.zeros_like(unpacked[0])
         torque = self.law.torque(*unpacked, reference, integral or Integral(zero, zero))
         return self.plant.drivetrain.of_joints(torque)
+
+
+def position_order(robot: Robot, plant: Plant) -> int:
+    """Order of the error dynamics (33a) of a robot's position.
+
+    Raises:
+        InputError: the robot mixes rigid joints with others, for which there is no such law.
+    """
+    sprung = plant.drivetrain.sprung
+    if sprung.any() and not sprung.all():
+        raise InputError.one(_mixed(robot, plant))
+    return POSITION_ORDER if sprung.all() else RIGID_ORDER
+
+
+def control_law(plant: Plant, gains: Gains) -> Decoupling | ComputedTorque:
+    """The law for a robot all of whose joints, or none, have springs."""
+    return Decoupling(plant, gains) if plant.drivetrain.sprung.all() else ComputedTorque(plant, gains)
 
 
 def _mixed(robot: Robot, plant: Plant) -> str:

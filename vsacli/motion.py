@@ -8,7 +8,7 @@ from vsacli.arrays import FloatArray
 from vsacli.wrench import WRENCH_NAMES, Wrench
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """Motion and stiffness over a block of times.
 

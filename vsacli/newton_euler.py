@@ -3,23 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from vsacli.arrays import FloatArray, by_joint, over_time
+from vsacli.engine import Engine, choose
 from vsacli.errors import InputError
 from vsacli.recursion import JointState, LinkConstants, TipLoad, recursion
 from vsacli.robot import Joint, Pose, Robot
-from vsacli.vector import ZERO, Matrix, Scalar, SymmetricTensor, Vector, add, exact, mul, sub
+from vsacli.vector import (
+    ZERO,
+    Matrix,
+    Scalar,
+    SymmetricTensor,
+    Vector,
+    add,
+    exact,
+    mul,
+    sub,
+    trigonometric,
+)
 from vsacli.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
 
-SAMPLES_PER_PASS = 4096
-"""Samples in one pass: fewer waste time in the interpreter, more leave the processor's cache."""
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
-JOINT_SAMPLES_PER_PASS = 2**19
-"""Bound on joints times samples in one pass: the recursion keeps about 500 bytes for each."""
+MOTION_NAMES = ("q", "dq", "ddq", "d3q", "d4q")
 
 
 def link_constants(joint: Joint) -> LinkConstants:
@@ -28,8 +40,8 @@ def link_constants(joint: Joint) -> LinkConstants:
     return LinkConstants(
         revolute=joint.is_revolute,
         a=exact(joint.dh.a),
-        cos_alpha=_trigonometric(math.cos, joint.dh.alpha),
-        sin_alpha=_trigonometric(math.sin, joint.dh.alpha),
+        cos_alpha=trigonometric(math.cos, joint.dh.alpha),
+        sin_alpha=trigonometric(math.sin, joint.dh.alpha),
         mass=exact(joint.link.mass),
         com=Vector(*map(exact, joint.link.com)),
         inertia=SymmetricTensor(
@@ -37,12 +49,6 @@ def link_constants(joint: Joint) -> LinkConstants:
         ),
         damping=exact(joint.damping),
     )
-
-
-def _trigonometric(function: Callable[[float], float], angle: float) -> Scalar:
-    """Cosine or sine of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
-    number = function(angle)
-    return 0 if abs(number) <= np.finfo(float).eps * max(1.0, abs(angle)) else exact(number)
 
 
 def base_gravity(robot: Robot) -> Vector:
@@ -72,7 +78,7 @@ def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> Ti
 def _rotation(pose: Pose) -> Matrix:
     """Rz(yaw) Ry(pitch) Rx(roll), with exact zeros and ones at right angles."""
     (cr, cp, cy), (sr, sp, sy) = (
-        [_trigonometric(function, angle) for angle in pose.rpy] for function in (math.cos, math.sin)
+        [trigonometric(function, angle) for angle in pose.rpy] for function in (math.cos, math.sin)
     )
     return Matrix(
         Vector(mul(cy, cp), sub(mul(mul(cy, sp), sr), mul(sy, cr)), add(mul(mul(cy, sp), cr), mul(sy, sr))),
@@ -81,14 +87,62 @@ def _rotation(pose: Pose) -> Matrix:
     )
 
 
+@dataclass(frozen=True)
+class LinkTorques:
+    """The recursion over rows of samples, for an engine.
+
+    Inputs are q, dq, ddq, d3q, d4q of the joints, then the wrench and its two derivatives if there is one;
+    outputs are tau_e, dtau_e, ddtau_e of the joints.
+
+    Attributes:
+        robot: the chain.
+        frame: of the wrench; None if there is none.
+    """
+
+    robot: Robot
+    frame: str | None = None
+
+    @property
+    def inputs(self) -> int:
+        """Rows it takes."""
+        of_wrench = 0 if self.frame is None else len(WRENCH_NAMES) * len(WRENCH_AXES)
+        return len(MOTION_NAMES) * len(self.robot.joints) + of_wrench
+
+    @property
+    def outputs(self) -> int:
+        """Rows it gives."""
+        return 3 * len(self.robot.joints)
+
+    def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
+        """Run (36)-(60)."""
+        joints = self.robot.joints
+        motion = [rows[order * len(joints) :] for order in range(len(MOTION_NAMES))]
+        states = [
+            joint_state(joint, q, (dq, ddq, d3q, d4q))
+            for joint, q, dq, ddq, d3q, d4q in zip(joints, *motion, strict=False)
+        ]
+        links = [link_constants(joint) for joint in joints]
+        torques = recursion(links, states, base_gravity(self.robot), self._tip(rows))
+        return [row for rows_of_order in zip(*torques, strict=True) for row in rows_of_order]
+
+    def _tip(self, rows: Sequence[Scalar]) -> TipLoad | None:
+        if self.frame is None:
+            return None
+        axes, start = len(WRENCH_AXES), len(MOTION_NAMES) * len(self.robot.joints)
+        wrench = [rows[first : first + axes] for first in range(start, len(rows), axes)]
+        return tip_load(self.robot, self.frame, wrench)
+
+
 def link_torques(
     robot: Robot,
-    q: npt.ArrayLike,
-    dq: npt.ArrayLike,
-    ddq: npt.ArrayLike,
-    d3q: npt.ArrayLike,
-    d4q: npt.ArrayLike,
+    q: ArrayLike,
+    dq: ArrayLike,
+    ddq: ArrayLike,
+    d3q: ArrayLike,
+    d4q: ArrayLike,
     wrench: Wrench | None = None,
+    *,
+    engine: str | Engine = "numpy",
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Torques that the links demand of the joints, and their first two derivatives, (36)-(60).
 
@@ -100,62 +154,46 @@ def link_torques(
         d3q: their third derivative.
         d4q: their fourth derivative.
         wrench: what the environment exerts on the end effector, over the same samples; nothing if None.
+        engine: what computes, one of `vsacli.engine.NAMES`, or one that was chosen before.
 
     Returns:
         tau_e, dtau_e, ddtau_e, each (samples, joints), N m (N) per s^k.
 
     Raises:
         InputError: an array has another shape than (samples, joints), or not that of `q`; one of the wrench
-            another than (samples, 6).
+            another than (samples, 6); there is no such engine, or no C compiler for it.
     """
-    position, *rates = (_checked(robot, name, array) for name, array in _named(q, dq, ddq, d3q, d4q))
-    if len({array.shape for array in (position, *rates)}) > 1:
-        shapes = ", ".join(str(array.shape[::-1]) for array in (position, *rates))
+    motion = [_checked(robot, name, array) for name, array in _named(q, dq, ddq, d3q, d4q)]
+    shape = motion[0].shape
+    if len({array.shape for array in motion}) > 1:
+        shapes = ", ".join(str(array.shape[::-1]) for array in motion)
         raise InputError.one(f"q, dq, ddq, d3q, d4q must have one shape, not {shapes}")
 
-    tip_at = _tip_loads(robot, wrench, position.shape[1])
-    links = [link_constants(joint) for joint in robot.joints]
-    gravity = base_gravity(robot)
-    torques = np.empty((3, *position.shape))
-    samples = max(1, min(SAMPLES_PER_PASS, JOINT_SAMPLES_PER_PASS // len(robot.joints)))
-    for start in range(0, position.shape[1], samples):
-        part = slice(start, start + samples)
-        states = _joint_states(robot, position[:, part], [rate[:, part] for rate in rates])
-        for joint, derivatives in enumerate(recursion(links, states, gravity, tip_at(part))):
-            for order, row in enumerate(derivatives):
-                torques[order, joint, part] = row
-    tau_e, dtau_e, ddtau_e = map(over_time, torques)
+    kernel = LinkTorques(robot, None if wrench is None else wrench.frame)
+    rows = [row for array in (*motion, *_wrench_rows(wrench, shape[1])) for row in array]
+    chosen = choose(engine, kernel, shape[1]).engine if isinstance(engine, str) else engine
+    tau_e, dtau_e, ddtau_e = map(over_time, chosen.run(kernel, rows).reshape(3, *shape))
     return tau_e, dtau_e, ddtau_e
 
 
-def _named(*motion: npt.ArrayLike) -> Iterator[tuple[str, npt.ArrayLike]]:
-    return zip(("q", "dq", "ddq", "d3q", "d4q"), motion, strict=True)
+def _named(*motion: ArrayLike) -> Iterator[tuple[str, ArrayLike]]:
+    return zip(MOTION_NAMES, motion, strict=True)
 
 
-def _checked(robot: Robot, name: str, array: npt.ArrayLike) -> FloatArray:
+def _checked(robot: Robot, name: str, array: ArrayLike) -> FloatArray:
     shape = np.shape(array)
     if len(shape) != 2 or shape[1] != len(robot.joints):
         raise InputError.one(f"{name} must have the shape (samples, {len(robot.joints)}), not {shape}")
     return by_joint(array)
 
 
-def _tip_loads(robot: Robot, wrench: Wrench | None, samples: int) -> Callable[[slice], TipLoad | None]:
-    """The load at the tip over any part of the samples."""
-    if wrench is None:
-        return lambda _: None
-    frame = wrench.frame
-    for name in WRENCH_NAMES:
-        if (shape := np.shape(getattr(wrench, name))) != (samples, len(WRENCH_AXES)):
+def _wrench_rows(wrench: Wrench | None, samples: int) -> Iterator[FloatArray]:
+    """The components, and each of their derivatives."""
+    for name in WRENCH_NAMES if wrench is not None else ():
+        array = getattr(wrench, name)
+        if (shape := np.shape(array)) != (samples, len(WRENCH_AXES)):
             raise InputError.one(f"{name} must have the shape ({samples}, {len(WRENCH_AXES)}), not {shape}")
-    rows = np.stack([by_joint(getattr(wrench, name)) for name in WRENCH_NAMES])
-    return lambda part: tip_load(robot, frame, rows[:, :, part])
-
-
-def _joint_states(robot: Robot, position: FloatArray, rates: Sequence[FloatArray]) -> list[JointState]:
-    return [
-        joint_state(joint, position[k], (rates[0][k], rates[1][k], rates[2][k], rates[3][k]))
-        for k, joint in enumerate(robot.joints)
-    ]
+        yield by_joint(array)
 
 
 def joint_state(joint: Joint, q: Scalar, rates: tuple[Scalar, Scalar, Scalar, Scalar]) -> JointState:
@@ -164,4 +202,4 @@ def joint_state(joint: Joint, q: Scalar, rates: tuple[Scalar, Scalar, Scalar, Sc
     if joint.is_revolute:
         angle = q + dh.theta
         return JointState(np.cos(angle), np.sin(angle), exact(dh.d), rates)
-    return JointState(_trigonometric(math.cos, dh.theta), _trigonometric(math.sin, dh.theta), q + dh.d, rates)
+    return JointState(trigonometric(math.cos, dh.theta), trigonometric(math.sin, dh.theta), q + dh.d, rates)

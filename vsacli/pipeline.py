@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from vsacli.drift import DriftTally
+from vsacli.arrays import AnyArray
+from vsacli.energy import RunEnergy
+from vsacli.engine import choose
 from vsacli.feasibility import NEAR_SINGULAR, check_near_singular, has
 from vsacli.flags import Flag
-from vsacli.following import Following
 from vsacli.report import Report
 from vsacli.robot import Antagonistic, Robot
 from vsacli.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
-from vsacli.steps import check_fit, compute_block
+from vsacli.steps import InverseDynamics, check_fit, compute_block
 from vsacli.tally import JointTally
 from vsacli.trajectory import Trajectory
 from vsacli.variables import Block
+
+if TYPE_CHECKING:
+    from vsacli.drift import DriftTally
+    from vsacli.following import Following
+    from vsacli.result import Result
 
 BLOCK_SAMPLES = 8192
 """Steps computed at a time: enough to hide the interpreter, few enough to bound the memory."""
@@ -35,9 +40,15 @@ class Run:
         near_singular: margin below which a step is near-singular.
         following: deflections to use, by `follow`, instead of the root of (14) at each step.
         block_samples: steps in a block; results do not depend on it.
+        engine: what computes, one of `vsacli.engine.NAMES`.
+        threads: of compiled code; as many as there are processors if None.
+
+    Attributes:
+        choice: the engine that was chosen, and why.
 
     Raises:
-        InputError: the margin is none, or the trajectory does not fit the robot.
+        InputError: the margin is none, the trajectory does not fit the robot, there is no such engine,
+            or no C compiler for it.
     """
 
     def __init__(
@@ -49,6 +60,8 @@ class Run:
         near_singular: float = NEAR_SINGULAR,
         following: Following | None = None,
         block_samples: int = BLOCK_SAMPLES,
+        engine: str = "numpy",
+        threads: int | None = None,
     ) -> None:
         check_near_singular(near_singular)
         check_fit(robot, trajectory)
@@ -58,8 +71,12 @@ class Run:
         self._near_singular = near_singular
         self._block_samples = block_samples
         self._following = following
+        frame = None if trajectory.wrench is None else trajectory.wrench.frame
+        kernel = InverseDynamics(robot, frame, near_singular, following is not None)
+        self.choice = choose(engine, kernel, trajectory.samples, threads)
         self._tallies = [JointTally(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if following is None else _drift_tallies(robot, following)
+        self._energy = RunEnergy(robot)
         self._spring_residual = 0.0
         self._samples = 0
 
@@ -68,23 +85,22 @@ class Run:
             stop = min(start + self._block_samples, self.trajectory.samples)
             motion = self.trajectory.block(start, stop)
             followed = None if self._following is None else self._following.at(motion.time)
-            block = compute_block(self.robot, motion, self._near_singular, followed)
+            block = compute_block(self.robot, motion, self._near_singular, followed, self.choice.engine)
             infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
             if self._stop_on_infeasible and infeasible.any():
-                block = _shortened(block, int(infeasible.argmax()) + 1)
-                self._add(block)
-                yield block
+                yield self._added(_shortened(block, int(infeasible.argmax()) + 1))
                 return
-            self._add(block)
-            yield block
+            yield self._added(block)
 
-    def _add(self, block: Block) -> None:
+    def _added(self, block: Block) -> Block:
+        """The block with the energy that the motors have spent, once it is merged into the report."""
         self._samples += len(block.time)
         self._spring_residual = float(np.maximum(self._spring_residual, spring_residual(self.robot, block)))
         for tally in self._tallies:
             tally.add(block)
         for drift in self._drifts:
             drift.add(block)
+        return replace(block, motor_energy=self._energy.add(block))
 
     def report(self) -> Report:
         """The verdict on the blocks so far, with the self-check of the whole."""
@@ -96,8 +112,9 @@ class Run:
             complete=self._samples == self.trajectory.samples,
             warnings=(*self.robot.warnings, *self.trajectory.warnings),
             self_check=self._self_check(),
-            joints=tuple(tally.report() for tally in self._tallies),
+            joints=tuple(map(JointTally.report, self._tallies, self._energy.report())),
             drifts=tuple(drift.report() for drift in self._drifts),
+            fits=self.trajectory.fits,
         )
 
     def _self_check(self) -> SelfCheck:
@@ -106,43 +123,42 @@ class Run:
         return SelfCheck(self._spring_residual, ladder(self.robot, self.trajectory), bound)
 
 
-@dataclass(frozen=True)
-class Result(Block):
-    """Every variable over the whole trajectory, and the report on it."""
-
-    report: Report = field(kw_only=True)
-    joint_names: tuple[str, ...] = field(kw_only=True)
-
-
 def inverse_dynamics(
     robot: Robot,
     trajectory: Trajectory,
     *,
     stop_on_infeasible: bool = False,
     following: Following | None = None,
+    engine: str = "numpy",
 ) -> Result:
     """Motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
 
-    Pure: prints nothing, writes nothing.
+    Pure: prints nothing, writes nothing; but compiled code is kept in the user's cache folder.
 
     Args:
         robot: the robot, from `load_robot` or built in Python.
         trajectory: for this robot, from `load_trajectory` or `Trajectory.from_samples`.
         stop_on_infeasible: end with the first infeasible step.
         following: deflections to use, by `follow`, instead of the root of (14) at each step.
+        engine: what computes, one of `vsacli.engine.NAMES`: "numpy", compiled "c", or "auto", which takes the
+            latter where that saves time.
 
     Returns:
         Every variable of `vsacli.variables.Block` over (samples, joints[, 2]); `report` holds the verdict.
 
     Raises:
         InputError: the trajectory has another number of joints than the robot, or no stiffness for a joint
-            that needs one.
+            that needs one; there is no such engine, or no C compiler for it.
     """
-    run = Run(robot, trajectory, stop_on_infeasible=stop_on_infeasible, following=following)
+    from vsacli.result import Result
+
+    run = Run(robot, trajectory, stop_on_infeasible=stop_on_infeasible, following=following, engine=engine)
     return Result(**_joined(list(run)), report=run.report(), joint_names=robot.joint_names)
 
 
 def _drift_tallies(robot: Robot, following: Following) -> list[DriftTally]:
+    from vsacli.drift import DriftTally
+
     pairs = zip(robot.joints, following.stops, strict=True)
     return [
         DriftTally(joint, joint.actuator, index, stop)
@@ -155,7 +171,7 @@ def _shortened(block: Block, samples: int) -> Block:
     return Block(**{name: array[:samples] for name, array in block.arrays().items()})
 
 
-def _joined(blocks: list[Block]) -> dict[str, npt.NDArray[Any]]:
+def _joined(blocks: list[Block]) -> dict[str, AnyArray]:
     """Blocks one after the other, samples contiguous."""
     rows = [{name: np.moveaxis(array, 0, -1) for name, array in block.arrays().items()} for block in blocks]
     return {

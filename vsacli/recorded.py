@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +11,18 @@ from pathlib import Path
 import numpy as np
 
 from vsacli.arrays import FloatArray
-from vsacli.columns import JOINT_SIGNALS, SIGNALS, TIME, Layout, column_layout
+from vsacli.columns import JOINT_SIGNALS, SIGNALS, Column, Layout, column_layout
 from vsacli.errors import InputError, Problem
-from vsacli.profiles import Signal
-from vsacli.samples import SampledProfile, SampleProblem, time_problems, value_problems
+from vsacli.profiles import WRENCH, Signal
+from vsacli.samples import SampledProfile, SampleProblem, Samples, time_problems, value_problems
 from vsacli.spec.source import Source
-from vsacli.spec.table import Table, line_of, read_table
+from vsacli.spec.table import Lines, Table, read_table
 from vsacli.times import RecordedTimes
 from vsacli.trajectory import Trajectory
+from vsacli.wrench import WRENCH_AXES
+
+DEFAULT_FITS: Mapping[Signal, str | None] = dict.fromkeys(JOINT_SIGNALS)
+"""Position and stiffness, each fitted as its noise asks for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +34,14 @@ class Recording:
         profiles: one for each signal that was asked for, in that order.
         warnings: what of the file is not used.
         source: the file.
+        lines: those of its rows.
     """
 
     times: RecordedTimes
     profiles: tuple[SampledProfile, ...]
     warnings: tuple[str, ...]
     source: Source
+    lines: Lines
 
     def check_times(self, other: Recording) -> None:
         """Refuse another recording that is to be combined with this one if its times differ.
@@ -48,7 +55,7 @@ class Recording:
         if differ.any():
             row = int(np.argmax(differ))
             message = f"time is {there[row]} s, but {here[row]} s in the same row of {self.source.path}"
-            raise InputError.one(message, other.source.path, line_of(row))
+            raise InputError.one(message, other.source.path, other.lines.of(row))
         if len(here) != len(there):
             message = f"the file has {len(there)} rows, but {self.source.path} has {len(here)}"
             raise InputError.one(message, other.source.path)
@@ -56,83 +63,98 @@ class Recording:
 
 def read_recording(
     path: str | os.PathLike[str],
-    joint_names: Sequence[str],
-    wanted: Sequence[Signal] = JOINT_SIGNALS,
+    joints: Mapping[str, str],
+    wanted: Mapping[Signal, str | None] = DEFAULT_FITS,
     without_stiffness: Collection[str] = (),
+    *,
+    resampled: bool = False,
 ) -> Recording:
     """Read signals from a CSV file.
 
     Args:
         path: a file with the columns `time` and those of `column_layout`.
-        joint_names: from the base to the tip.
-        wanted: the signals to read.
+        joints: names with types, from the base to the tip.
+        wanted: the signals to read, each with the method of its fit as in `fit_samples`.
         without_stiffness: joints for which no stiffness is read.
+        resampled: whether the steps will be other times than the recorded ones.
 
     Raises:
         InputError: with file and line of everything that does not fit.
     """
     table = read_table(path)
     file = table.source.path
-    layout = column_layout(table.columns, joint_names, wanted, file, without_stiffness)
-    time = np.ascontiguousarray(table.values[:, table.columns.index(TIME)])
-    profiles = tuple(
-        _profile(signal, signal.components or len(joint_names), time, table, layout) for signal in wanted
-    )
+    signals = tuple(wanted)
+    layout = column_layout(table.columns, joints, signals, file, table.header_line, without_stiffness)
+    time = _si(table, layout.time)
+    records = [_samples(signal, tuple(joints), time, table, layout) for signal in signals]
 
-    problems = [
-        *time_problems(time),
-        *(problem for profile in profiles for problem in value_problems(profile)),
-    ]
+    problems = [*time_problems(time), *(problem for record in records for problem in value_problems(record))]
     if problems:
         raise InputError(_located(problem, table, layout) for problem in problems)
-    warnings = tuple(f"{file}: {clause}" for clause in _unused(table, layout, wanted))
-    return Recording(RecordedTimes(time), profiles, warnings, table.source)
+    warnings = tuple(f"{file}: {clause}" for clause in _unused(layout, signals))
+    source, lines = table.source, table.lines
+    del table  # as large as the records, which may be fitted now
+    profiles = tuple(
+        SampledProfile.of(record, wanted[record.signal], resampled=resampled) for record in records
+    )
+    return Recording(RecordedTimes(time), profiles, warnings, source, lines)
 
 
-def _unused(table: Table, layout: Layout, wanted: Sequence[Signal]) -> Iterator[str]:
+def _unused(layout: Layout, wanted: Sequence[Signal]) -> Iterator[str]:
     for signal in SIGNALS:
-        if signal not in wanted and any(layout.get(name) for name in signal.names):
+        if signal not in wanted and any(layout.quantities.get(name) for name in signal.names):
             yield f"its columns of {signal.names[0]} are not used"
-    used = {TIME, *(table.columns[column] for columns in layout.values() for column in columns.values())}
-    if left := [column for column in table.columns if column not in used]:
-        yield f"not used: {', '.join(left)}; only antagonistic joints take a stiffness"
+    if layout.unused:
+        yield f"not used: {', '.join(layout.unused)}; only antagonistic joints take a stiffness"
 
 
-def _profile(
-    signal: Signal, components: int, time: FloatArray, table: Table, layout: Layout
-) -> SampledProfile:
+def _samples(
+    signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: Table, layout: Layout
+) -> Samples:
+    labels = WRENCH_AXES if signal is WRENCH else joint_names
     values, *derivatives = (
-        _rows(table, layout[name], components) if name in layout else None for name in signal.names
+        _rows(table, layout.quantities[name], len(labels)) if name in layout.quantities else None
+        for name in signal.names
     )
     assert values is not None, "columns of values are required"
-    return SampledProfile(signal=signal, time=time, values=values, derivatives=tuple(derivatives))
+    return Samples(signal=signal, time=time, values=values, derivatives=tuple(derivatives), labels=labels)
 
 
-def _rows(table: Table, columns: Mapping[int, int], components: int) -> FloatArray:
+def _rows(table: Table, columns: Mapping[int, Column], components: int) -> FloatArray:
     """(components, samples), NaN where a component has no column."""
     rows = np.full((components, len(table.values)), np.nan)
     for component, column in columns.items():
-        rows[component] = table.values[:, column]
+        rows[component] = _si(table, column)
     return rows
 
 
+def _si(table: Table, column: Column) -> FloatArray:
+    """A column in SI; divided rather than multiplied where that is exact, so that 3 ms are 0.003 s."""
+    values = np.ascontiguousarray(table.values[:, column.index])
+    divisor = round(1 / column.factor)
+    if divisor > 1 and math.isclose(divisor * column.factor, 1, rel_tol=1e-14):
+        return values / divisor
+    with np.errstate(over="ignore"):  # infinite is a problem of its own
+        return values * column.factor
+
+
 def _located(problem: SampleProblem, table: Table, layout: Layout) -> Problem:
-    line = 0 if problem.sample is None else line_of(problem.sample)
+    line = 0 if problem.sample is None else table.line_of(problem.sample)
     column = (
-        problem.quantity if problem.joint is None else table.columns[layout[problem.quantity][problem.joint]]
+        problem.quantity if problem.joint is None else layout.quantities[problem.quantity][problem.joint].name
     )
     return Problem(table.source.path, line, f"{column} {problem.message}")
 
 
 def recorded_trajectory(
-    path: str | os.PathLike[str], joint_names: Sequence[str], without_stiffness: Collection[str] = ()
+    path: str | os.PathLike[str], joints: Mapping[str, str], without_stiffness: Collection[str] = ()
 ) -> Trajectory:
     """A trajectory whose position and stiffness come from one CSV file, named after the file.
 
     Raises:
         InputError: as `read_recording`.
     """
-    recording = read_recording(path, joint_names, without_stiffness=without_stiffness)
+    recording = read_recording(path, joints, without_stiffness=without_stiffness)
     position, stiffness = recording.profiles
     return Trajectory(
         recording.times,

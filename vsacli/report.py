@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vsacli.flags import LIMITS, Flag
-from vsacli.following import Stop
 from vsacli.self_check import LADDER_BOUND, SelfCheck
+
+if TYPE_CHECKING:
+    from vsacli.energy import JointEnergy
+    from vsacli.following import Stop
 
 FORMAT = "vsacli-report/1"
 
@@ -25,8 +27,7 @@ COUNTED = {
 """Kinds of trouble whose steps are counted, and the bits that make them."""
 
 
-@dataclass(frozen=True)
-class Worst:
+class Worst(NamedTuple):
     """The worst step of a kind of trouble: when, what value, against which bound.
 
     `bound` is NaN where the elastic torque itself cannot be carried; `motor` is 1, 2 or None.
@@ -45,8 +46,7 @@ class Worst:
         return entry if self.motor is None else {**entry, "motor": self.motor}
 
 
-@dataclass(frozen=True)
-class JointReport:
+class JointReport(NamedTuple):
     """What a run found at one joint; torques in N m (N), stiffness in N m/rad (N/m).
 
     Attributes:
@@ -67,6 +67,7 @@ class JointReport:
         torque_step: |tau_motor - tau_spring| at the first step: by how much the torque that holds the motor
             at rest must jump there; NaN at a rigid joint, where tau_e may jump as well.
         other_preload: whether every infeasible step could be done with the opposite preload.
+        energy: work of the motors, elastic energy, co-contraction.
     """
 
     name: str
@@ -84,6 +85,7 @@ class JointReport:
     start_theta: tuple[float, float]
     torque_step: tuple[float, float]
     other_preload: bool
+    energy: JointEnergy
 
     def as_json(self) -> dict[str, Any]:
         """Plain values under the published keys."""
@@ -99,11 +101,11 @@ class JointReport:
             "peak": {"tau_e": self.peak_tau_e, "tau_motor": list(self.peak_tau_motor)},
             "start": {"theta": list(self.start_theta), "torque_step": list(self.torque_step)},
             "other_preload": self.other_preload,
+            "energy": self.energy.as_json(),
         }
 
 
-@dataclass(frozen=True)
-class JointDrift:
+class JointDrift(NamedTuple):
     """What became of the followed deflections of a joint.
 
     Attributes:
@@ -131,8 +133,7 @@ class JointDrift:
         }
 
 
-@dataclass(frozen=True)
-class Report:
+class Report(NamedTuple):
     """The verdict on a run.
 
     Attributes:
@@ -145,6 +146,7 @@ class Report:
         self_check: outcome of the self-check.
         joints: one report a joint.
         drifts: one a joint if the deflections were followed by integration, else none.
+        fits: what is known of the splines that recorded samples were replaced by, plain values.
     """
 
     robot: str
@@ -154,8 +156,9 @@ class Report:
     complete: bool
     self_check: SelfCheck
     joints: tuple[JointReport, ...]
-    warnings: tuple[str, ...] = field(default=())
-    drifts: tuple[JointDrift, ...] = field(default=())
+    warnings: tuple[str, ...] = ()
+    drifts: tuple[JointDrift, ...] = ()
+    fits: tuple[dict[str, Any], ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -178,6 +181,7 @@ class Report:
                 "duration": self.duration,
                 "complete": self.complete,
                 "warnings": list(self.warnings),
+                "fits": list(self.fits),
                 "self_check": {
                     "passed": check.passed,
                     "spring_residual": check.spring_residual,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from vsacli.energy import JointEnergy
 from vsacli.flags import Flag
 from vsacli.report import JointDrift, JointReport, Report, Worst
 from vsacli.self_check import LADDER_BOUND
@@ -18,8 +19,8 @@ QUANTITY_OF_LIMIT = {
     Flag.VELOCITY_LIMIT.label: "velocity",
     Flag.STIFFNESS_LIMIT.label: "stiffness",
     Flag.DEFLECTION_LIMIT.label: "deflection of spring",
-    Flag.MOTOR_VELOCITY_LIMIT.label: "velocity of motor",
-    Flag.MOTOR_TORQUE_LIMIT.label: "torque of motor",
+    Flag.MOTOR_VELOCITY_LIMIT.label: "joint-side velocity of motor",
+    Flag.MOTOR_TORQUE_LIMIT.label: "joint-side torque of motor",
 }
 
 TROUBLE = ("infeasible", "singular", "over_limit")
@@ -36,6 +37,7 @@ def render(report: Report) -> str:
             *(sentence for joint in report.joints for sentence in sentences(joint)),
             *_stops(report),
             *_start(report),
+            *energy_lines([(joint.name, joint.type, joint.energy) for joint in report.joints]),
             *_drift(report),
             _self_check(report),
         ]
@@ -211,6 +213,24 @@ def _start_of(joint: JointReport) -> str:
     if any(map(math.isnan, positions)):
         return f"{joint.name} undefined (first step infeasible)"
     return f"{joint.name} {' '.join(f'{theta:+.4g}' for theta in positions)} {POSITION.unit(joint.type)}"
+
+
+def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str]:
+    """From names, types and energies of joints: sums, if all have them, and the joints with the most."""
+    energies = [energy for _, _, energy in joints]
+    if not any(math.isnan(energy.spent) for energy in energies):
+        spent, recovered = (
+            _number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
+        )
+        name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
+        held = f"springs hold up to {_number(most.elastic_peak)} J ({name})"
+        yield f"energy: motors spend {spent} J, take back {recovered} J; {held}"
+    paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
+    if paired:
+        name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
+        unit = TORQUE.unit(joint_type)
+        effort, load = f"{_number(most.co_contraction)} {unit}", f"{_number(most.load)} {unit}"
+        yield f"co-contraction: up to {effort} rms for each motor ({name}), its load takes {load}"
 
 
 def _stops(report: Report) -> Iterator[str]:

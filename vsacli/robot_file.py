@@ -7,7 +7,6 @@ import os
 from dataclasses import dataclass
 
 from vsacli.errors import InputError
-from vsacli.modified_dh import as_standard
 from vsacli.robot import Robot
 from vsacli.spec.fields import choice, declared
 from vsacli.spec.reading import read_document
@@ -29,7 +28,11 @@ class RobotFile(Robot):
     def robot(self) -> Robot:
         """The robot, with standard rows and link frames whatever the convention of the file."""
         robot = Robot(**{name: getattr(self, name) for name in declared(Robot)}, sources=self.sources)
-        return as_standard(robot) if self.convention == "modified" else robot
+        if self.convention == "standard":
+            return robot
+        from vsacli.modified_dh import as_standard
+
+        return as_standard(robot)
 
 
 def load_robot(path: str | os.PathLike[str]) -> Robot:

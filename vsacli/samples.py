@@ -1,44 +1,48 @@
-"""Profiles through recorded samples: columns that are given, and an interpolating spline for the others."""
+"""Recorded samples of a signal, and the profile they make: given columns, and a fit for the others."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from vsacli.arrays import BoolArray, FloatArray, by_joint
 from vsacli.errors import InputError
+from vsacli.fits import Fit, fit_samples, mismatches
+from vsacli.fits.wording import describe, fit_sentences
 from vsacli.profiles import Signal
+from vsacli.profiles.closed_form import LONGEST, SHORTEST
 from vsacli.times import stretch
 
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
+LARGEST = 1e100
+"""Values beyond are no motion of a robot, and their squares, which a fit takes, would overflow."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class SampledProfile:
-    """A signal known at recorded times; `time_problems` and `value_problems` check what it rests on.
+class Samples:
+    """A signal at recorded times; `time_problems` and `value_problems` say what keeps it from being used.
 
     Attributes:
         signal: what is described.
         time: (samples,) in s.
         values: (components, samples); NaN throughout if the signal is optional and a component has none.
         derivatives: for each derivative of the signal the given values, (components, samples), or None.
+        labels: what the components are called in sentences.
     """
 
     signal: Signal
     time: FloatArray = field(repr=False)
     values: FloatArray = field(repr=False)
     derivatives: tuple[FloatArray | None, ...] = field(repr=False)
+    labels: tuple[str, ...]
 
     @classmethod
     def from_arrays(
         cls, signal: Signal, time: FloatArray, values: npt.ArrayLike, *derivatives: npt.ArrayLike | None
-    ) -> SampledProfile:
+    ) -> Samples:
         """From arrays of the shape (samples, components).
 
         Raises:
@@ -50,54 +54,38 @@ class SampledProfile:
             None if array is None else _checked_rows(name, array, len(time), len(rows))
             for name, array in zip(names, derivatives, strict=True)
         )
-        return cls(signal=signal, time=time, values=rows, derivatives=further)
+        labels = tuple(f"column {index}" for index in range(len(rows)))
+        return cls(signal=signal, time=time, values=rows, derivatives=further, labels=labels)
 
     @property
-    def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
-        return len(self.values)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Which derivatives were not given."""
-        value, *names = self.signal.names
-        missing = [name for name, given in zip(names, self.derivatives, strict=True) if given is None]
-        if not missing:
-            return ()
-        verb = "comes" if len(missing) == 1 else "come"
-        smoothness = self.signal.spline_degree - 1
-        return (f"{', '.join(missing)} {verb} from a C{smoothness} spline through {value}",)
-
-    @cached_property
-    def breakpoints(self) -> FloatArray:
-        """Knots of the spline: the samples without the ones next to the ends ("not a knot")."""
-        margin = (self.signal.spline_degree + 1) // 2
-        return np.concatenate([self.time[:1], self.time[margin:-margin], self.time[-1:]])
-
-    @cached_property
-    def _spline(self) -> BSpline[np.float64]:
-        from scipy.interpolate import make_interp_spline
-
-        return make_interp_spline(self.time, self.values[self.given].T, k=self.signal.spline_degree)
-
-    @cached_property
     def given(self) -> BoolArray:
         """Which components have values, (components,)."""
         absent: BoolArray = np.all(np.isnan(self.values), axis=1)
         return ~absent if self.signal.optional else np.ones_like(absent)
 
-    def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
-        """Value and derivatives at the samples start..stop-1: what was given, and for the rest the spline."""
-        if any(given is None for given in self.derivatives):
-            rows = self.at(time)
-        else:
-            rows = np.empty((self.signal.orders, self.components, len(time)))
-        for row, given in zip(rows, (self.values, *self.derivatives), strict=True):
-            if given is not None:
-                row[:] = given[:, start:stop]
-        return rows
+    @property
+    def complete(self) -> bool:
+        """Whether all derivatives are given."""
+        return all(given is not None for given in self.derivatives)
 
-    def stretched(self, factor: float) -> SampledProfile:
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """The derivatives that are not given."""
+        pairs = zip(self.signal.names[1:], self.derivatives, strict=True)
+        return tuple(name for name, given in pairs if given is None)
+
+    def doubts(self, fit: Fit, *, resampled: bool) -> Iterator[str]:
+        """Where numbers at the steps come from, and given derivatives that play no part or do not follow."""
+        value, *names = self.signal.names
+        yield from fit_sentences(value, names if resampled else self.missing, self.labels, self.time, fit)
+        unused = [name for name in names if name not in self.missing]
+        if not resampled:
+            yield from mismatches(self.signal.names, self.labels, self.time, self.derivatives, fit)
+        elif unused:
+            verb = "plays" if len(unused) == 1 else "play"
+            yield f"the given {', '.join(unused)} {verb} no part, since the steps are resampled"
+
+    def stretched(self, factor: float) -> Samples:
         """The same values further apart; what was given of derivatives becomes smaller."""
         derivatives = tuple(
             None if given is None else given / factor**order
@@ -105,26 +93,91 @@ class SampledProfile:
         )
         return replace(self, time=stretch(self.time, self.time[0], factor), derivatives=derivatives)
 
-    def at(self, time: FloatArray) -> FloatArray:
-        """The spline and its derivatives at any times of the span, shape (orders, components, samples).
 
-        Within a knot span one polynomial is evaluated, so that neighbouring values share their rounding
-        error; evaluating derivatives of B-splines point by point leaves noise of about eps / step^order.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SampledProfile:
+    """A signal known at recorded times.
+
+    At these times its derivatives are the given ones, and those of a fit where none are given; its values are
+    the samples where all derivatives are given or the fit goes through the samples, else those of the fit.
+
+    Attributes:
+        record: what was recorded.
+        fit: of the values.
+        resampled: whether the steps are not the recorded times; only the fit counts then.
+        warnings: where the numbers come from, and given derivatives that do not follow from the values.
+    """
+
+    record: Samples
+    fit: Fit
+    resampled: bool = False
+    warnings: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, record: Samples, method: str | None = None, *, resampled: bool = False) -> SampledProfile:
+        """Fit samples that have no problems.
+
+        Args:
+            record: the samples.
+            method: "lsq", "interpolate", or None to decide by their noise; see `fit_samples`.
+            resampled: whether the steps are not the recorded times.
         """
-        degree, knots = self.signal.spline_degree, self.breakpoints
-        span = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
-        used, which = np.unique(span, return_inverse=True)
-        offset = time - knots[span]
-        taylor = [self._spline(knots[used], nu=order).T[:, which] for order in range(degree + 1)]
+        signal = record.signal
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # a range of 1e100 in 1e-30 s is judged by the robot
+            fit = fit_samples(record.time, record.values, signal.spline_degree, signal.orders - 1, method)
+            warnings = tuple(record.doubts(fit, resampled=resampled))
+        return cls(record=record, fit=fit, resampled=resampled, warnings=warnings)
 
-        rows = np.full((self.signal.orders, self.components, len(time)), np.nan)
-        for order, row in enumerate(rows):
-            total = taylor[degree].copy()
-            for power in range(degree - order, 0, -1):
-                total *= offset / power
-                total += taylor[order + power - 1]
-            row[self.given] = total
+    @property
+    def signal(self) -> Signal:
+        """What is described."""
+        return self.record.signal
+
+    @property
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+        return len(self.record.values)
+
+    @property
+    def fitted(self) -> bool:
+        """Whether any number at the steps comes from the fit."""
+        return self.resampled or not self.record.complete
+
+    def summary(self) -> dict[str, Any] | None:
+        """The fit in plain values, for the report: see `describe`; None if nothing comes from it."""
+        return describe(self.record.signal.names[0], self.record.labels, self.fit) if self.fitted else None
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """Ascending times between which the fit is analytic; the first and last are its span."""
+        return self.fit.breakpoints if self.fit.parts else self.record.time[[0, -1]]
+
+    def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
+        """Value and derivatives at the samples start..stop-1: what was given, and for the rest the fit."""
+        record = self.record
+        if self.resampled:
+            return self.at(time)
+        if record.complete:
+            rows = np.empty((record.signal.orders, self.components, len(time)))
+            exact = np.ones(self.components, dtype=bool)
+        else:
+            rows = self.at(time)
+            exact = self.fit.exact
+        rows[0, exact] = record.values[exact, start:stop]
+        for row, given in zip(rows[1:], record.derivatives, strict=True):
+            if given is not None:
+                row[:] = given[:, start:stop]
         return rows
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """The fit and its derivatives at any times of the span, shape (orders, components, samples)."""
+        return self.fit.at(time, self.record.signal.orders)
+
+    def stretched(self, factor: float) -> SampledProfile:
+        """The same course, slower by a factor; the warnings are those about the record."""
+        return replace(self, record=self.record.stretched(factor), fit=self.fit.stretched(factor))
 
 
 def checked_array(name: str, array: npt.ArrayLike, *shape: int | None) -> FloatArray:
@@ -171,23 +224,29 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
         sample = int(np.argmin(rising)) + 1
         message = f"must increase strictly, but {time[sample]} s follows {time[sample - 1]} s"
         yield SampleProblem("time", message, sample=sample)
+    elif len(time) > 1 and not SHORTEST <= time[-1] - time[0] <= LONGEST:
+        yield SampleProblem(
+            "time", f"must go on for {SHORTEST:g} to {LONGEST:g} s, not {time[-1] - time[0]:g} s"
+        )
 
 
-def value_problems(profile: SampledProfile) -> Iterator[SampleProblem]:
+def value_problems(samples: Samples) -> Iterator[SampleProblem]:
     """What keeps these values from being used: too few, or not finite, or not positive where they must be."""
-    signal, degree = profile.signal, profile.signal.spline_degree
-    name, count = signal.names[0], len(profile.time)
+    signal, degree = samples.signal, samples.signal.spline_degree
+    name, count = signal.names[0], len(samples.time)
     if count <= degree:
         yield SampleProblem(
             name, f"needs at least {degree + 1} samples for a C{degree - 1} spline, not {count}"
         )
-    given = np.flatnonzero(profile.given).tolist()
-    for column, rows in zip(signal.names, (profile.values, *profile.derivatives), strict=True):
+    given = np.flatnonzero(samples.given).tolist()
+    for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
         for joint, row in () if rows is None else zip(given, rows[given], strict=True):
-            yield from _breach(column, joint, profile.time, row, np.isfinite(row), "finite")
+            yield from _breach(column, joint, samples.time, row, np.isfinite(row), "finite")
+            small = ~(np.isfinite(row) & (np.abs(row) > LARGEST))
+            yield from _breach(column, joint, samples.time, row, small, f"at most {LARGEST:g} in size")
     if signal.positive:
-        for joint, row in zip(given, profile.values[given], strict=True):
-            yield from _breach(name, joint, profile.time, row, ~(row <= 0), "positive")
+        for joint, row in zip(given, samples.values[given], strict=True):
+            yield from _breach(name, joint, samples.time, row, ~(row <= 0), "positive")
 
 
 def _breach(

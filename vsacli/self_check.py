@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -62,8 +61,7 @@ SMALL_JOINT = 1e-3
 but rounding of the larger torques."""
 
 
-@dataclass(frozen=True)
-class SelfCheck:
+class SelfCheck(NamedTuple):
     """Outcome of the self-check.
 
     Attributes:

@@ -9,6 +9,7 @@ import numpy as np
 
 from vsacli.actuation import other_preload_would_do
 from vsacli.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.energy import JointEnergy
 from vsacli.feasibility import TOUCHING, excess, has, limit_checks, margin
 from vsacli.report import COUNTED, JointReport, Worst
 from vsacli.robot import Antagonistic, Joint, Rigid
@@ -64,8 +65,8 @@ class JointTally:
             demand = block.tau_e[beyond, index], stiffness[beyond]
             self._other_preload = bool(other_preload_would_do(actuator, *demand).all())
 
-    def report(self) -> JointReport:
-        """What was found so far; at least one block must have been added."""
+    def report(self, energy: JointEnergy) -> JointReport:
+        """What was found so far, besides the energy; at least one block must have been added."""
         assert self._start is not None
         least, time, reachable = self._margin
         (theta_1, theta_2), (step_1, step_2) = self._start.tolist()
@@ -86,6 +87,7 @@ class JointTally:
             start_theta=(theta_1, theta_2),
             torque_step=(step_1, step_2),
             other_preload="infeasible" in self._worst and self._other_preload,
+            energy=energy,
         )
 
     def _count(self, flags: FlagArray, time: FloatArray) -> None:

@@ -101,14 +101,15 @@ class UniformTimes:
 
 @dataclass(frozen=True, eq=False)
 class RecordedTimes:
-    """Times that were given, (samples,) in s; see `time_problems` for what they must satisfy."""
+    """Times that are given one by one.
+
+    Attributes:
+        time: (samples,) in s; see `time_problems` for what they must satisfy.
+        warnings: what the user should know about them.
+    """
 
     time: FloatArray = field(repr=False)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Nothing: they are what they are."""
-        return ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def span(self) -> tuple[float, float]:
@@ -127,6 +128,19 @@ class RecordedTimes:
     def stretched(self, factor: float) -> RecordedTimes:
         """As many steps, further apart."""
         return RecordedTimes(stretch(self.time, self.time[0], factor))
+
+
+def uniform_times_over(span: tuple[float, float], rate: float) -> RecordedTimes:
+    """Equally spaced times from the first to the last of a span, in s, at about `rate` per second.
+
+    Raises:
+        InputError: the rate is not possible.
+    """
+    first, last = span
+    uniform = UniformTimes(last - first, rate)
+    time = first + uniform.block(0, uniform.samples)
+    time[-1] = last
+    return RecordedTimes(time, uniform.warnings)
 
 
 def stretch(time: _Time, first: float, factor: float) -> _Time:

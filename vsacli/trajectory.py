@@ -5,19 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from vsacli.arrays import BoolArray, FloatArray, over_time
 from vsacli.errors import InputError, Problem
 from vsacli.motion import Motion
 from vsacli.profiles import POSITION, STIFFNESS, WRENCH, Constant, Signal
-from vsacli.samples import SampledProfile, checked_array, time_problems, value_problems
 from vsacli.spec.source import Source
 from vsacli.times import RecordedTimes, Times
 from vsacli.wrench import WRENCH_AXES, Wrench, check_frame
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from vsacli.samples import Samples
 
 
 class Profile(Protocol):
@@ -43,6 +46,9 @@ class Profile(Protocol):
 
     def stretched(self, factor: float) -> Profile:
         """The same course, slower by a factor, from the same first time on."""
+
+    def summary(self) -> dict[str, Any] | None:
+        """The spline that values at the steps come from, in plain values; None if they come from none."""
 
 
 @dataclass(frozen=True)
@@ -125,29 +131,30 @@ class Trajectory:
     @classmethod
     def from_samples(
         cls,
-        time: npt.ArrayLike,
-        q: npt.ArrayLike,
-        stiffness: npt.ArrayLike | None = None,
+        time: ArrayLike,
+        q: ArrayLike,
+        stiffness: ArrayLike | None = None,
         *,
-        dq: npt.ArrayLike | None = None,
-        ddq: npt.ArrayLike | None = None,
-        d3q: npt.ArrayLike | None = None,
-        d4q: npt.ArrayLike | None = None,
-        dstiffness: npt.ArrayLike | None = None,
-        ddstiffness: npt.ArrayLike | None = None,
-        wrench: npt.ArrayLike | None = None,
-        dwrench: npt.ArrayLike | None = None,
-        ddwrench: npt.ArrayLike | None = None,
+        dq: ArrayLike | None = None,
+        ddq: ArrayLike | None = None,
+        d3q: ArrayLike | None = None,
+        d4q: ArrayLike | None = None,
+        dstiffness: ArrayLike | None = None,
+        ddstiffness: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+        dwrench: ArrayLike | None = None,
+        ddwrench: ArrayLike | None = None,
         wrench_frame: str = "end_effector",
+        fit: str | None = None,
         name: str = "samples",
     ) -> Trajectory:
         """A trajectory through samples; derivatives that are given are used at the samples as they are.
 
-        Those that are not come from a spline through the values: degree 5 (C4) for q, cubic (C2) for the
-        stiffness and the wrench. `at` evaluates these splines in any case.
+        Those that are not come from splines: degree 7 (C6) for q, degree 5 (C4) for the stiffness and the
+        wrench. `at` evaluates these splines in any case.
 
         Args:
-            time: (samples,) in s, strictly increasing, at least 6.
+            time: (samples,) in s, strictly increasing, at least 8.
             q: position, (samples, joints), rad (m), as are its derivatives per s^k.
             stiffness: joint stiffness, (samples, joints), N m/rad (N/m), as are its derivatives per s^k. Only
                 that of antagonistic joints counts; others may have NaN, and None will do if there are none.
@@ -162,23 +169,33 @@ class Trajectory:
             dwrench: first derivative of its components.
             ddwrench: second derivative of its components.
             wrench_frame: along whose axes the components are, "end_effector" or "base".
+            fit: the splines, "interpolate": through the samples, or "lsq": near noisy ones by least squares,
+                with knots by generalised cross-validation; then the values are those of the spline too. By
+                default what the noise of each column asks for, see `vsacli.fits.fit_samples`.
             name: used in reports and for the name of the result file.
 
         Raises:
-            InputError: naming each array that does not fit, by index.
+            InputError: `fit` is no such word; or naming each array that does not fit, by index.
         """
+        from vsacli.fits import METHODS
+        from vsacli.samples import SampledProfile, Samples, checked_array, time_problems, value_problems
+
+        if fit not in (None, *METHODS):
+            raise InputError.one(f"fit must be one of {', '.join(METHODS)}, not {fit!r}")
         times = checked_array("time", time, None)
-        position = SampledProfile.from_arrays(POSITION, times, q, dq, ddq, d3q, d4q)
+        position = Samples.from_arrays(POSITION, times, q, dq, ddq, d3q, d4q)
         stiffnesses = _recorded(STIFFNESS, times, stiffness, dstiffness, ddstiffness)
         wrenches = _recorded(WRENCH, times, wrench, dwrench, ddwrench)
-        profiles = [position, *stiffnesses, *wrenches]
-        problems = [*time_problems(times), *(found for part in profiles for found in value_problems(part))]
+        records = [position, *stiffnesses, *wrenches]
+        problems = [*time_problems(times), *(found for part in records for found in value_problems(part))]
         if problems:
             raise InputError(Problem("", 0, str(problem)) for problem in problems)
-        exerted = WrenchProfile(wrenches[0], wrench_frame) if wrenches else None
+        profiles = {record.signal: SampledProfile.of(record, fit) for record in records}
+        exerted = WrenchProfile(profiles[WRENCH], wrench_frame) if wrenches else None
         recorded = RecordedTimes(times)
-        chosen = stiffnesses[0] if stiffnesses else no_stiffness(position.components, recorded)
-        return cls(recorded, position, chosen, wrench=exerted, name=name)
+        moving = profiles[POSITION]
+        chosen = profiles[STIFFNESS] if stiffnesses else no_stiffness(moving.components, recorded)
+        return cls(recorded, moving, chosen, wrench=exerted, name=name)
 
     @property
     def joints(self) -> int:
@@ -218,6 +235,12 @@ class Trajectory:
         wrench = Wrench(*map(over_time, rows(self.wrench.profile)), frame=self.wrench.frame)
         return Motion(time, *commanded, wrench=wrench)
 
+    @property
+    def fits(self) -> tuple[dict[str, Any], ...]:
+        """What is known of the splines that its steps come from, see `SampledProfile.summary`."""
+        summaries = (profile.summary() for _, profile in self._profiles())
+        return tuple(summary for summary in summaries if summary is not None)
+
     def stretched(self, factor: float) -> Trajectory:
         """Position, stiffness and wrench slower by a factor; steps at a uniform rate keep their rate."""
         return Trajectory(
@@ -232,7 +255,8 @@ class Trajectory:
     @property
     def breakpoints(self) -> FloatArray:
         """Ascending times between which all its functions are analytic; the first and last are its span."""
-        return np.unique(np.concatenate([profile.breakpoints for _, profile in self._profiles()]))
+        times = np.sort(np.concatenate([profile.breakpoints for _, profile in self._profiles()]))
+        return times[np.append(True, np.diff(times) > 0)]  # np.unique would import numpy.ma
 
     def check_points(self, count: int) -> tuple[FloatArray, FloatArray]:
         """`count` times all over the span at which the derivatives can be checked by finite differences.
@@ -258,11 +282,13 @@ def no_stiffness(joints: int, times: Times) -> Constant:
 
 
 def _recorded(
-    signal: Signal, times: FloatArray, values: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
-) -> list[SampledProfile]:
-    """The profile through samples of a signal, if there are any."""
+    signal: Signal, times: FloatArray, values: ArrayLike | None, *derivatives: ArrayLike | None
+) -> list[Samples]:
+    """The samples of a signal, if there are any."""
+    from vsacli.samples import Samples
+
     if values is not None:
-        return [SampledProfile.from_arrays(signal, times, values, *derivatives)]
+        return [Samples.from_arrays(signal, times, values, *derivatives)]
     if any(given is not None for given in derivatives):
         name = signal.names[0]
         raise InputError.one(f"derivatives of a {name} are given, but not the {name}")

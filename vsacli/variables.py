@@ -8,12 +8,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
-
-import numpy.typing as npt
+from typing import Any, NamedTuple
 
 from vsacli import units
-from vsacli.arrays import FlagArray, FloatArray
+from vsacli.arrays import AnyArray, FlagArray, FloatArray
 from vsacli.errors import InputError, Problem
 from vsacli.suggestions import did_you_mean
 from vsacli.units import Quantity
@@ -25,8 +23,7 @@ COMPLIANT = (*VARIABLE_STIFFNESS, "elastic")
 EVERY_ACTUATOR = (*COMPLIANT, "rigid")
 
 
-@dataclass(frozen=True)
-class Variable:
+class Variable(NamedTuple):
     """What is declared of a result variable.
 
     Attributes:
@@ -70,20 +67,21 @@ def _of_joint(
     return _variable(("joint",), quantity, long_name, equation, actuators=actuators)
 
 
-def _of_motor(quantity: Quantity, long_name: str, equation: str) -> Any:
-    return _variable(("joint", "motor"), quantity, long_name, equation)
+def _of_motor(quantity: Quantity, long_name: str, equation: str, default: Any = dataclasses.MISSING) -> Any:
+    return _variable(("joint", "motor"), quantity, long_name, equation, default)
 
 
 def _of_wrench(quantity: Quantity, long_name: str) -> Any:
     return _variable(("wrench_axis",), quantity, long_name, "given", default=None)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Block:
     """Every variable over a block of consecutive steps; shapes (samples, joints) or (samples, joints, 2).
 
     A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have
-    is NaN throughout. The wrench, (samples, 6), is None if the trajectory has none.
+    is NaN throughout. The wrench, (samples, 6), is None if the trajectory has none, and `motor_energy`, which
+    sums over the steps before, until the block has its place in a run.
     """
 
     time: FloatArray = _variable((), units.TIME, "time", "given")
@@ -122,6 +120,17 @@ class Block:
     tau_spring: FloatArray = _of_motor(units.TORQUE, "torque of each transmission", "(62)")
     tau_motor: FloatArray = _of_motor(units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)")
 
+    elastic_energy: FloatArray = _of_joint(
+        units.ENERGY, "energy in the springs of the joint", "integral of (62)"
+    )
+    motor_power: FloatArray = _of_motor(units.POWER, "mechanical power of the motor", "tau_motor * dtheta")
+    motor_energy: FloatArray | None = _of_motor(
+        units.ENERGY,
+        "mechanical work of the motor since the first step",
+        "integral of motor_power",
+        default=None,
+    )
+
     det_A: FloatArray = _of_joint(  # noqa: N815  (the published name)
         units.DECOUPLING, "determinant of the decoupling block of the joint", "(67)", VARIABLE_STIFFNESS
     )
@@ -141,7 +150,7 @@ class Block:
         units.DIMENSIONLESS, "what is wrong with this step of the joint", "margins of (14)"
     )
 
-    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+    def arrays(self) -> dict[str, AnyArray]:
         """The variables there are, by name."""
         return {name: array for name in VARIABLES if (array := getattr(self, name)) is not None}
 

@@ -19,7 +19,7 @@ WRENCH_FRAMES = ("end_effector", "base")
 """Frames along whose axes the components may be given."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Wrench:
     """What the environment exerts on the end effector.
 

@@ -15,6 +15,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))  # the oracles and sam
 
 import actuation
 import commands
+import compiled
 import growth
 import kernel
 import page
@@ -36,6 +37,9 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     """Name and text of each part of the page, as it is found."""
     yield "machine", description() + "\n"
     yield "kernel", page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats))
+    yield "batches", page.batch_table(compiled.batches(SAMPLES, repeats))
+    yield "calls", page.call_sentence(compiled.single_calls())
+    yield "costs", page.cost_table(compiled.costs())
     yield "stages", page.stage_table(stages.split(SAMPLES, repeats))
     yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, repeats))
     yield "startup", page.startup_table(commands.startup(3 * repeats))

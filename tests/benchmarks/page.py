@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from actuation import JOINTS, Actuation
+from compiled import CALLS, SCALAR_FLAGS, Calls, Cost
 from growth import Growth
 from kernel import CASADI, Kernel
 from stages import Stages
@@ -34,6 +35,47 @@ def kernel_table(kernels: Iterable[Kernel]) -> str:
 
 def _differences(kernel: Kernel) -> str:
     return "-" if kernel.differences is None else ", ".join(f"{error:.0e}" for error in kernel.differences)
+
+
+def batch_table(taken: Seconds) -> str:
+    """Compiled batches, against casadi."""
+    header = ("7R arm, compiled", "threads", "µs a sample", "ratio")
+    rows = [
+        [*_way(name), micro(seconds), f"{seconds / taken[CASADI]:.2g}"] for name, seconds in taken.items()
+    ]
+    return table(header, rows)
+
+
+def _way(name: str) -> list[str]:
+    return [name, "1"] if name == CASADI else name.rsplit(", ", 1)
+
+
+def call_sentence(calls: Calls) -> str:
+    """How long single calls of generated code take."""
+    return (
+        f"{CALLS:,} single calls of the generated `inverse_dynamics`, 7R arm, `{' '.join(SCALAR_FLAGS)}`: median "
+        f"{calls.median:.2g} µs, 99.9 % below {calls.most:.2g} µs, the worst {calls.worst:.2g} µs, when the "
+        "operating system let something else run."
+    )
+
+
+def cost_table(costs: Mapping[int, Cost]) -> str:
+    """Size of the code, and the time that it takes to make it."""
+    header = ("joints", "operations", "code", "stack", "recording", "compiling")
+    return table(
+        header,
+        (
+            [
+                str(joints),
+                f"{cost.operations:,}",
+                f"{cost.code / 1e3:.0f} kB",
+                f"{cost.stack / 1e3:.1f} kB",
+                f"{cost.recording:.2f} s",
+                f"{cost.compiling:.1f} s",
+            ]
+            for joints, cost in costs.items()
+        ),
+    )
 
 
 def stage_table(stages: Stages) -> str:

@@ -9,19 +9,23 @@ import numpy as np
 
 from vsacli.actuation.transmission import Command, Transmission
 from vsacli.arrays import BoolArray, FloatArray
-from vsacli.feasibility import has, reach_flags
-from vsacli.flags import Flag
+from vsacli.decoupling_matrix import beta, determinant, solve, spring_state
+from vsacli.feasibility import Reach, reach
 from vsacli.robot import Antagonistic
 from vsacli.springs import PairSolution, make_pair
 
+Sides = tuple[FloatArray, FloatArray]
+"""A quantity of motor 1 or its spring, and of motor 2."""
 
-class _Springs(NamedTuple):
-    """Torques of the two springs and their derivatives at the deflections; arrays (2, samples)."""
 
-    tau: FloatArray
-    sigma: FloatArray
-    zeta: FloatArray
-    eta: FloatArray
+class Motors(NamedTuple):
+    """What the motors of a joint do; arrays (samples,), or any other kind of number."""
+
+    phi: Sides
+    dphi: Sides
+    ddtheta: Sides
+    tau_spring: Sides
+    det_A: FloatArray  # noqa: N815  (the published name)
 
 
 def transmit(
@@ -29,27 +33,44 @@ def transmit(
 ) -> Transmission:
     """Deflections on the actuator's branch, their rates, and motor accelerations; arguments as of `drive`."""
     solution = solve_deflections(actuator, command.tau_e, command.stiffness)
-    flags = reach_flags(command.stiffness, solution, near_singular)
-    phi = solution.deflections if followed is None else followed.copy()  # (61)
-    flags[np.isnan(phi[0])] |= np.uint16(Flag.INFEASIBLE)
-    phi[:, has(flags, Flag.INFEASIBLE)] = np.nan
-    springs = _springs(actuator, phi)
-
-    det_a = _determinant(springs)
-    divisor = np.where(has(flags, Flag.SINGULAR), np.nan, det_a)
-    dphi = _solve(springs, divisor, command.dtau_e, command.dstiffness)  # (68)
+    reached = reach(command.stiffness, solution, near_singular)
+    phi = (solution.phi_1, solution.phi_2)  # (61)
+    if followed is not None:
+        phi = (followed[0], followed[1])
+        reached = reached._replace(infeasible=reached.infeasible | np.isnan(followed[0]))
+    motors = motor_motion(actuator, command, reached, phi)
     return Transmission(
         stiffness=command.stiffness,
         dstiffness=command.dstiffness,
         ddstiffness=command.ddstiffness,
-        phi=phi,
-        dphi=dphi,
-        ddtheta=_solve(springs, divisor, *_beta(springs, dphi, command)),  # (72)
-        tau_spring=springs.tau,
-        det_A=det_a,
+        phi=np.stack(motors.phi),
+        dphi=np.stack(motors.dphi),
+        ddtheta=np.stack(motors.ddtheta),
+        tau_spring=np.stack(motors.tau_spring),
+        det_A=motors.det_A,
         stiffness_lower=solution.lower,
         stiffness_upper=solution.upper,
-        flags=flags,
+        flags=reached.flags,
+    )
+
+
+def motor_motion(actuator: Antagonistic, command: Command, reached: Reach, deflections: Sides) -> Motors:
+    """Motion of both motors and torques of both springs at given deflections, (62)-(72).
+
+    NaN where the step is infeasible; what needs the inverse of A also where it is singular.
+    """
+    phi_1, phi_2 = (np.where(reached.infeasible, np.nan, phi) for phi in deflections)
+    one, two = (spring_state(law, phi) for law, phi in zip(actuator.laws, (phi_1, phi_2), strict=True))
+    det_a = determinant(one, two)  # (67)
+    divisor = np.where(reached.singular, np.nan, det_a)
+    dphi = solve(one, two, divisor, command.dtau_e, command.dstiffness)  # (68)
+    accelerating = beta(one, two, dphi, command.ddtau_e, command.ddstiffness, command.ddq)
+    return Motors(
+        phi=(phi_1, phi_2),
+        dphi=dphi,
+        ddtheta=solve(one, two, divisor, *accelerating),  # (72)
+        tau_spring=(one.tau, two.tau),
+        det_A=det_a,
     )
 
 
@@ -65,13 +86,14 @@ def deflection_rates(
     actuator: Antagonistic, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray
 ) -> FloatArray:
     """Rates of the deflections phi, both (2, samples), by (19)-(20)."""
-    springs = _springs(actuator, phi)
-    return _solve(springs, _determinant(springs), dtau_e, dstiffness)
+    one, two = (spring_state(law, deflection) for law, deflection in zip(actuator.laws, phi, strict=True))
+    return np.stack(solve(one, two, determinant(one, two), dtau_e, dstiffness))
 
 
 def decoupling_determinant(actuator: Antagonistic, phi: FloatArray) -> FloatArray:
     """Determinant of A at deflections (2, samples), (67)."""
-    return _determinant(_springs(actuator, phi))
+    one, two = (spring_state(law, deflection) for law, deflection in zip(actuator.laws, phi, strict=True))
+    return determinant(one, two)
 
 
 def other_preload_would_do(actuator: Antagonistic, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
@@ -79,35 +101,4 @@ def other_preload_would_do(actuator: Antagonistic, tau_e: FloatArray, stiffness:
     if any(law.pulls_only for law in actuator.laws):
         return np.zeros(tau_e.shape, dtype=bool)
     opposite = replace(actuator, preload="negative" if actuator.preload == "positive" else "positive")
-    return ~has(reach_flags(stiffness, solve_deflections(opposite, tau_e, stiffness)), Flag.INFEASIBLE)
-
-
-def _springs(actuator: Antagonistic, phi: FloatArray) -> _Springs:
-    sides = list(zip(actuator.laws, phi, strict=True))
-    return _Springs(
-        tau=np.stack([law.torque(deflection) for law, deflection in sides]),  # (62)
-        sigma=np.stack([law.stiffness(deflection) for law, deflection in sides]),  # (63)
-        zeta=np.stack([law.slope(deflection) for law, deflection in sides]),  # (64)
-        eta=np.stack([law.curvature(deflection) for law, deflection in sides]),  # (66)
-    )
-
-
-def _determinant(springs: _Springs) -> FloatArray:
-    (sigma_1, sigma_2), (zeta_1, zeta_2) = springs.sigma, springs.zeta
-    determinant: FloatArray = sigma_1 * zeta_2 - sigma_2 * zeta_1  # (67)
-    return determinant
-
-
-def _beta(springs: _Springs, dphi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:
-    squared = dphi * dphi
-    sigma, zeta = springs.sigma.sum(axis=0), springs.zeta.sum(axis=0)  # (11), (65)
-    return (
-        command.ddtau_e - (springs.zeta * squared).sum(axis=0) + sigma * command.ddq,  # (70)
-        command.ddstiffness - (springs.eta * squared).sum(axis=0) + zeta * command.ddq,  # (71)
-    )
-
-
-def _solve(springs: _Springs, det_a: FloatArray, upper: FloatArray, lower: FloatArray) -> FloatArray:
-    """A^-1 (upper, lower) by (67)."""
-    (sigma_1, sigma_2), (zeta_1, zeta_2) = springs.sigma, springs.zeta
-    return np.stack((zeta_2 * upper - sigma_2 * lower, sigma_1 * lower - zeta_1 * upper)) / det_a
+    return ~reach(stiffness, solve_deflections(opposite, tau_e, stiffness)).infeasible

@@ -33,6 +33,8 @@ class Drive(NamedTuple):
     ddtheta: FloatArray
     tau_spring: FloatArray
     tau_motor: FloatArray
+    elastic_energy: FloatArray
+    motor_power: FloatArray
     det_A: FloatArray  # noqa: N815  (the published name)
     stiffness_lower: FloatArray
     stiffness_upper: FloatArray
@@ -59,11 +61,14 @@ def drive(
     motors = [motor for motor, _ in motors_and_springs(joint.actuator)]
     inertia = _by_motor([motor.inertia for motor in motors])
     damping = _by_motor([motor.damping for motor in motors])
+    tau_motor = inertia * transmission.ddtheta + damping * dtheta + transmission.tau_spring  # (73)-(74)
     driven = Drive(
         **transmission._asdict(),
         theta=transmission.phi + command.q,  # (69)
         dtheta=dtheta,
-        tau_motor=inertia * transmission.ddtheta + damping * dtheta + transmission.tau_spring,  # (73)-(74)
+        tau_motor=tau_motor,
+        elastic_energy=_elastic_energy(joint, transmission.phi),
+        motor_power=tau_motor * dtheta,
     )
     return driven._replace(flags=driven.flags | _limit_flags(joint, command, driven))
 
@@ -80,6 +85,15 @@ def _transmit(
             return rigid.transmit(command)
 
 
+def _elastic_energy(joint: Joint, phi: FloatArray) -> FloatArray:
+    """Of all springs of a joint, (samples,), from the deflections, (2, samples); 0 without springs."""
+    energy: FloatArray = np.zeros_like(phi[0])
+    for (_, law), deflection in zip(motors_and_springs(joint.actuator), phi, strict=False):
+        if law is not None:
+            energy = energy + law.energy(deflection)
+    return energy
+
+
 def _by_motor(values: list[float]) -> FloatArray:
     """(2, 1), NaN for a motor there is not."""
     return np.array([*values, *[math.nan] * (SIDES - len(values))])[:, None]
@@ -90,5 +104,5 @@ def _limit_flags(joint: Joint, command: Command, driven: Drive) -> FlagArray:
     flags = np.zeros_like(driven.flags)
     for check in limit_checks(joint):
         of_joint = values[check.variable]
-        flags |= limit_flags(check, of_joint if check.motor is None else of_joint[check.motor - 1])
+        flags = flags | limit_flags(check, of_joint if check.motor is None else of_joint[check.motor - 1])
     return flags

@@ -12,6 +12,7 @@ import click
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.options import (
     deflections_option,
+    engine_options,
     example,
     json_option,
     overwrite_option,
@@ -65,6 +66,7 @@ if TYPE_CHECKING:
     help="Write the suggested stiffness profile as FILE.yaml, with a CSV beside it; implies --suggest.",
 )
 @overwrite_option
+@engine_options
 @talk_options
 def check_feasibility(
     robot: str,
@@ -77,6 +79,8 @@ def check_feasibility(
     advise: bool,
     fixed: str | None,
     overwrite: bool,
+    engine: str,
+    threads: int | None,
     talk: Talk,
 ) -> int:
     """Say whether ROBOT can execute TRAJECTORY, without computing a result file.
@@ -110,6 +114,8 @@ def check_feasibility(
         stop_on_infeasible=stop_on_infeasible,
         near_singular=margin,
         following=followed(deflections, *inputs),
+        engine=engine,
+        threads=threads,
     )
     report, figures = (compute(run, talk), None) if plot_folder is None else _compute_and_draw(run, talk)
     suggestions = suggest(*inputs, margin) if advise or fixed is not None else None

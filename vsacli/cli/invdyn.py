@@ -11,6 +11,7 @@ import click
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.options import (
     deflections_option,
+    engine_options,
     example,
     json_option,
     overwrite_option,
@@ -47,6 +48,7 @@ from vsacli.cli.running import (
 @json_option
 @overwrite_option
 @stop_option
+@engine_options
 @talk_options
 def invdyn(
     robot: str,
@@ -58,6 +60,8 @@ def invdyn(
     as_json: bool,
     overwrite: bool,
     stop_on_infeasible: bool,
+    engine: str,
+    threads: int | None,
     talk: Talk,
 ) -> int:
     """Compute the motor torques with which ROBOT executes TRAJECTORY.
@@ -82,7 +86,13 @@ def invdyn(
         path, *inputs, variables, overwrite=overwrite, command_line=shlex.join(["vsacli", *sys.argv[1:]])
     )
     check_target(path, overwrite=overwrite)
-    run = Run(*inputs, stop_on_infeasible=stop_on_infeasible, following=followed(deflections, *inputs))
+    run = Run(
+        *inputs,
+        stop_on_infeasible=stop_on_infeasible,
+        following=followed(deflections, *inputs),
+        engine=engine,
+        threads=threads,
+    )
     report = compute(run, talk, writer)
     code = show_report(report, as_json)
     talk.note(f"wrote {path}")

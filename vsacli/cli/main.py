@@ -4,29 +4,46 @@ from __future__ import annotations
 
 import io
 import sys
-import traceback
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from contextlib import suppress
-from typing import NoReturn
+from typing import NoReturn, cast
 
 import click
 
 from vsacli import __version__
-from vsacli.cli.check_feasibility import check_feasibility
 from vsacli.cli.console import OutputClosedError, reporting_stdout_errors, tell
 from vsacli.cli.exit_codes import Exit
-from vsacli.cli.export import export
-from vsacli.cli.invdyn import invdyn
 from vsacli.cli.options import example
-from vsacli.cli.plot import plot
-from vsacli.cli.simulate import simulate
 from vsacli.errors import InputError, StorageError
+from vsacli.on_demand import OnDemand
 
 _EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --plot figures")
 _EPILOG += "\n\n\b\nExit codes:\n" + "\n".join(f"  {code.value:<3}  {code.meaning}" for code in Exit)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EPILOG)
+_COMMANDS = OnDemand(
+    {
+        "invdyn": "vsacli.cli.invdyn:invdyn",
+        "check-feasibility": "vsacli.cli.check_feasibility:check_feasibility",
+        "plot": "vsacli.cli.plot:plot",
+        "export": "vsacli.cli.export:export",
+        "simulate": "vsacli.cli.simulate:simulate",
+        "codegen": "vsacli.cli.codegen:codegen",
+        "examples": "vsacli.cli.examples:examples",
+        "import-urdf": "vsacli.cli.import_urdf:import_urdf",
+        "validate": "vsacli.cli.validate:validate",
+        "info": "vsacli.cli.info:info",
+        "new": "vsacli.cli.new:new",
+        "schema": "vsacli.cli.schema:schema",
+    }
+)
+
+
+@click.group(
+    commands=cast("MutableMapping[str, click.Command]", _COMMANDS),  # click looks commands up, no more
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=_EPILOG,
+)
 @click.version_option(__version__, message="%(prog)s %(version)s")
 def vsacli() -> None:
     """Inverse dynamics of robots with variable stiffness actuators.
@@ -34,10 +51,6 @@ def vsacli() -> None:
     From a robot and a trajectory, compute the motor torques that execute a motion and a stiffness profile;
     say which steps cannot be done, and why.
     """
-
-
-for command in (invdyn, check_feasibility, plot, export, simulate):
-    vsacli.add_command(command)
 
 
 def main() -> NoReturn:
@@ -65,6 +78,8 @@ def run(arguments: Sequence[str]) -> int:
     except StorageError as error:
         return _fail(str(error), Exit.STORAGE)
     except Exception:
+        import traceback
+
         lines = traceback.format_exc()
         return _fail(f"{lines}vsacli: this is a bug; please report it with the lines above", Exit.BUG)
     return int(code or Exit.OK)

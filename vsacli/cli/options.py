@@ -44,3 +44,21 @@ deflections_option = click.option(
     help="Solve for the deflections at each step, or follow those of the first by integration, which drifts.",
 )
 stop_option = click.option("--stop-on-infeasible", is_flag=True, help="End with the first infeasible step.")
+
+
+def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """`--engine` and `--threads`."""
+    engine = click.option(
+        "--engine",
+        type=click.Choice(["numpy", "c", "auto"]),
+        default="auto",
+        show_default=True,
+        help="What computes: NumPy, or code from the system's C compiler; auto takes what is faster.",
+    )
+    threads = click.option(
+        "--threads",
+        type=click.IntRange(min=1),
+        metavar="COUNT",
+        help="Threads of compiled code; by default one a processor.",
+    )
+    return engine(threads(command))

@@ -34,8 +34,8 @@ from vsacli.cli.running import described
 def plot(results: tuple[str, ...], folder: str, file_format: str, overwrite: bool, talk: Talk) -> None:
     """Draw the figures of a RESULT, or compare several.
 
-    One result gives <stem>-motion, <stem>-motor-torque and <stem>-elastic-torque; two or more give one
-    figure <stem>-<stem>-compare, with their motor torques overlaid joint by joint.
+    One result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy; two or
+    more give one figure <stem>-<stem>-compare, with their motor torques overlaid joint by joint.
     """
     if len(results) == 1:
         draw_result(Path(results[0]), Path(folder), file_format, overwrite, talk)

@@ -55,6 +55,9 @@ def followed(deflections: str, robot: Robot, trajectory: Trajectory) -> Followin
 
 def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
     """Compute block by block; a writer gets each block as it comes, and the report at the end."""
+    for remark in run.choice.remarks:
+        talk.note(remark)
+    talk.detail(run.choice.reason)
     with writer or nullcontext(), talk.progress(run.trajectory.samples) as progress:
         for block in run:
             if writer is not None:

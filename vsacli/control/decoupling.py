@@ -9,7 +9,7 @@ import numpy as np
 from vsacli.arrays import FloatArray
 from vsacli.control.gains import Gains
 from vsacli.control.linear import Integral, linear_control
-from vsacli.drivetrain import Springs
+from vsacli.decoupling_matrix import Springs, beta, determinant, solve
 from vsacli.forward_dynamics import Plant
 from vsacli.motion import Motion
 from vsacli.wrench import Wrench
@@ -101,19 +101,23 @@ class Decoupling:
         ddtau_e: FloatArray,
         ddsigma: FloatArray,
     ) -> FloatArray:
-        """Motor accelerations by (70)-(72), (..., springs); of a single spring by (70) alone."""
-        drivetrain, squared = self._plant.drivetrain, dphi * dphi
-        total, joint = drivetrain.joint_sum, drivetrain.spring_joint
-        beta_1 = ddtau_e - total(springs.zeta * squared) + link.stiffness * link.ddq  # (70)
-        beta_2 = ddsigma - total(springs.eta * squared) + total(springs.zeta) * link.ddq  # (71)
-        upper, lower = beta_1[..., joint], beta_2[..., joint]
-
+        """Motor accelerations by (70)-(72), (..., springs); of a single, linear spring by (70) alone."""
+        drivetrain = self._plant.drivetrain
         first, second, single = drivetrain.first, drivetrain.second, drivetrain.single
-        one, two = springs.of(first), springs.of(second)
-        det_a = drivetrain.decoupling_determinant(springs)  # (67)
+        of_pair, of_single = drivetrain.spring_joint[first], drivetrain.spring_joint[single]
+        one, two, alone = springs.of(first), springs.of(second), springs.of(single)
+
+        det_a = determinant(one, two)  # (67)
         divisor = np.where(det_a == 0, np.nan, det_a)
-        ddtheta = np.empty_like(dphi)  # (72)
-        ddtheta[..., first] = (two.zeta * upper[..., first] - two.sigma * lower[..., first]) / divisor
-        ddtheta[..., second] = (one.sigma * lower[..., first] - one.zeta * upper[..., first]) / divisor
-        ddtheta[..., single] = upper[..., single] / springs.sigma[..., single]
+        accelerating = beta(
+            one,
+            two,
+            (dphi[..., first], dphi[..., second]),
+            ddtau_e[..., of_pair],
+            ddsigma[..., of_pair],
+            link.ddq[..., of_pair],
+        )
+        ddtheta = np.empty_like(dphi)
+        ddtheta[..., first], ddtheta[..., second] = solve(one, two, divisor, *accelerating)  # (72)
+        ddtheta[..., single] = ddtau_e[..., of_single] / alone.sigma + link.ddq[..., of_single]
         return ddtheta

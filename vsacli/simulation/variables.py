@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from vsacli.variables import VARIABLES, Variable
 
@@ -29,17 +28,17 @@ def error(name: str) -> str:
 def _declared() -> Iterator[Variable]:
     yield VARIABLES["time"]
     yield from (VARIABLES[name] for name in COMMANDED)
-    yield replace(
-        VARIABLES["tau_motor"], long_name="motor torque that the controller asks for", equation="controller"
+    yield VARIABLES["tau_motor"]._replace(
+        long_name="motor torque that the controller asks for", equation="controller"
     )
     for name in ACTUAL:
         was = VARIABLES[name]
         words = was.long_name.replace("commanded ", "")
-        yield replace(was, name=actual(name), long_name=f"{words}, as it was", equation="(5)")
+        yield was._replace(name=actual(name), long_name=f"{words}, as it was", equation="(5)")
     for name in ERRORS:
         words = VARIABLES[name].long_name.replace("commanded ", "")
-        yield replace(VARIABLES[name], name=error(name), long_name=f"{words}, actual minus commanded")
-    yield replace(VARIABLES["flags"], equation="state")
+        yield VARIABLES[name]._replace(name=error(name), long_name=f"{words}, actual minus commanded")
+    yield VARIABLES["flags"]._replace(equation="state")
 
 
 SIMULATION_VARIABLES: dict[str, Variable] = {variable.name: variable for variable in _declared()}

@@ -1,8 +1,9 @@
 """Declaring the fields of a record once, for the file reader, the constructor checks and the documentation.
 
-A record is a frozen, keyword-only dataclass whose attributes are made by the functions below. It may have two
-class attributes: `not_yet` names keys that belong to the format but that this version does not act on;
-`unit_variant` names the choice on which the units in the record, and in records inside it, depend.
+A record is a frozen, keyword-only dataclass whose attributes are made by the functions below. It may have
+these class attributes: `not_yet` names keys that belong to the format but that this version does not act on;
+`unit_variant` names the choice on which the units in the record, and in records inside it, depend;
+`unit_variant_with` is a key and the choice that counts for them if the key is there.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 from vsacli.errors import FieldProblem, InvalidRecordError
 from vsacli.spec.tree import quoted
@@ -20,110 +21,101 @@ from vsacli.suggestions import did_you_mean
 from vsacli.units import Quantity
 
 REQUIRED = dataclasses.MISSING
-_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
 
 @dataclass(frozen=True)
 class Check:
-    """A condition on a single number and the words for it, as in "must be positive"."""
+    """A condition on a single number and the words for it, as in "must be positive".
+
+    `keywords` say it in JSON Schema, as far as that can.
+    """
 
     holds: Callable[[float], bool]
     requirement: str
+    keywords: Mapping[str, Any] = dataclasses.field(default_factory=dict, compare=False)
 
 
-POSITIVE = Check(lambda value: value > 0 and math.isfinite(value), "positive")
-POSITIVE_OR_INFINITE = Check(lambda value: value > 0, "positive")
-NON_NEGATIVE = Check(lambda value: value >= 0 and math.isfinite(value), "zero or positive")
+_ABOVE_ZERO = {"exclusiveMinimum": 0}
+POSITIVE = Check(lambda value: value > 0 and math.isfinite(value), "positive", _ABOVE_ZERO)
+POSITIVE_OR_INFINITE = Check(lambda value: value > 0, "positive", _ABOVE_ZERO)
+NON_NEGATIVE = Check(lambda value: value >= 0 and math.isfinite(value), "zero or positive", {"minimum": 0})
+NON_ZERO = Check(
+    lambda value: value != 0 and math.isfinite(value), "finite and not zero", {"not": {"const": 0}}
+)
 FINITE = Check(math.isfinite, "finite")
 
 
-@dataclass(frozen=True)
-class Kind:
-    """What a value may look like in a file; the subclasses are the alternatives."""
-
-
-@dataclass(frozen=True)
-class Number(Kind):
+class Number(NamedTuple):
     """One number with a unit."""
 
     unit: Quantity
 
 
-@dataclass(frozen=True)
-class Integer(Kind):
+class Integer(NamedTuple):
     """One whole number."""
 
 
-@dataclass(frozen=True)
-class Text(Kind):
+class Text(NamedTuple):
     """A text; `identifier` restricts it to letters, digits, `_` and `-`, starting with a letter or `_`."""
 
     identifier: bool = False
 
 
-@dataclass(frozen=True)
-class Choice(Kind):
+class Choice(NamedTuple):
     """One of a few words; `not_yet` are words of the format that this version does not act on."""
 
     options: tuple[str, ...]
     not_yet: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Vector(Kind):
+class Vector(NamedTuple):
     """A list of `length` numbers, read as a tuple."""
 
     length: int
     unit: Quantity
 
 
-@dataclass(frozen=True)
-class Interval(Kind):
+class Interval(NamedTuple):
     """`[lower, upper]`, read as a pair; a scalar means [-scalar, scalar], if `one_sided` [-inf, scalar]."""
 
     unit: Quantity
     one_sided: bool = False
 
 
-@dataclass(frozen=True)
-class Record(Kind):
+class Record(NamedTuple):
     """A mapping read into the record class `cls`."""
 
     cls: type
 
 
-@dataclass(frozen=True)
-class OneOf(Kind):
+class OneOf(NamedTuple):
     """A mapping whose key `type` selects the record class; `not_yet` as for Choice."""
 
     variants: Mapping[str, type]
     not_yet: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Items(Kind):
+class Items(NamedTuple):
     """A list of one or more values of a kind, read as a tuple; all differ in the text field `unique`."""
 
     item: Kind
     unique: str | None = None
 
 
-@dataclass(frozen=True)
-class Pair(Kind):
+class Pair(NamedTuple):
     """One value for both sides of a joint, or a list of two, read as a pair."""
 
     item: Kind
 
 
-@dataclass(frozen=True)
-class TableFile(Kind):
+class TableFile(NamedTuple):
     """Path of a CSV file relative to the document, read as a `vsacli.spec.table.Table` of these columns."""
 
     columns: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class PerJoint(Kind):
+class PerJoint(NamedTuple):
     """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint.
 
     Joints that have no such quantity are named in no mapping and null in a list; their entry is None.
@@ -132,8 +124,13 @@ class PerJoint(Kind):
     unit: Quantity
 
 
-@dataclass(frozen=True)
-class Field:
+Kind: TypeAlias = (
+    "Number | Integer | Text | Choice | Vector | Interval | Record | OneOf | Items | Pair | TableFile | PerJoint"
+)
+"""What a value may look like in a file."""
+
+
+class Field(NamedTuple):
     """A declared field: the kind of its value, one sentence about it, and the condition on each number."""
 
     kind: Kind
@@ -180,7 +177,7 @@ def interval(unit: Quantity, doc: str, *, one_sided: bool = False, default: Any 
 
 
 def value(kind: Kind, doc: str, *, check: Check | None = None, default: Any = REQUIRED) -> Any:
-    """A nested value: Record, OneOf, Items, Pair or PerJoint; `check` is for the numbers of a PerJoint."""
+    """A nested value: Record, OneOf, Items, Pair or PerJoint; `check` is for the numbers in it."""
     return _declare(Field(kind, doc, check), default)
 
 
@@ -216,13 +213,15 @@ def check_fields(record: Any, *further: FieldProblem) -> None:
 def field_problems(name: str, field: Field, content: Any) -> Iterator[FieldProblem]:
     """What is wrong with the content of a field; the one place where declarations are enforced."""
     match field.kind:
-        case Text(identifier=True) if not _IDENTIFIER.fullmatch(content):
+        case Text(identifier=True) if not IDENTIFIER.fullmatch(content):
             requirement = "letters, digits, _ and -, beginning with a letter or _"
             yield FieldProblem((name,), f"must be made of {requirement}, not {quoted(content)}")
         case Choice(options=options, not_yet=not_yet) if content not in options:
             yield FieldProblem((name,), unknown_word(content, options, not_yet))
-        case Vector(length=length) if len(content) != length:
-            yield FieldProblem((name,), f"expected {length} numbers, found {len(content)}")
+        case Vector(length=length) | Items(item=Vector(length=length)) if problems := list(
+            _wrong_lengths((name,), length, content)
+        ):
+            yield from problems
         case Interval() if not content[0] <= content[1]:
             bounds = f"the lower bound {content[0]:g} exceeds the upper bound {content[1]:g}"
             yield FieldProblem((name,), bounds)
@@ -230,7 +229,7 @@ def field_problems(name: str, field: Field, content: Any) -> Iterator[FieldProbl
             for index, message in repeated(getattr(item, key) for item in content):
                 yield FieldProblem((name, index, key), message)
         case _ if field.check is not None:
-            yield from _check_numbers(name, field.check, content)
+            yield from _check_numbers((name,), field.check, content)
 
 
 def unknown_word(word: str, options: Iterable[str], not_yet: tuple[str, ...]) -> str:
@@ -250,9 +249,17 @@ def repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
             seen.add(word)
 
 
-def _check_numbers(name: str, check: Check, content: Any) -> Iterator[FieldProblem]:
-    in_tuple = isinstance(content, tuple)
-    for index, item in enumerate(content if in_tuple else (content,)):
-        if item is not None and not check.holds(item):
-            path = (name, index) if in_tuple else (name,)
-            yield FieldProblem(path, f"must be {check.requirement}, not {item:g}")
+def _wrong_lengths(path: tuple[str | int, ...], length: int, content: Any) -> Iterator[FieldProblem]:
+    if content and isinstance(content[0], tuple):
+        for index, item in enumerate(content):
+            yield from _wrong_lengths((*path, index), length, item)
+    elif len(content) != length:
+        yield FieldProblem(path, f"expected {length} numbers, found {len(content)}")
+
+
+def _check_numbers(path: tuple[str | int, ...], check: Check, content: Any) -> Iterator[FieldProblem]:
+    if isinstance(content, tuple):
+        for index, item in enumerate(content):
+            yield from _check_numbers((*path, index), check, item)
+    elif content is not None and not check.holds(content):
+        yield FieldProblem(path, f"must be {check.requirement}, not {content:g}")

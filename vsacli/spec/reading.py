@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from typing import Any, TypeVar
 
 from vsacli.errors import InputError, InvalidRecordError
@@ -61,6 +62,29 @@ def read_document(
     return record, source
 
 
+def survey_document(
+    path: str | os.PathLike[str], cls: type
+) -> tuple[tree.Mapping, list[tuple[Quantity, tree.Node]]]:
+    """The root of a YAML file, and its PerJoint values as written, whatever joints they are for.
+
+    Args:
+        path: the file.
+        cls: the record class of the whole document; what is wrong with it is not looked at.
+
+    Raises:
+        InputError: the file is no YAML mapping.
+    """
+    source, text = read_source(path)
+    problems = Problems(source.path)
+    root = parse_yaml(text, problems)
+    if not isinstance(root, tree.Mapping):
+        problems.fail(root.line, f"expected a mapping, found {root}")
+    survey: list[tuple[Quantity, tree.Node]] = []
+    with suppress(InputError):  # too many problems, which reading will report
+        _read_record_of(cls, root, "", Scope(problems, {}, {}, survey=survey), beside=("format",))
+    return root, survey
+
+
 def _check_format(root: tree.Mapping, expected: str, problems: Problems) -> None:
     node = root.entries.get("format")
     if node is None:
@@ -88,7 +112,8 @@ def _read_record_of(
         return cls(**values)
     except InvalidRecordError as error:
         for problem in error.fields:
-            scope.problems.add(_line_of(problem.path, node, scope), f"{prefix}{problem}")
+            message = problem.in_file(list(scope.members))
+            scope.problems.add(_line_of(problem.path, node, scope), f"{prefix}{message}")
         return INVALID
     except InputError as error:
         scope.problems.include(error)
@@ -123,8 +148,10 @@ def _read_field(name: str, field: Field, node: tree.Mapping, prefix: str, scope:
 
 
 def _joint_of(path: tuple[str | int, ...], field: Field, scope: Scope) -> str:
-    per_joint = isinstance(field.kind, PerJoint)
-    return f" of joint {list(scope.members)[int(path[1])]}" if per_joint else ""
+    match field.kind:
+        case PerJoint() | Items(PerJoint()):
+            return f" of joint {list(scope.members)[int(path[-1])]}"
+    return ""
 
 
 def _line_of(path: tuple[str | int, ...], node: tree.Node, scope: Scope) -> int:

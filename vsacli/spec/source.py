@@ -7,8 +7,8 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from vsacli.errors import InputError
 from vsacli.suggestions import nearest
@@ -17,8 +17,7 @@ MAX_DOCUMENT_BYTES = 1_000_000
 """Size up to which a text document is read, and up to which the text of any input is kept."""
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """A file that was read: its path as given, SHA-256 in hex, and its text (None if too large to keep)."""
 
     path: str

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as AbstractMapping
-from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 MAX_SHOWN = 40
 
@@ -14,8 +13,7 @@ def quoted(text: str) -> str:
     return repr(text) if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]!r}..."
 
 
-@dataclass(frozen=True)
-class Scalar:
+class Scalar(NamedTuple):
     """A text as written; `plain` means without quotes."""
 
     line: int
@@ -31,8 +29,7 @@ class Scalar:
         return self.plain and self.text.lower() in ("", "~", "null")
 
 
-@dataclass(frozen=True)
-class Sequence:
+class Sequence(NamedTuple):
     """A list."""
 
     line: int
@@ -42,8 +39,7 @@ class Sequence:
         return f"a list of {len(self.items)}"
 
 
-@dataclass(frozen=True)
-class Mapping:
+class Mapping(NamedTuple):
     """Keys, each with its line, and their values, in the order of the file."""
 
     line: int

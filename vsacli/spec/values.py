@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import singledispatch
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from vsacli.errors import InputError
 from vsacli.spec import tree
@@ -26,7 +24,6 @@ from vsacli.spec.fields import (
     declared,
 )
 from vsacli.spec.problems import Problems
-from vsacli.spec.table import read_table
 from vsacli.suggestions import did_you_mean
 from vsacli.units import DIMENSIONLESS, Quantity
 
@@ -34,8 +31,7 @@ INVALID: Final = object()
 """In place of a value that cannot be used; its problem is noted already."""
 
 
-@dataclass(frozen=True)
-class Scope:
+class Scope(NamedTuple):
     """What the meaning of a value depends on besides its own text.
 
     Attributes:
@@ -43,12 +39,15 @@ class Scope:
         members: name and unit variant of every joint, for PerJoint values.
         exempt: for a quantity the joints that have none, each with the reason.
         variant: the choice on which units depend here, None while it is unknown.
+        survey: collects the quantity and the node of each PerJoint value, which is then not read; None to
+            read them.
     """
 
     problems: Problems
     members: Mapping[str, str]
     exempt: Mapping[Quantity, Mapping[str, str]]
     variant: str | None = None
+    survey: list[tuple[Quantity, tree.Node]] | None = None
 
     def unit(self, quantity: Quantity) -> str:
         """Unit of a quantity here; an unknown variant is a problem of its own and must not make others."""
@@ -56,13 +55,16 @@ class Scope:
 
     def inside(self, cls: type, node: tree.Mapping) -> Scope:
         """The scope of the values in a record."""
+        key, variant = getattr(cls, "unit_variant_with", (None, None))
+        if key in node.entries:
+            return self._replace(variant=variant)
         selector = getattr(cls, "unit_variant", None)
         if selector is None:
             return self
         match declared(cls)[selector][0].kind, node.entries.get(selector):
             case Choice(options=options), tree.Scalar(text=word) if word in options:
-                return dataclasses.replace(self, variant=word)
-        return dataclasses.replace(self, variant=None)
+                return self._replace(variant=word)
+        return self._replace(variant=None)
 
 
 @singledispatch
@@ -140,6 +142,8 @@ def _read_table_file(kind: TableFile, node: tree.Node, label: str, scope: Scope)
     name = _read_text(Text(), node, label, scope)
     if name is INVALID:
         return INVALID
+    from vsacli.spec.table import read_table
+
     try:
         table = read_table(Path(scope.problems.file).parent / name)
         if table.columns != kind.columns:
@@ -153,6 +157,9 @@ def _read_table_file(kind: TableFile, node: tree.Node, label: str, scope: Scope)
 
 @read_value.register
 def _read_per_joint(kind: PerJoint, node: tree.Node, label: str, scope: Scope) -> Any:
+    if scope.survey is not None:
+        scope.survey.append((kind.unit, node))
+        return INVALID
     exempt = scope.exempt.get(kind.unit, {})
     nodes = _by_joint(node, label, scope, exempt)
     if nodes is None:

@@ -19,7 +19,8 @@ MAX_NODES = 100_000
 """Keys and values after each alias was replaced by what it stands for."""
 
 _LOADER: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_UNPRINTABLE = re.compile("[^\t\n\r -~\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]")
+_PLAIN = re.compile("[\t\n\r -~]*")
+_UNPRINTABLE = "[^\t\n\r -~\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"  # slow to compile
 _CORE_TAG = "tag:yaml.org,2002:"
 
 
@@ -34,7 +35,7 @@ def parse_yaml(text: str, problems: Problems) -> Node:
         InputError: what cannot be read past (broken syntax, beyond the limits, no document), with everything
             found before it.
     """
-    unprintable = _UNPRINTABLE.search(text)
+    unprintable = None if _PLAIN.fullmatch(text) else re.search(_UNPRINTABLE, text)
     if unprintable:
         line = text.count("\n", 0, unprintable.start()) + 1
         problems.fail(

@@ -21,16 +21,6 @@ class Cubic(SpringLaw):
     k: float = number(units.STIFFNESS, "linear coefficient K", check=POSITIVE)
     k_c: float = number(units.CUBIC_STIFFNESS, "cubic coefficient Kc", check=POSITIVE)
 
-    @property
-    def hardening_peak(self) -> tuple[float, float]:
-        """Torques at phi = +-sqrt(K/(3 Kc))."""
-        peak = 4 / 3 * self.k * self._peak_deflection
-        return (-peak, peak)
-
-    @property
-    def _peak_deflection(self) -> float:
-        return math.sqrt(self.k / (3 * self.k_c))
-
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """Closed for a twin, on the branch of equations (28)-(31)."""
         return AlikeCubics(self) if other == self else None
@@ -58,7 +48,7 @@ class Cubic(SpringLaw):
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """The real root of the cubic, by its hyperbolic form (no cancellation at any size of torque)."""
-        scale = self._peak_deflection
+        scale = math.sqrt(self.k / (3 * self.k_c))
         return 2 * scale * np.sinh(np.arcsinh(1.5 * torque / (self.k * scale)) / 3)
 
 
@@ -73,16 +63,16 @@ class AlikeCubics(Pair):
         k, k_c = self.spring.k, self.spring.k_c
         lower = self._lowest_stiffness(np.abs(tau_e))
         demand = np.maximum(stiffness, lower)
-        load = np.clip(3 * math.sqrt(3 * k_c) * tau_e / demand**1.5, -1, 1)
+        load = np.clip(3 * math.sqrt(3 * k_c) * tau_e / (demand * np.sqrt(demand)), -1, 1)
         u = 2 * np.sqrt(demand / (3 * k_c)) * np.sin(np.arcsin(load) / 3)
         spread_squared = 2 * (demand - 2 * k) / (3 * k_c) - u * u
         spread = np.sqrt(np.maximum(spread_squared, 0))
         return PairSolution(
             lower=lower,
             upper=np.full_like(tau_e, np.inf),
-            lower_critical=np.ones(tau_e.shape, dtype=bool),
-            upper_critical=np.zeros(tau_e.shape, dtype=bool),
-            slack_below=np.zeros(tau_e.shape, dtype=bool),
+            lower_critical=np.ones_like(tau_e, dtype=bool),
+            upper_critical=np.zeros_like(tau_e, dtype=bool),
+            slack_below=np.zeros_like(tau_e, dtype=bool),
             phi_1=(u + spread) / 2,
             phi_2=(u - spread) / 2,
         )

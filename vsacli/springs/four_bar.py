@@ -11,7 +11,7 @@ import numpy as np
 from vsacli import units
 from vsacli.arrays import FloatArray
 from vsacli.spec.fields import POSITIVE, Check, number
-from vsacli.springs.inversion import inverse
+from vsacli.springs.inversion import FirstGuess, inverse
 from vsacli.springs.law import SpringLaw
 
 ABOVE_ONE = Check(lambda ratio: ratio > 1 and math.isfinite(ratio), "greater than 1")
@@ -47,25 +47,26 @@ class FourBar(SpringLaw):
         low, high = self.torque(np.array(self.domain))
         return float(low), float(high)
 
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Derivatives of the energy k beta^2/2, which share the angles."""
+        crank = _Crank(self.ratio, phi)
+        return tuple(self.k * derivative(crank) for derivative in _DERIVATIVES[: order + 1])
+
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque k beta beta'."""
-        crank = _Crank(self.ratio, phi)
-        return self.k * crank.beta * crank.d1
+        return self.k * _torque(_Crank(self.ratio, phi))
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Stiffness k (beta'^2 + beta beta'')."""
-        crank = _Crank(self.ratio, phi)
-        return self.k * (crank.d1**2 + crank.beta * crank.d2)
+        return self.k * _stiffness(_Crank(self.ratio, phi))
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope k (3 beta' beta'' + beta beta''')."""
-        crank = _Crank(self.ratio, phi)
-        return self.k * (3 * crank.d1 * crank.d2 + crank.beta * crank.d3)
+        return self.k * _slope(_Crank(self.ratio, phi))
 
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Curvature k (3 beta''^2 + 4 beta' beta''' + beta beta'''')."""
-        crank = _Crank(self.ratio, phi)
-        return self.k * (3 * crank.d2**2 + 4 * crank.d1 * crank.d3 + crank.beta * crank.d4)
+        return self.k * _curvature(_Crank(self.ratio, phi))
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Energy k beta^2/2."""
@@ -75,15 +76,14 @@ class FourBar(SpringLaw):
         """Inverse by safeguarded iteration within the domain."""
         load = np.minimum(np.abs(torque), self.torque_range[1])
         low, high = np.zeros_like(load), np.full_like(load, self.domain[1])
-        start = np.interp(load, *self._nodes)
+        start = np.clip(self._first_guess(load), low, high)
         return np.copysign(inverse(self, load, low, high, start), torque)
 
     @cached_property
-    def _nodes(self) -> tuple[FloatArray, FloatArray]:
-        """Torques and deflections over the domain, denser towards its end."""
+    def _first_guess(self) -> FirstGuess:
+        """From nodes over the domain, denser towards its end."""
         psi = np.linspace(0, math.pi / 2, NODES)
-        phi = 2 * np.arcsin((1 - STRETCHED) * np.sin(psi) / self.ratio)
-        return self.torque(phi), phi
+        return FirstGuess(self, 2 * np.arcsin((1 - STRETCHED) * np.sin(psi) / self.ratio))
 
 
 class _Crank:
@@ -101,27 +101,46 @@ class _Crank:
         self._bend = ratio * (ratio - 1) * (ratio + 1)
         self._gain = (ratio - 1) * (ratio + 1) / (self._c_cos + self._cos_psi)
 
-    @property
+    @cached_property
     def beta(self) -> FloatArray:
         angle: FloatArray = np.arctan2(
             self._sin * self._gain, self._cos_psi * self._cos + self._sin_psi * self._sin
         )
         return angle
 
-    @property
+    @cached_property
     def d1(self) -> FloatArray:
         return self._gain / (2 * self._cos_psi)
 
-    @property
+    @cached_property
     def d2(self) -> FloatArray:
         return self._bend / 4 * self._sin / (self._room * self._cos_psi)
 
-    @property
+    @cached_property
     def d3(self) -> FloatArray:
         return self._bend / 8 * self._cos * (1 + 2 * self._sin_psi**2) / (self._room**2 * self._cos_psi)
 
-    @property
+    @cached_property
     def d4(self) -> FloatArray:
         grown = 1 + 2 * self._sin_psi**2
         fourth = self._c_cos**2 * (2 * self._room + 2.5 * grown) - grown * self._room / 2
         return self._bend / 8 * self._sin * fourth / (self._room**3 * self._cos_psi)
+
+
+def _torque(crank: _Crank) -> FloatArray:
+    return crank.beta * crank.d1
+
+
+def _stiffness(crank: _Crank) -> FloatArray:
+    return crank.d1**2 + crank.beta * crank.d2
+
+
+def _slope(crank: _Crank) -> FloatArray:
+    return 3 * crank.d1 * crank.d2 + crank.beta * crank.d3
+
+
+def _curvature(crank: _Crank) -> FloatArray:
+    return 3 * crank.d2**2 + 4 * crank.d1 * crank.d3 + crank.beta * crank.d4
+
+
+_DERIVATIVES = (_torque, _stiffness, _slope, _curvature)

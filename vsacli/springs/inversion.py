@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.arrays import FloatArray
+from vsacli.arrays import BoolArray, FloatArray
 from vsacli.springs.law import SpringLaw
+from vsacli.springs.loops import Values, look_up, repeat
 
 MOST_STEPS = 200
 """More than bisection alone needs for all digits of a double."""
@@ -17,26 +18,38 @@ LAST_STEP = 1e-8
 def inverse(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
 ) -> FloatArray:
-    """Deflection at which the law has a torque, between `low` and `high` that enclose it.
+    """Deflection at which the law has a torque, between `low` and `high` that enclose it."""
 
-    Each entry is iterated until its own torque is met, independently of the others.
-    """
-    shape = torque.shape
-    torque, low, high = (array.flatten() for array in (torque, low, high))
-    phi = np.where(torque == 0, 0.0, start.ravel())
-    phi[~np.isfinite(torque)] = np.nan
-    active = np.flatnonzero(np.isfinite(torque) & (torque != 0))
-    for _ in range(MOST_STEPS):
-        if not active.size:
-            break
-        trial = phi[active]
-        error = law.torque(trial) - torque[active]
-        low[active] = np.where(error <= 0, trial, low[active])
-        high[active] = np.where(error >= 0, trial, high[active])
+    def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+        (phi, low, high), (wanted,) = state, constants
+        torque, stiffness = law.derivatives(phi, 1)
+        error = torque - wanted
+        low, high = np.where(error <= 0, phi, low), np.where(error >= 0, phi, high)
         with np.errstate(divide="ignore", invalid="ignore"):  # no stiffness at rest: halve the bracket
-            newton = trial - error / law.stiffness(trial)
-        inside = (newton >= low[active]) & (newton <= high[active])
-        phi[active] = np.where(inside, newton, (low[active] + high[active]) / 2)
-        met = inside & (np.abs(error) <= LAST_STEP * np.abs(torque[active]))
-        active = active[~met & (low[active] < high[active])]
-    return phi.reshape(shape)
+            newton = phi - error / stiffness
+        inside = (newton >= low) & (newton <= high)
+        met = inside & (np.abs(error) <= LAST_STEP * np.abs(wanted))
+        return (np.where(inside, newton, (low + high) / 2), low, high), met | ~(low < high)
+
+    phi, _, _ = repeat(step, (start, low, high), (torque,), MOST_STEPS)
+    return np.where(torque == 0, 0.0, np.where(np.isfinite(torque), phi, np.nan))
+
+
+class FirstGuess:
+    """Deflections of a law by cubic interpolation over the torque, between nodes that are computed once."""
+
+    def __init__(self, law: SpringLaw, nodes: FloatArray) -> None:
+        torque, stiffness = law.derivatives(nodes, 1)
+        compliance = 1 / np.where(stiffness == 0, np.inf, stiffness)
+        width, rise = np.diff(torque), np.diff(nodes)
+        first, last = compliance[:-1] * width, compliance[1:] * width
+        self._torque, self._width = torque, width
+        self._coefficients = (nodes[:-1], first, 3 * rise - 2 * first - last, first + last - 2 * rise)
+
+    def __call__(self, torque: FloatArray) -> FloatArray:
+        """The deflection under torques within those of the nodes."""
+        cell = np.searchsorted(self._torque, torque, side="right") - 1
+        cell = np.clip(cell, 0, len(self._width) - 1)
+        share = (torque - look_up(self._torque, cell)) / look_up(self._width, cell)
+        a, b, c, d = (look_up(row, cell) for row in self._coefficients)
+        return a + share * (b + share * (c + share * d))

@@ -62,11 +62,6 @@ class SpringLaw(ABC):
         """Whether the stiffness is the same at every deflection."""
         return False
 
-    @property
-    def hardening_peak(self) -> tuple[float, float]:
-        """Torques between which the relative hardening zeta/sigma surely increases with the torque."""
-        return (-math.inf, math.inf)
-
     def as_second(self) -> SpringLaw:
         """The law as it acts on side 2, where a tendon pulls the other way."""
         return self
@@ -78,6 +73,11 @@ class SpringLaw(ABC):
     def hardening(self, phi: FloatArray) -> FloatArray:
         """Relative hardening rho = zeta/sigma."""
         return self.slope(phi) / self.stiffness(phi)
+
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Torque and its derivatives up to an order, 3 at most; for laws in which they share work."""
+        methods = (self.torque, self.stiffness, self.slope, self.curvature)
+        return tuple(method(phi) for method in methods[: order + 1])
 
     @abstractmethod
     def torque(self, phi: FloatArray) -> FloatArray:

@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vsacli.arrays import FloatArray
+from vsacli.springs.loops import look_up
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -30,40 +32,39 @@ LEAST_STIFFNESS = 1e-3
 
 @dataclass(frozen=True)
 class MeasuredCurve:
-    """A curve made of a half on either side of zero.
+    """A curve made of a half on either side of zero, over the size of the deflection.
 
     Attributes:
-        up: the half for positive deflections.
-        down: the half for negative ones, turned around; that of a spring that only pulls is never asked.
+        edges: deflections between which the curve is one polynomial, (pieces + 1,), ascending.
+        origins: sizes of deflection from which the polynomials count, (pieces,); zero next to zero, so that
+            nothing cancels there.
+        coefficients: of the energy, from the constant on, (powers, pieces).
         residual: the largest misfit in torque.
     """
 
-    up: Half
-    down: Half
+    edges: FloatArray
+    origins: FloatArray
+    coefficients: FloatArray
     residual: float
 
-    def __call__(self, order: int, phi: FloatArray) -> FloatArray:
-        """Derivative of the torque of an order, from the energy (-1) to the curvature (3)."""
-        size, below = np.abs(phi), phi < 0
-        result = self.up(order, size)
-        if below.any():
-            result[below] = self.down(order, size[below])
-        return result if order % 2 else np.copysign(result, phi)
+    def __call__(self, orders: Sequence[int], phi: FloatArray) -> tuple[FloatArray, ...]:
+        """Derivatives of the energy of some orders, from 0 to 4."""
+        piece = np.clip(np.searchsorted(self.edges, phi, side="right") - 1, 0, len(self.origins) - 1)
+        x = np.abs(phi) - look_up(self.origins, piece)
+        coefficients = [look_up(row, piece) for row in self.coefficients[min(orders) :]]
+        found = (self._derivative(order, x, coefficients[order - min(orders) :]) for order in orders)
+        return tuple(
+            np.copysign(size, phi) if order % 2 else size for order, size in zip(orders, found, strict=True)
+        )
 
-
-class Half:
-    """The curve over the size of the deflection, from zero on, so that nothing cancels near zero."""
-
-    def __init__(self, spline: PPoly, stiffness_at_rest: float) -> None:
-        slope = _times_deflection(spline)
-        stiffness = slope.antiderivative()
-        stiffness.c[-1] += stiffness_at_rest
-        torque = stiffness.antiderivative()
-        self._orders = {-1: torque.antiderivative(), 0: torque, 1: stiffness, 2: slope, 3: slope.derivative()}
-
-    def __call__(self, order: int, size: FloatArray) -> FloatArray:
-        """Derivative of the torque of an order."""
-        return np.asarray(self._orders[order](size))
+    def _derivative(self, order: int, x: FloatArray, coefficients: list[FloatArray]) -> FloatArray:
+        """From the coefficients of the energy from that order on."""
+        *lower, result = (
+            math.perm(power, order) * coefficient for power, coefficient in enumerate(coefficients, order)
+        )
+        for term in reversed(lower):
+            result = result * x + term
+        return result
 
 
 def fit_curve(deflection: FloatArray, torque: FloatArray) -> MeasuredCurve:
@@ -72,12 +73,12 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> MeasuredCurve:
 
     knots = _knots(float(deflection[0]), float(deflection[-1]), len(deflection))
     shapes = [_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
-    columns = np.column_stack([deflection, *(shape(0, deflection) for shape in shapes)])
+    columns = np.column_stack([deflection, *(shape((1,), deflection)[0] for shape in shapes)])
     sizes = np.abs(columns).max(axis=0)
     least = LEAST_STIFFNESS * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
     excess, *weights = nnls(columns / sizes, torque - least * deflection)[0] / sizes
     curve = _curve(knots, np.array(weights), least + excess)
-    return dataclasses.replace(curve, residual=float(np.abs(curve(0, deflection) - torque).max()))
+    return dataclasses.replace(curve, residual=float(np.abs(curve((1,), deflection)[0] - torque).max()))
 
 
 def _knots(low: float, high: float, samples: int) -> FloatArray:
@@ -90,9 +91,22 @@ def _knots(low: float, high: float, samples: int) -> FloatArray:
 
 
 def _curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> MeasuredCurve:
-    up = Half(_above_zero(knots, weights), stiffness_at_rest)
-    down = Half(_above_zero(-knots[::-1], weights[::-1]), stiffness_at_rest)
-    return MeasuredCurve(up, down, residual=math.nan)
+    up = _energy(_above_zero(knots, weights), stiffness_at_rest)
+    down = _energy(_above_zero(-knots[::-1], weights[::-1]), stiffness_at_rest)
+    halves = [(up.x[:-1], up.c[::-1])]
+    edges = up.x
+    if knots[0] < 0:
+        halves.insert(0, (down.x[-2::-1], down.c[::-1, ::-1]))
+        edges = np.concatenate((-down.x[:0:-1], up.x))
+    origins, coefficients = zip(*halves, strict=True)
+    return MeasuredCurve(edges, np.concatenate(origins), np.hstack(coefficients), residual=math.nan)
+
+
+def _energy(spline: PPoly, stiffness_at_rest: float) -> PPoly:
+    """Energy over the size of the deflection, of the spring with the slope phi spline(phi)."""
+    stiffness = _times_deflection(spline).antiderivative()
+    stiffness.c[-1] += stiffness_at_rest
+    return stiffness.antiderivative(2)
 
 
 def _above_zero(knots: FloatArray, weights: FloatArray) -> PPoly:

@@ -29,14 +29,16 @@ class Mirrored(SpringLaw):
         """As the law."""
         return self.law.pulls_only
 
-    @property
-    def hardening_peak(self) -> tuple[float, float]:
-        """The law's, turned around."""
-        return _turned(self.law.hardening_peak)
-
     def hardening(self, phi: FloatArray) -> FloatArray:
         """Odd in the deflection."""
         return -self.law.hardening(-phi)
+
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Odd and even in turn."""
+        signs = (-1.0, 1.0, -1.0, 1.0)[: order + 1]
+        return tuple(
+            sign * value for sign, value in zip(signs, self.law.derivatives(-phi, order), strict=True)
+        )
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Odd in the deflection."""

@@ -64,13 +64,12 @@ def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> 
 
     Deflections that rounding has made those of a tendon that pushes are zero.
     """
-    never = np.zeros(lower.shape, dtype=bool)
     return PairSolution(
         lower=lower,
         upper=np.full_like(lower, np.inf),
-        lower_critical=never,
-        upper_critical=never,
-        slack_below=~never,
+        lower_critical=np.zeros_like(lower, dtype=bool),
+        upper_critical=np.zeros_like(lower, dtype=bool),
+        slack_below=np.ones_like(lower, dtype=bool),
         phi_1=np.maximum(phi_1, 0),
         phi_2=np.minimum(phi_2, 0),
     )

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
-from numpy.polynomial import Polynomial as Series
 
 from vsacli import units
 from vsacli.arrays import FloatArray
@@ -27,50 +27,36 @@ class Polynomial(SpringLaw):
     c9: float = number(units.NINTH_STIFFNESS, "coefficient of phi^9", check=NON_NEGATIVE, default=0.0)
 
     @cached_property
-    def _derivatives(self) -> tuple[Series, Series, Series, Series]:
-        odd = np.zeros(10)
-        odd[1::2] = self._coefficients
-        series = Series(np.trim_zeros(odd, "b"))
-        return series, series.deriv(1), series.deriv(2), series.deriv(3)
+    def _coefficients(self) -> tuple[float, ...]:
+        """Of phi, phi^3, ... up to the last that is not zero."""
+        coefficients = (self.c1, self.c3, self.c5, self.c7, self.c9)
+        return coefficients[: max(index for index, each in enumerate(coefficients, start=1) if each)]
 
     @property
     def is_linear(self) -> bool:
         """Whether all but the first coefficient vanish."""
-        return not any(self._coefficients[1:])
-
-    @property
-    def _coefficients(self) -> tuple[float, ...]:
-        return (self.c1, self.c3, self.c5, self.c7, self.c9)
-
-    @cached_property
-    def hardening_peak(self) -> tuple[float, float]:
-        """Torques at the first root of rho' = (eta sigma - zeta^2)/sigma^2."""
-        _, sigma, zeta, eta = self._derivatives
-        roots = (eta * sigma - zeta * zeta).roots()
-        positive = roots.real[(np.abs(roots.imag) <= 1e-6 * np.abs(roots)) & (roots.real > 0)]
-        peak = float(self.torque(positive.min())) if positive.size else math.inf
-        return (-peak, peak)
+        return len(self._coefficients) == 1
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque c1 phi + c3 phi^3 + ..."""
-        return self._evaluate(0, phi)
+        return phi * self._derivative(0, phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Stiffness, the first derivative."""
-        return self._evaluate(1, phi)
+        return self._derivative(1, phi)
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope, the second derivative."""
-        return self._evaluate(2, phi)
+        return phi * self._derivative(2, phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Curvature, the third derivative."""
-        return self._evaluate(3, phi)
+        return self._derivative(3, phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Energy, the integral of the torque."""
-        energy: FloatArray = self._derivatives[0].integ()(phi)
-        return energy
+        squared = phi * phi
+        return squared * _series([each / (2 * n + 2) for n, each in enumerate(self._coefficients)], squared)
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration from the bound that each term alone sets."""
@@ -80,9 +66,18 @@ class Polynomial(SpringLaw):
             for index, coefficient in enumerate(self._coefficients)
             if coefficient > 0
         ]
-        high = np.minimum.reduce(bounds)
+        high = reduce(np.minimum, bounds)
         return np.copysign(inverse(self, load, np.zeros_like(load), high, start=high), torque)
 
-    def _evaluate(self, order: int, phi: FloatArray) -> FloatArray:
-        result: FloatArray = self._derivatives[order](phi)
-        return result
+    def _derivative(self, order: int, phi: FloatArray) -> FloatArray:
+        """Derivative of the torque, without the factor phi that those of even order have."""
+        factors = [math.perm(2 * n + 1, order) * each for n, each in enumerate(self._coefficients)]
+        return _series(factors[order // 2 :], phi * phi)
+
+
+def _series(coefficients: Sequence[float], x: FloatArray) -> FloatArray:
+    """Power series from the constant on."""
+    result = np.zeros_like(x)
+    for coefficient in reversed(coefficients):
+        result = result * x + coefficient
+    return result

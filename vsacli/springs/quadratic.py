@@ -24,11 +24,6 @@ class Quadratic(Tendon):
         """Closed for twins."""
         return QuadraticTwins(self) if other == self.as_second() else None
 
-    @property
-    def hardening_peak(self) -> tuple[float, float]:
-        """Nowhere: the hardening decreases from slack on."""
-        return (0.0, 0.0)
-
     def hardening(self, phi: FloatArray) -> FloatArray:
         """Hardening 1/phi, infinite where it goes slack."""
         with np.errstate(divide="ignore"):

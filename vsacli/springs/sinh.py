@@ -80,9 +80,9 @@ class SinhPair(Pair):
         return PairSolution(
             lower=lower,
             upper=np.full_like(tau_e, np.inf),
-            lower_critical=np.ones(tau_e.shape, dtype=bool),
-            upper_critical=np.zeros(tau_e.shape, dtype=bool),
-            slack_below=np.zeros(tau_e.shape, dtype=bool),
+            lower_critical=np.ones_like(tau_e, dtype=bool),
+            upper_critical=np.zeros_like(tau_e, dtype=bool),
+            slack_below=np.zeros_like(tau_e, dtype=bool),
             phi_1=phi_1,
             phi_2=phi_2,
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,18 +12,18 @@ from vsacli.arrays import FloatArray
 from vsacli.errors import InputError, Problem
 from vsacli.spec.fields import TableFile, value
 from vsacli.spec.source import Source
-from vsacli.spec.table import Table, line_of
-from vsacli.springs.inversion import inverse
+from vsacli.spec.table import Table
+from vsacli.springs.inversion import FirstGuess, inverse
 from vsacli.springs.law import SpringLaw
 from vsacli.springs.measured import MeasuredCurve, fit_curve
 from vsacli.springs.mirrored import Mirrored
 
 LEAST_ROWS = 6
+NODES = 100
+"""Points of the curve on either side between which the inverse begins."""
+
 SHAPE_TOLERANCE = 1e-3
 """Share of the torque range by which measurement noise may hide the shape: a point above its chord, say."""
-
-HARDENING_NODES = 400
-"""Deflections at which the hardening of a measured curve is looked at, on either side of zero."""
 
 
 @dataclass(frozen=True)
@@ -77,57 +76,51 @@ class MeasuredSpring(SpringLaw):
         """Whether the table begins at zero deflection."""
         return self.domain[0] == 0
 
-    @cached_property
-    def hardening_peak(self) -> tuple[float, float]:
-        """Where the hardening of the curve first decreases, on either side."""
-        low, high = (self._peak(end) for end in self.domain)
-        return -low, high
-
-    def _peak(self, end: float) -> float:
-        if not end:
-            return math.inf
-        phi = np.linspace(0, end, HARDENING_NODES)
-        falling = np.flatnonzero(np.diff(np.abs(self.hardening(phi))) < 0)
-        # The peak lies in the cell before the first that falls, or in that one.
-        return float(np.abs(self.torque(phi[max(falling[0] - 1, 0)]))) if falling.size else math.inf
-
     def as_second(self) -> SpringLaw:
         """Turned around if it only pulls."""
         return Mirrored(law=self) if self.pulls_only else self
 
     def hardening(self, phi: FloatArray) -> FloatArray:
         """Relative hardening, infinite where a spring without stiffness at rest goes slack."""
-        stiffness = self.stiffness(phi)
-        return np.divide(
-            self.slope(phi), stiffness, out=np.full_like(stiffness, np.inf), where=stiffness != 0
-        )
+        _, stiffness, slope = self.derivatives(phi, 2)
+        slack = stiffness == 0
+        return np.where(slack, np.inf, slope / np.where(slack, 1.0, stiffness))
+
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Of the fitted curve, looked up once."""
+        return self._curve(range(1, order + 2), phi)
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque of the fitted curve."""
-        return self._curve(0, phi)
+        return self._curve((1,), phi)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Stiffness of the fitted curve."""
-        return self._curve(1, phi)
+        return self._curve((2,), phi)[0]
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope of the fitted curve."""
-        return self._curve(2, phi)
+        return self._curve((3,), phi)[0]
 
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Curvature of the fitted curve."""
-        return self._curve(3, phi)
+        return self._curve((4,), phi)[0]
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Energy of the fitted curve."""
-        return self._curve(-1, phi)
+        return self._curve((0,), phi)[0]
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration within the measured range."""
         low, high = (np.full_like(torque, end) for end in self.domain)
-        deflections, torques = self.file.values.T
-        start = np.interp(torque, torques, deflections)
-        return inverse(self, np.clip(torque, *self.torque_range), low, high, start)
+        carried = np.clip(torque, *self.torque_range)
+        return inverse(self, carried, low, high, np.clip(self._first_guess(carried), low, high))
+
+    @cached_property
+    def _first_guess(self) -> FirstGuess:
+        low, high = self.domain
+        shares = np.linspace(0, 1, NODES)
+        return FirstGuess(self, np.unique(np.concatenate((low * shares, high * shares))))
 
 
 def _problems(table: Table) -> Iterator[Problem]:
@@ -136,7 +129,7 @@ def _problems(table: Table) -> Iterator[Problem]:
     path = table.source.path
 
     def at(row: int, message: str) -> Problem:
-        return Problem(path, line_of(row), message)
+        return Problem(path, table.line_of(row), message)
 
     if len(deflection) < LEAST_ROWS:
         yield Problem(path, 0, f"expected at least {LEAST_ROWS} rows, found {len(deflection)}")

@@ -134,6 +134,18 @@ class AtomicFile:
             self.temporary.unlink(missing_ok=True)
 
 
+def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> None:
+    """Write a text file, all of it or nothing.
+
+    Raises:
+        StorageError: as `AtomicFile`.
+    """
+    with AtomicFile(path, overwrite=overwrite) as file:
+        with reporting_storage_errors(path):
+            file.temporary.write_text(text, encoding="utf-8")
+        file.publish()
+
+
 def _taken(path: str | Path) -> StorageError:
     return StorageError(path, "exists already; choose another name, or replace it with --overwrite")
 

@@ -12,16 +12,10 @@ import numpy as np
 from vsacli import __version__
 from vsacli.robot import Robot
 from vsacli.store.inputs import write_robot, write_sources
-from vsacli.store.schema import TEXT, chunk_rows, storable, storage_type, variable_attributes
+from vsacli.store.schema import TEXT, chunk_rows, row_shape, storable, storage_type, variable_attributes
 from vsacli.trajectory import Trajectory
 from vsacli.variables import MOTORS, VARIABLES, Variable
 from vsacli.wrench import WRENCH_AXES
-
-
-def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
-    """Lengths of the axes after time."""
-    lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
-    return tuple(lengths[dim] for dim in variable.dims)
 
 
 def row_bytes(variable: Variable, joints: int) -> int:

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import h5py
+import numpy as np
 
 from vsacli.arrays import FlagArray, FloatArray
 from vsacli.errors import InputError, StorageError
-from vsacli.store.schema import FORMAT
-from vsacli.variables import VARIABLES, Variable, select_variables
+from vsacli.store.damage import bounded, check_heaps, own_dataset, reporting_damage
+from vsacli.store.schema import FORMAT, row_shape, storage_type
+from vsacli.variables import MOTORS, VARIABLES, Variable, select_variables
 
-_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class StoredResult:
@@ -29,6 +32,7 @@ class StoredResult:
         complete: False if the run was ended at an infeasible step.
         joint_names, joint_types: base to tip; "revolute" or "prismatic".
         actuators: of each joint, "antagonistic", "elastic" or "rigid".
+        gear_ratio: (joints, 2), of the motors; NaN where the robot file gives none.
         variables: names of the variables the file holds, in declared order, without `time`.
         samples: number of steps stored.
         time: (samples,) in s.
@@ -48,7 +52,8 @@ class StoredResult:
         """
         _check_signature(path)
         with contextlib.ExitStack() as stack:
-            with _reporting_damage(path):
+            with reporting_damage(path):
+                check_heaps(path)
                 file = stack.enter_context(h5py.File(path, "r"))
                 found = file.attrs.get("format")
             if found != cls.format:
@@ -60,22 +65,54 @@ class StoredResult:
     def __init__(self, path: str | Path, file: h5py.File) -> None:
         self.path = Path(path)
         self._file = file
-        with _reporting_damage(path):
+        with reporting_damage(path):
             self.attributes: dict[str, Any] = dict(file.attrs)
             self.robot_name = str(file.attrs["robot_name"])
             self.trajectory_name = str(file.attrs["trajectory_name"])
             self.verdict = str(file.attrs["verdict"])
             self.complete = bool(file.attrs["complete"])
-            self.joint_names: tuple[str, ...] = tuple(file["joint"].asstr()[...])
-            self.joint_types: tuple[str, ...] = tuple(file["joint_type"].asstr()[...])
-            kinds = file["inputs/robot/joints/actuator_type"]
-            self.actuators: tuple[str, ...] = tuple(kinds.asstr()[...])
+            self.joint_names = self._labels("joint")
+            self.joint_types = self._labels("joint_type")
+            self.actuators = self._labels("inputs/robot/joints/actuator_type")
+            self.gear_ratio = self._gear_ratios()
             self.variables = tuple(
                 name for name, variable in self.declared.items() if variable.dims and name in file
             )
-            self.time: FloatArray = file["time"][...]
+            self.time: FloatArray = self._bounded("time")[...]
             self.samples = len(self.time)
-            self.report: dict[str, Any] = json.loads(file["report/json"].asstr()[()])
+            self.report = self._json("report/json")
+            self._check_shapes()
+
+    def _bounded(self, name: str) -> h5py.Dataset:
+        return bounded(own_dataset(self._file, name))
+
+    def _labels(self, name: str) -> tuple[str, ...]:
+        return tuple(self._bounded(name).asstr()[...])
+
+    def _gear_ratios(self) -> FloatArray:
+        """The stored ones, which have no second axis if no joint has two motors."""
+        ratios = np.full((len(self.actuators), len(MOTORS)), np.nan)
+        if GEAR_RATIO in self._file:
+            stored = self._bounded(GEAR_RATIO)
+            ratios.T[: 1 if stored.ndim == 1 else len(MOTORS)] = stored[...].T
+        return ratios
+
+    def _json(self, name: str) -> dict[str, Any]:
+        content = json.loads(own_dataset(self._file, name).asstr()[()])
+        if not isinstance(content, dict):
+            raise ValueError(f"{name} is no JSON object")
+        return content
+
+    def _check_shapes(self) -> None:
+        """Refuse what does not fit together, so that every variable can be read piece by piece."""
+        joints = len(self.joint_names)
+        if {len(self.joint_types), len(self.actuators)} != {joints} or self.time.ndim != 1:
+            raise ValueError("joints and times do not fit together")
+        for name in self.variables:
+            dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name])
+            shape = (self.samples, *row_shape(self.declared[name], joints))
+            if dataset.shape != shape or dataset.dtype != expected:
+                raise ValueError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
         """Steps start..stop-1 of a variable, (steps, joints) or (steps, joints, 2), in its declared units.
@@ -87,9 +124,23 @@ class StoredResult:
         if name not in self._file:
             message = f"holds no {name}; run invdyn again without --variables, or with {name} among them"
             raise InputError.one(message, self.path)
-        with _reporting_damage(self.path):
+        with reporting_damage(self.path):
             values: FloatArray | FlagArray = self._file[name][start:stop]
         return values
+
+    def provenance(self) -> dict[str, Any]:
+        """Who made the file, when, with which versions, and path and SHA-256 of each file that was read.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        with reporting_damage(self.path):
+            groups = [group for name, group in self._file["inputs"].items() if name.startswith("file_")]
+            return {
+                **{name: str(self.attributes[name]) for name in ("created", "generated_by", "command_line")},
+                "versions": json.loads(self.attributes["versions"]),
+                "inputs": [{name: str(group.attrs[name]) for name in ("path", "sha256")} for group in groups],
+            }
 
     def close(self) -> None:
         """Close the file."""
@@ -109,11 +160,29 @@ def open_result(path: str | Path) -> StoredResult:
     return StoredResult.open(path)
 
 
+def stored_format(path: str | Path) -> str | None:
+    """The attribute `format` of an HDF5 file; None if it has none.
+
+    Raises:
+        InputError, StorageError: as `StoredResult.open`.
+    """
+    _check_signature(path)
+    with reporting_damage(path):
+        check_heaps(path)
+        with h5py.File(path, "r") as file:
+            found = file.attrs.get("format")
+    return found if isinstance(found, str) else None
+
+
 def _check_signature(path: str | Path) -> None:
     """Tell a missing file, a folder and a file of another kind from each other before HDF5 sees them."""
+    if "\0" in str(path):
+        raise InputError.one("the path holds a NUL character", path)
     try:
+        if Path(path).is_fifo():
+            raise InputError.one("is a pipe; expected a result file, as invdyn writes it", path)
         with Path(path).open("rb") as file:
-            start = file.read(len(_SIGNATURE))
+            start = file.read(len(SIGNATURE))
     except FileNotFoundError:
         raise InputError.one(
             "there is no such file; expected a result file, as invdyn writes it", path
@@ -122,7 +191,7 @@ def _check_signature(path: str | Path) -> None:
         raise InputError.one("is a folder; expected a result file, as invdyn writes it", path) from None
     except OSError as error:
         raise StorageError(path, f"cannot be read: {error.strerror}") from error
-    if start != _SIGNATURE:
+    if start != SIGNATURE:
         kind = "is empty" if not start else "is not an HDF5 file"
         raise InputError.one(f"{kind}; expected a result file, as invdyn writes it", path)
 
@@ -133,14 +202,3 @@ def _foreign(found: object, expected: str) -> str:
     if found.partition("/")[0] != expected.partition("/")[0]:
         return f"has the format {found}, but expected is a file of the format {expected}"
     return f"has the format {found}, but this version reads {expected}; run invdyn again"
-
-
-@contextlib.contextmanager
-def _reporting_damage(path: str | Path) -> Iterator[None]:
-    """HDF5 reports truncation and corruption by any of these exceptions."""
-    try:
-        yield
-    except BlockingIOError as error:
-        raise StorageError(path, "cannot be read: another program has it open for writing") from error
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError) as error:
-        raise InputError.one(f"is damaged or truncated ({error}); run invdyn again", path) from error

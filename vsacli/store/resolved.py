@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,8 +30,7 @@ LABELS = {"axis": ("x", "y", "z"), "bound": ("lower", "upper")}
 """Dimensions that only the robot's arrays have."""
 
 
-@dataclass(frozen=True)
-class ResolvedField:
+class ResolvedField(NamedTuple):
     """The values of one declared field.
 
     Attributes:
@@ -61,7 +58,7 @@ def _of_record(record: Any) -> Iterator[ResolvedField]:
         content = getattr(record, name)
         if content is not None:
             for part in _of_kind(field.kind, content, field):
-                yield dataclasses.replace(part, path=(name, *part.path))
+                yield part._replace(path=(name, *part.path))
 
 
 def _of_kind(kind: Kind, content: Any, field: Field) -> Iterable[ResolvedField]:
@@ -94,7 +91,7 @@ def _leaf(dims: tuple[str, ...], quantity: Quantity | None, field: Field, conten
 
 def _of_variant(kind: OneOf, content: Any, field: Field) -> Iterator[ResolvedField]:
     word = next(name for name, variant in kind.variants.items() if type(content) is variant)
-    yield dataclasses.replace(_leaf((), None, field, word), path=("type",))
+    yield _leaf((), None, field, word)._replace(path=("type",))
     yield from _of_record(content)
 
 
@@ -104,7 +101,7 @@ def _stack(dim: str, members: Sequence[list[ResolvedField]]) -> Iterator[Resolve
     for path, part in _prototypes(members).items():
         absent = np.full_like(part.values, "" if part.quantity is None else np.nan)
         values = np.stack([_fitted(table.get(path, absent), absent) for table in tables])
-        yield dataclasses.replace(part, dims=(dim, *part.dims), values=values)
+        yield part._replace(dims=(dim, *part.dims), values=values)
 
 
 def _prototypes(members: Sequence[list[ResolvedField]]) -> dict[tuple[str, ...], ResolvedField]:

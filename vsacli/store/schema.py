@@ -9,7 +9,8 @@ import numpy as np
 
 from vsacli.flags import Flag
 from vsacli.units import Quantity, WrenchQuantity
-from vsacli.variables import Variable
+from vsacli.variables import MOTORS, Variable
+from vsacli.wrench import WRENCH_AXES
 
 FORMAT = "vsacli-result/1"
 CHUNK_BYTES = 2**20
@@ -49,6 +50,12 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
 def storage_type(variable: Variable) -> np.dtype[Any]:
     """Little-endian type of a variable in the file."""
     return np.dtype("<u2") if variable.name == "flags" else np.dtype("<f8")
+
+
+def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
+    """Lengths of the axes after time."""
+    lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
+    return tuple(lengths[dim] for dim in variable.dims)
 
 
 def chunk_rows(samples: int, row_bytes: int) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.errors import InputError
 from vsacli.pipeline import BLOCK_SAMPLES
-from vsacli.profiles import POSITION, STIFFNESS, WRENCH, ClosedForm, Constant, RestToRest, Signal
+from vsacli.profiles import POSITION, STIFFNESS, WRENCH, Constant, RestToRest, Signal
 from vsacli.store.atomic import AtomicFile, check_target, reporting_storage_errors
 from vsacli.trajectory import Profile, Trajectory
 from vsacli.trajectory_file import FORMAT
@@ -43,7 +43,8 @@ def write_fixed(
 ) -> tuple[Path, Path]:
     """Write a trajectory with recorded stiffness as a YAML file and a CSV file of the same stem.
 
-    Position and wrench stay formulas if they are, else they are recorded with all their derivatives.
+    Position and wrench stay formulas if they are constants or polynomials from rest to rest; else they are
+    recorded at the steps with all their derivatives.
 
     Returns:
         The two paths.
@@ -83,13 +84,17 @@ def _document(trajectory: Trajectory, table: str) -> str:
 
 
 def _course(profile: Profile, table: str) -> str:
+    return _formula(profile) or f"type: csv, file: {json.dumps(table)}"
+
+
+def _formula(profile: Profile) -> str | None:
+    """How a profile that does not depend on the times of the steps is declared; None for the others."""
     match profile:
         case RestToRest(degree=degree, start=start, end=end):
             return f"type: polynomial, degree: {degree}, start: {_numbers(start)}, end: {_numbers(end)}"
         case Constant(value=value):
             return f"type: constant, value: {_numbers(value)}"
-        case _:
-            return f"type: csv, file: {json.dumps(table)}"
+    return None
 
 
 def _numbers(values: Sequence[float]) -> str:
@@ -110,12 +115,12 @@ def _write_table(trajectory: Trajectory, joint_names: Sequence[str], stream: Tex
 
 
 def _recorded(trajectory: Trajectory) -> Iterator[Signal]:
-    """The signals that are no formula."""
+    """The signals that are not declared as formulas."""
     profiles = {POSITION: trajectory.position, STIFFNESS: trajectory.stiffness}
     if trajectory.wrench is not None:
         profiles[WRENCH] = trajectory.wrench.profile
     for signal, profile in profiles.items():
-        if not isinstance(profile, ClosedForm):
+        if _formula(profile) is None:
             yield signal
 
 

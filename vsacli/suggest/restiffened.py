@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from vsacli.arrays import FloatArray
+from vsacli.fits import INTERPOLATE
 from vsacli.profiles import STIFFNESS
-from vsacli.samples import SampledProfile
+from vsacli.samples import SampledProfile, Samples
 from vsacli.times import RecordedTimes
 from vsacli.trajectory import Trajectory
 
@@ -24,7 +25,11 @@ def restiffened(trajectory: Trajectory, changes: Mapping[int, FloatArray]) -> Tr
     for joint, change in changes.items():
         rows[:, joint] += change
     values, *derivatives = rows
-    stiffness = SampledProfile(signal=STIFFNESS, time=time, values=values, derivatives=tuple(derivatives))
+    labels = tuple(f"column {joint}" for joint in range(len(values)))
+    record = Samples(
+        signal=STIFFNESS, time=time, values=values, derivatives=tuple(derivatives), labels=labels
+    )
+    stiffness = SampledProfile.of(record, INTERPOLATE)
     name = f"{trajectory.name}-fixed"
     return Trajectory(
         RecordedTimes(time), trajectory.position, stiffness, wrench=trajectory.wrench, name=name

@@ -1,113 +1,19 @@
-"""Courses of position, stiffness and wrench over time, in closed form: rest to rest, and constant."""
+"""Polynomials from rest to rest."""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
-from typing import Self
 
 import numpy as np
-from numpy.polynomial import polynomial
 
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
-from vsacli.times import stretch
-from vsacli.wrench import WRENCH_AXES, WRENCH_NAMES
-
-DEGREES = range(3, 16, 2)
-"""Degrees that a rest-to-rest polynomial may have."""
-
-
-@dataclass(frozen=True)
-class Signal:
-    """What a profile describes: a value, and the derivatives of it that are needed.
-
-    Attributes:
-        names: the value and its derivatives, as in files and in `Motion`.
-        spline_degree: odd degree of the spline through recorded values.
-        positive: whether the value must be positive.
-        optional: whether a component may have no value, so that it is NaN all the time.
-        components: how many numbers a value has; None: one a joint.
-    """
-
-    names: tuple[str, ...]
-    spline_degree: int
-    positive: bool = False
-    optional: bool = False
-    components: int | None = None
-
-    @property
-    def orders(self) -> int:
-        """Number of functions in a profile: the value and its derivatives."""
-        return len(self.names)
-
-
-POSITION = Signal(("q", "dq", "ddq", "d3q", "d4q"), spline_degree=5)
-STIFFNESS = Signal(("stiffness", "dstiffness", "ddstiffness"), spline_degree=3, positive=True, optional=True)
-WRENCH = Signal(WRENCH_NAMES, spline_degree=3, components=len(WRENCH_AXES))
-
-
-@dataclass(frozen=True, kw_only=True)
-class ClosedForm(ABC):
-    """A profile given by a formula, analytic between the two ends of its span, in s."""
-
-    signal: Signal
-    span: tuple[float, float]
-
-    def __post_init__(self) -> None:
-        first, last = self.span
-        if not (math.isfinite(first) and math.isfinite(last) and first < last):
-            raise InputError.one(f"a profile must last a positive time, not from {first:g} to {last:g} s")
-
-    @property
-    @abstractmethod
-    def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Nothing: a formula leaves no doubt."""
-        return ()
-
-    @property
-    def breakpoints(self) -> FloatArray:
-        """The ends of the span."""
-        return np.array(self.span)
-
-    @abstractmethod
-    def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
-
-    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
-        """The same at the steps start..stop-1, whose times are `time`."""
-        return self.at(time)
-
-    def stretched(self, factor: float) -> Self:
-        """The same course, slower by a factor."""
-        first, last = self.span
-        return replace(self, span=(first, stretch(last, first, factor)))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Constant(ClosedForm):
-    """The same `value`, one number a component, all the time."""
-
-    value: tuple[float, ...]
-
-    @property
-    def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
-        return len(self.value)
-
-    def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
-        rows = np.zeros((self.signal.orders, self.components, len(time)))
-        rows[0] = np.array(self.value)[:, None]
-        return rows
+from vsacli.profiles.closed_form import ClosedForm
+from vsacli.profiles.degrees import DEGREES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +63,7 @@ def _rise(u: FloatArray, degree: int) -> FloatArray:
     With m = (degree-1)/2 it is u^(m+1) sum over k = 0..m of binomial(m+k, k) (1-u)^k.
     """
     m = (degree - 1) // 2
-    series = polynomial.polyval(1 - u, [math.comb(m + k, k) for k in range(m + 1)])
+    series = np.polyval([math.comb(m + k, k) for k in range(m, -1, -1)], 1 - u)
     return series * _power(u, m + 1)
 
 

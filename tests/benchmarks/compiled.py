@@ -1,0 +1,155 @@
+"""Compiled code beside casadi: batches of samples, single calls, and what code of longer chains costs."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from casadi_peer import CasadiPeer
+from kernel import CASADI
+from subjects import chain, motion, seven_joints
+from timing import Seconds, medians
+
+from vsacli.arrays import FloatArray
+from vsacli.codegen.project import generate, prefix_of
+from vsacli.engine.compiler import FLAGS, system_compiler
+from vsacli.engine.engines import CompiledEngine, Engine
+from vsacli.engine.kernel import Kernel, record
+from vsacli.engine.lanes import batch_source
+from vsacli.newton_euler import LinkTorques
+from vsacli.pipeline import BLOCK_SAMPLES
+from vsacli.robot import Robot
+from vsacli.steps import InverseDynamics
+
+LINKS, WHOLE = "link torques", "whole inverse dynamics"
+JOINTS = (1, 2, 3, 5, 7, 10, 15, 20)
+CALLS = 1_000_000
+SCALAR_FLAGS = ("-std=c99", "-O2", "-march=native")
+
+CALLER = """
+#include <time.h>
+#include "{prefix}.h"
+/* Nanoseconds of each of many calls, which step through the commands. */
+void time_calls(const {prefix}_command *commands, int count, int calls, int *nanoseconds)
+{{
+    {prefix}_drive drive;
+    for (int n = 0; n < calls; n++) {{
+        struct timespec begin, end;
+        clock_gettime(CLOCK_MONOTONIC, &begin);
+        {prefix}_inverse_dynamics(&commands[n % count], &drive);
+        clock_gettime(CLOCK_MONOTONIC, &end);
+        nanoseconds[n] = (int)(1000000000L * (end.tv_sec - begin.tv_sec) + end.tv_nsec - begin.tv_nsec);
+    }}
+}}
+"""
+
+
+def batches(samples: int, repeats: int) -> Seconds:
+    """Seconds a sample of the arm with seven joints: casadi, and both kernels in one and two threads."""
+    robot = seven_joints()
+    moving = motion(7, samples)
+    rows = [row for array in moving for row in np.ascontiguousarray(array.T)]
+    stiffness = [np.full(samples, 1000.0)] * 7 + [np.zeros(samples)] * 14
+    with tempfile.TemporaryDirectory() as folder:
+        casadi = CasadiPeer(robot, Path(folder))
+        ways = {CASADI: lambda: casadi(moving)[0]}
+        for threads in (1, 2):
+            engine = CompiledEngine(system_compiler(), threads, print)
+            for name, kernel, given in (
+                (LINKS, LinkTorques(robot), rows),
+                (WHOLE, InverseDynamics(robot), [*rows, *stiffness]),
+            ):
+                engine.prepare(kernel)
+                ways[f"{name}, {threads}"] = _in_blocks(engine, kernel, given)
+        return {name: seconds / samples for name, seconds in medians(ways, repeats).items()}
+
+
+def _in_blocks(engine: Engine, kernel: Kernel, rows: Sequence[FloatArray]) -> Callable[[], object]:
+    """As a run takes them."""
+
+    def way() -> None:
+        for start in range(0, len(rows[0]), BLOCK_SAMPLES):
+            engine.run(kernel, [row[start : start + BLOCK_SAMPLES] for row in rows])
+
+    return way
+
+
+class Calls(NamedTuple):
+    """Microseconds of single calls of the generated inverse dynamics."""
+
+    median: float
+    most: float
+    worst: float
+
+
+def single_calls(calls: int = CALLS) -> Calls:
+    """Time each of many calls; `most` is what 99.9 % of them stay below."""
+    robot = seven_joints()
+    prefix = prefix_of(robot)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, text in generate(robot).files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        (folder / "caller.c").write_text(CALLER.format(prefix=prefix), encoding="utf-8")
+        command = ["cc", *SCALAR_FLAGS, "-D_POSIX_C_SOURCE=199309L", "-fPIC", "-shared", f"{prefix}.c"]
+        subprocess.run([*command, "caller.c", "-o", "caller.so", "-lm"], cwd=folder, check=True)
+        library = ctypes.CDLL(str(folder / "caller.so"))
+    count = 1000
+    commands = np.zeros((count, 8, 7))
+    commands[:, :5] = np.stack(motion(7, count), axis=1)
+    commands[:, 5] = 1000
+    taken = np.empty(calls, dtype=np.int32)
+    library.time_calls(
+        commands.ctypes.data_as(ctypes.c_void_p), count, calls, taken.ctypes.data_as(ctypes.c_void_p)
+    )
+    return Calls(
+        *(float(value) / 1e3 for value in (np.median(taken), np.quantile(taken, 0.999), taken.max()))
+    )
+
+
+class Cost(NamedTuple):
+    """What code of inverse dynamics costs: operations, bytes of machine code and of stack, seconds to make it.
+
+    `recording` and `compiling` are of the batch library, the rest of the generated function.
+    """
+
+    operations: int
+    code: int
+    stack: int
+    recording: float
+    compiling: float
+
+
+def costs() -> dict[int, Cost]:
+    """Over the number of joints."""
+    return {joints: _cost(chain(joints)) for joints in JOINTS}
+
+
+def _cost(robot: Robot) -> Cost:
+    prefix = prefix_of(robot)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        begin = time.perf_counter()
+        listing = record(InverseDynamics(robot))
+        (folder / "batch.c").write_text(batch_source(listing), encoding="utf-8")
+        recorded = time.perf_counter()
+        subprocess.run(["cc", *FLAGS, "batch.c", "-o", "batch.so", "-lm"], cwd=folder, check=True)
+        compiled = time.perf_counter()
+        for file, text in generate(robot).files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        command = ["cc", *SCALAR_FLAGS, "-fstack-usage", "-c", f"{prefix}.c"]
+        subprocess.run(command, cwd=folder, check=True)
+        symbols = subprocess.run(
+            ["nm", "-S", f"{prefix}.o"], cwd=folder, check=True, capture_output=True, text=True
+        ).stdout.splitlines()
+        stacks = (folder / f"{prefix}.su").read_text().splitlines()
+    wanted = f"{prefix}_inverse_dynamics"
+    code = next(int(line.split()[1], 16) for line in symbols if line.endswith(f" {wanted}"))
+    stack = next(int(line.split()[-2]) for line in stacks if wanted in line)
+    return Cost(len(listing.operations), code, stack, recorded - begin, compiled - recorded)

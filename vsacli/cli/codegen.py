@@ -1,0 +1,42 @@
+"""`vsacli codegen`."""
+
+from __future__ import annotations
+
+import click
+
+from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.exit_codes import Exit
+from vsacli.cli.options import example, overwrite_option, robot_argument
+
+
+@click.command(
+    "codegen",
+    short_help="Write C code of a robot for its controller.",
+    epilog=example("vsacli codegen robots/vsa_3r.yaml -o controller"),
+)
+@robot_argument
+@click.option("-o", "--output", metavar="FOLDER", required=True, help="Folder for the code.")
+@click.option(
+    "--precision",
+    type=click.Choice(["double", "float"]),
+    default="double",
+    show_default=True,
+    help="Type of all numbers.",
+)
+@overwrite_option
+@talk_options
+def codegen(robot: str, output: str, precision: str, overwrite: bool, talk: Talk) -> int:
+    """Write C code for link torques, inverse dynamics and feedback linearization of ROBOT.
+
+    C99 that needs nothing but math.h: no allocation, nothing kept between calls, a bounded number of
+    operations. A test program with reference values, a Makefile and a README come along.
+    """
+    from vsacli.codegen.project import generate, write
+    from vsacli.robot_file import load_robot
+
+    project = generate(load_robot(robot), precision)
+    for path in write(project, output, overwrite=overwrite):
+        talk.note(f"wrote {path}")
+    for reason in project.omitted:
+        talk.note(reason)
+    return Exit.OK

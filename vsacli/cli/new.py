@@ -1,0 +1,85 @@
+"""`vsacli new`."""
+
+from __future__ import annotations
+
+import click
+
+from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.options import example, overwrite_option
+
+_output_option = click.option(
+    "-o", "--output", metavar="FILE", help="File to write; by default standard output."
+)
+
+
+@click.group(
+    "new",
+    short_help="Write a robot or trajectory file to begin with.",
+    epilog=example("vsacli new robot --joints RR"),
+)
+def new() -> None:
+    """Write a commented robot or trajectory file to begin with."""
+
+
+@new.command(
+    "robot",
+    short_help="A robot with these joints.",
+    epilog=example("vsacli new robot --joints RRP -o arm.yaml"),
+)
+@click.option(
+    "--joints",
+    metavar="LETTERS",
+    required=True,
+    help="A letter for each joint from the base to the tip: R (revolute) or P (prismatic).",
+)
+@click.option(
+    "--actuator",
+    type=click.Choice(["antagonistic", "elastic", "rigid"]),
+    default="antagonistic",
+    show_default=True,
+    help="What drives the joints.",
+)
+@_output_option
+@overwrite_option
+@talk_options
+def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk: Talk) -> None:
+    """Write a robot file with these joints, to be edited.
+
+    It can be computed with as it is. Each key has a comment; what is optional stands commented out.
+    """
+    from vsacli.templates import robot_template
+
+    _write(robot_template(joints, actuator), output, overwrite, talk)
+
+
+@new.command(
+    "trajectory",
+    short_help="A trajectory, for a robot of yours or for a new one.",
+    epilog=example("vsacli new trajectory --robot robots/rp_2.yaml -o move.yaml"),
+)
+@click.option("--robot", "robot_path", metavar="ROBOT", help="The robot that is to execute it.")
+@_output_option
+@overwrite_option
+@talk_options
+def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk: Talk) -> None:
+    """Write a trajectory file, to be edited: a motion from rest to rest whose torques start without a step.
+
+    Its numbers suit the joints, limits and springs of the robot; without one, those of a new robot with
+    revolute joints.
+    """
+    from vsacli.robot_file import load_robot
+    from vsacli.templates import trajectory_template
+
+    _write(
+        trajectory_template(None if robot_path is None else load_robot(robot_path)), output, overwrite, talk
+    )
+
+
+def _write(text: str, output: str | None, overwrite: bool, talk: Talk) -> None:
+    if output is None:
+        click.echo(text, nl=False)
+        return
+    from vsacli.store.atomic import write_text
+
+    write_text(output, text, overwrite=overwrite)
+    talk.note(f"wrote {output}")

@@ -1,0 +1,22 @@
+"""`vsacli schema`."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from vsacli.cli.options import example
+
+
+@click.command(
+    "schema",
+    short_help="Print the JSON Schema of a YAML format, for editors.",
+    epilog=example("vsacli schema robot > robot.schema.json"),
+)
+@click.argument("kind", type=click.Choice(["robot", "trajectory", "poles"]))
+def schema(kind: str) -> None:
+    """Print the JSON Schema of a YAML format, with which editors complete keys and mark mistakes."""
+    from vsacli.documents import DOCUMENTS
+
+    click.echo(json.dumps(DOCUMENTS[kind].schema(), indent=1))

@@ -1,0 +1,53 @@
+"""`vsacli validate`."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.exit_codes import Exit
+from vsacli.cli.options import example
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from vsacli.validation import Checked
+
+
+@click.command(
+    "validate",
+    short_help="Report everything that is wrong with files of any kind.",
+    epilog=example("vsacli validate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml"),
+)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.option("--json", "as_json", is_flag=True, help="Print what is found as a JSON list.")
+@talk_options
+def validate(files: tuple[str, ...], as_json: bool, talk: Talk) -> int:
+    """Report everything that is wrong with each FILE.
+
+    Robots, trajectories, poles, CSV tables, URDFs and results are told apart by what they hold. A trajectory,
+    or a file of poles, must fit one of the robots among the files; without any, joint names, units and limits
+    are not checked. Warnings and notes are no problems; with --quiet, only problems are printed.
+    """
+    from vsacli.validation import check_files
+
+    checked = check_files(list(dict.fromkeys(files)))
+    if as_json:
+        findings = [finding.as_json() for file in checked for finding in file.findings]
+        click.echo(json.dumps(findings, indent=1))
+    else:
+        for line in _lines(checked, talk):
+            click.echo(line)
+    return Exit.OK if all(file.passed for file in checked) else Exit.USAGE
+
+
+def _lines(checked: Sequence[Checked], talk: Talk) -> Iterator[str]:
+    for file in checked:
+        if file.passed and talk.quiet:
+            continue
+        if file.passed:
+            yield f"{file.path}: ok, {file.summary}"
+        yield from map(str, file.findings)

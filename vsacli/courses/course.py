@@ -1,0 +1,77 @@
+"""What all courses have in common."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+
+from vsacli.errors import FieldProblem, InputError
+from vsacli.profiles import ClosedForm, Signal
+
+SAME_TIME = 1e-9
+"""Times whose difference is a smaller share than this are the same, but for rounding in a file."""
+
+PROBES = 101
+"""Times at which it is looked whether derivatives are finite."""
+
+Values: TypeAlias = tuple[float | None, ...]
+"""A number for each joint or axis, None for joints without stiffness."""
+
+
+class Course(ABC):
+    """How position, stiffness or wrench goes on over time, as declared in a trajectory file."""
+
+    signal: ClassVar[Signal]
+
+    @property
+    def lasts(self) -> float | None:
+        """The duration that follows from what is declared, s; None if any will do."""
+        return None
+
+    @abstractmethod
+    def over(self, span: tuple[float, float]) -> ClosedForm:
+        """The profile from the first to the last time of a span, in s."""
+
+    def problems_over(self, duration: float) -> Iterator[FieldProblem]:
+        """What keeps it from lasting so long, in s."""
+        if self.lasts is not None and not same_time(self.lasts, duration):
+            yield FieldProblem((), f"lasts {self.lasts:.10g} s, but the trajectory {duration:.10g} s")
+            return
+        try:
+            finite = _is_finite(self.over((0.0, duration)))
+        except InputError as error:
+            yield FieldProblem((), str(error))
+        else:
+            if not finite:
+                yield FieldProblem((), "its numbers are so large that derivatives are none any more")
+
+    def remarks_over(self, _span: tuple[float, float], _joints: Mapping[str, str], /) -> Iterator[str]:
+        """What the user should know about it over a span, in clauses.
+
+        Args:
+            _span: in s.
+            _joints: name and type of each.
+        """
+        return iter(())
+
+
+def _is_finite(profile: ClosedForm) -> bool:
+    """Whether value and derivatives are numbers at some times, but for components that never are."""
+    with np.errstate(all="ignore"):
+        rows = profile.at(np.linspace(*profile.span, PROBES))
+    absent = np.isnan(rows[0]).all(axis=-1)  # derivatives of a constant are zero even there
+    return bool(np.isfinite(rows[:, ~absent]).all())
+
+
+def same_time(one: float, other: float) -> bool:
+    """Whether two times are the same but for rounding."""
+    return math.isclose(one, other, rel_tol=SAME_TIME)
+
+
+def numbers(values: Values) -> tuple[float, ...]:
+    """NaN in place of None."""
+    return tuple(math.nan if value is None else value for value in values)

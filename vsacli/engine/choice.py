@@ -1,0 +1,93 @@
+"""Which engine is worth its while."""
+
+from __future__ import annotations
+
+import os
+from typing import NamedTuple
+
+from vsacli.engine.engines import CompiledEngine, Engine, NumPyEngine
+from vsacli.engine.kernel import Kernel
+from vsacli.errors import InputError
+from vsacli.suggestions import did_you_mean
+
+NAMES = ("numpy", "c", "auto")
+"""Engines that may be asked for."""
+
+COMPILE_FROM = 200_000
+"""Samples with which NumPy is busy for longer than the compiler; with more joints both take longer."""
+
+LOOK_FROM = 20_000
+"""Samples with which it is busy for longer than it takes to see whether there is compiled code."""
+
+RECORD_FROM = 100_000
+"""Samples from which on NumPy saves more time with a recorded program than recording it takes."""
+
+NUMPY: Engine = NumPyEngine()
+
+
+class Choice(NamedTuple):
+    """An engine.
+
+    Attributes:
+        engine: it.
+        reason: what computes, and why; a clause.
+        remarks: what was wrong on the way to it.
+    """
+
+    engine: Engine
+    reason: str
+    remarks: tuple[str, ...] = ()
+
+
+def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) -> Choice:
+    """The engine for a computation.
+
+    Args:
+        name: one of `NAMES`; "auto" takes compiled code where that saves time.
+        kernel: what is computed.
+        samples: over how many samples.
+        threads: of compiled code; as many as there are processors if None.
+
+    Raises:
+        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works.
+    """
+    if name not in NAMES:
+        raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
+    if name == "numpy":
+        return Choice(_numpy(samples), "NumPy computes, as asked for")
+    if name == "auto" and samples < LOOK_FROM:
+        return Choice(NUMPY, f"NumPy computes: {samples} samples are few")
+    from vsacli.engine.compiler import CompilerError, system_compiler
+
+    threads = threads or _processors()
+    remarks: list[str] = []
+    try:
+        engine = CompiledEngine(system_compiler(), threads, remarks.append)
+        loaded = engine.prepare(kernel, build=name == "c" or samples >= COMPILE_FROM)
+    except CompilerError as error:
+        if name == "c":
+            raise InputError.one(f"{error}; the engine numpy needs none") from error
+        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(remarks))
+    if loaded is None:
+        return Choice(
+            _numpy(samples), f"NumPy computes: {samples} samples would not repay compiling", tuple(remarks)
+        )
+    when = "now" if loaded.compiled else "before"
+    return Choice(engine, f"C code computes, compiled {when}, in {_counted(threads)}", tuple(remarks))
+
+
+def _numpy(samples: int) -> Engine:
+    if samples < RECORD_FROM:
+        return NUMPY
+    from vsacli.engine.recorded import RecordedEngine
+
+    return RecordedEngine()
+
+
+def _counted(threads: int) -> str:
+    return f"{threads} threads" if threads > 1 else "1 thread"
+
+
+def _processors() -> int:
+    """Those that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

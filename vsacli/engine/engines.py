@@ -1,0 +1,79 @@
+"""The engines: what carries out a kernel on rows of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from vsacli.arrays import FloatArray
+from vsacli.engine.kernel import Kernel
+
+if TYPE_CHECKING:
+    from vsacli.engine.compiler import Compiler
+    from vsacli.engine.loading import Loaded, Tell
+
+SAMPLES_PER_PASS = 4096
+"""Samples that NumPy takes at a time: fewer waste time in the interpreter, more leave the caches."""
+
+INPUTS_PER_PASS = 5 * 2**19
+"""Bound on a kernel's inputs times samples at a time: the recursion keeps about 100 bytes for each."""
+
+
+class Engine(Protocol):
+    """What carries out kernels."""
+
+    def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
+        """The kernel's outputs, (outputs, samples), from its inputs, contiguous rows (samples,)."""
+
+
+class NumPyEngine:
+    """The kernel itself, on a number of samples at a time."""
+
+    def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
+        """As of `Engine`."""
+        samples = len(rows[0])
+        outputs = np.empty((kernel.outputs, samples))
+        step = max(1, min(SAMPLES_PER_PASS, INPUTS_PER_PASS // len(rows)))
+        for start in range(0, samples, step):
+            part = slice(start, start + step)
+            for output, row in zip(outputs, kernel([row[part] for row in rows]), strict=True):
+                output[part] = row
+        return outputs
+
+
+class CompiledEngine:
+    """Machine code, compiled for each kernel when it is first needed.
+
+    Args:
+        compiler: what compiles.
+        threads: how many run at once.
+        tell: learns what is wrong with the cache of compiled code.
+    """
+
+    def __init__(self, compiler: Compiler, threads: int, tell: Tell) -> None:
+        self._compiler = compiler
+        self._threads = threads
+        self._tell = tell
+        self._loaded: dict[Kernel, Loaded] = {}
+
+    def prepare(self, kernel: Kernel, *, build: bool = True) -> Loaded | None:
+        """Load a kernel's code, if need be and if told to by compiling it; None if there is no such code.
+
+        Raises:
+            CompilerError: it cannot be compiled.
+        """
+        if kernel not in self._loaded:
+            from vsacli.engine.loading import load
+
+            loaded = load(kernel, self._compiler, self._tell, build=build)
+            if loaded is None:
+                return None
+            self._loaded[kernel] = loaded
+        return self._loaded[kernel]
+
+    def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
+        """As of `Engine`."""
+        self.prepare(kernel)
+        return self._loaded[kernel].library(rows, self._threads)

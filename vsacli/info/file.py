@@ -1,0 +1,53 @@
+"""The description of a file of any kind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vsacli.errors import InputError
+from vsacli.info.result import describe_result
+from vsacli.info.robot import describe_robot
+from vsacli.info.trajectory import describe_trajectory
+from vsacli.recognition import FileKind, recognise
+from vsacli.robot_file import load_robot
+from vsacli.stand_in import stand_in
+from vsacli.store.reader import open_result
+from vsacli.store.simulation import StoredSimulation
+from vsacli.trajectory_file import load_trajectory
+
+
+def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
+    """What a robot, trajectory, result or simulation file holds, as plain values in SI units.
+
+    Args:
+        path: the file.
+        robot_path: the robot that a trajectory is for, if its joints shall have their names.
+
+    Raises:
+        InputError: the file is of another kind, or cannot be used.
+    """
+    match recognise(path):
+        case FileKind.ROBOT:
+            return describe_robot(load_robot(path))
+        case FileKind.TRAJECTORY | FileKind.TABLE:
+            return _described_trajectory(path, robot_path)
+        case FileKind.RESULT as kind:
+            with open_result(path) as result:
+                return describe_result(result, kind.value)
+        case FileKind.SIMULATION as kind:
+            with StoredSimulation.open(path) as simulation:
+                return describe_result(simulation, kind.value)
+        case kind:
+            expected = "a robot, a trajectory, a result or a simulation"
+            raise InputError.one(f"is a file of the kind {kind.value}; expected {expected}", path)
+
+
+def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:
+    if robot_path is not None:
+        robot = load_robot(robot_path)
+    else:
+        robot, ordered = stand_in(path)
+        if not ordered:
+            hint = "name the robot with --robot ROBOT"
+            raise InputError.one(f"does not say which joint is which in its lists; {hint}", path)
+    return describe_trajectory(load_trajectory(path, robot), robot.joint_names)

@@ -1,0 +1,88 @@
+"""Loops, branches and tables of single samples, on arrays of symbols and constants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from vsacli.tracing.array import TracedArray, cells_of
+from vsacli.tracing.operations import kind_of
+from vsacli.tracing.pruning import Listing
+from vsacli.tracing.symbol import Operand, Symbol, Table
+from vsacli.tracing.tape import record
+from vsacli.tracing.ufuncs import each
+
+Function = Callable[..., Any]
+
+
+def repeat_traced(
+    first: TracedArray, step: Function, state: Sequence[Any], constants: Sequence[Any], limit: int
+) -> tuple[TracedArray, ...]:
+    """`vsacli.springs.loops.repeat`: the step is recorded once, and repeated when the program runs."""
+    tape, count = first.tape, len(state)
+
+    def body(symbols: list[Symbol]) -> Sequence[Operand]:
+        rows = _rows(symbols)
+        following, done = step(tuple(rows[:count]), tuple(rows[count:]))
+        return _entries(*following, done)
+
+    def one(*entries: Operand) -> Sequence[Operand]:
+        listing = record(body, list(map(kind_of, entries)))
+        return tape.record_loop(listing, limit, entries[:count], entries[count:])
+
+    return _each(one, first, [*state, *constants], count)
+
+
+def branch_traced(
+    mask: TracedArray, function: Function, arguments: Sequence[Any], otherwise: Sequence[Any]
+) -> tuple[TracedArray, ...]:
+    """`vsacli.springs.loops.where_needed`: the function is recorded, and runs where the mask holds."""
+    tape, count = mask.tape, len(otherwise)
+
+    def body(symbols: list[Symbol]) -> Sequence[Operand]:
+        return _entries(*function(*_rows(symbols)))
+
+    def one(truth: Operand, *entries: Operand) -> Sequence[Operand]:
+        if truth is False:
+            return entries[:count]
+        listing: Listing = record(body, list(map(kind_of, entries[count:])))
+        return tape.record_branch(truth, listing, entries[count:], entries[:count])
+
+    return _each(one, mask, [mask, *otherwise, *arguments], count)
+
+
+def look_up_traced(index: TracedArray, constants: Any) -> TracedArray:
+    """`vsacli.springs.loops.look_up`."""
+    table = Table(tuple(np.asarray(constants, dtype=np.float64).tolist()))
+    return TracedArray(index.tape, each(lambda cell: index.tape.record("take", table, cell), index.cells))
+
+
+def _rows(symbols: Sequence[Symbol]) -> list[TracedArray]:
+    return [TracedArray(symbol.tape, [symbol]) for symbol in symbols]
+
+
+def _entries(*arrays: Any) -> list[Operand]:
+    return [cells_of(array).item() for array in arrays]
+
+
+def _each(
+    one: Callable[..., Sequence[Operand]], like: TracedArray, arrays: Sequence[Any], count: int
+) -> tuple[TracedArray, ...]:
+    """A function with `count` results for each entry of arrays."""
+    spread = np.broadcast_arrays(*map(cells_of, arrays), subok=False)
+    results: Iterator[Sequence[Operand]] = (
+        one(*entries) for entries in zip(*(cells.flat for cells in spread), strict=True)
+    )
+    columns = zip(*results, strict=True)
+    shape = spread[0].shape
+    made = tuple(TracedArray(like.tape, _shaped(column, shape)) for column in columns)
+    assert len(made) == count
+    return made
+
+
+def _shaped(entries: Sequence[Operand], shape: tuple[int, ...]) -> Any:
+    cells = np.empty(len(entries), dtype=object)
+    cells[:] = entries
+    return cells.reshape(shape)
