@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-
 from cli_samples import REPOSITORY
-from robots import random_robot
 from spring_samples import SPRINGS
+
+from robots import random_robot
 from vsacli import load_robot
 from vsacli.arrays import FloatArray
 from vsacli.motion import Motion
@@ -28,7 +28,7 @@ def with_springs(law: str) -> Robot:
     """Two light joints: springs of a law alike, and unlike, with limits that some of the samples break."""
     (one, _), (other, _) = SPRINGS[law]
     robot = random_robot("RR", seed=8)
-    motor = Motor(inertia=0.1, damping=0.1, max_torque=20.0, max_velocity=3.0)
+    motor = Motor(inertia=0.1, damping=0.1, max_torque=20.0, max_velocity=2.5)
     joints = tuple(
         dataclasses.replace(
             joint,

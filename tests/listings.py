@@ -31,9 +31,7 @@ def recorded(function: Callable[..., Any], count: int) -> Listing:
 
 def carry_out(listing: Listing, inputs: Sequence[FloatArray]) -> Values:
     """The outputs for rows of samples; constants among them are as they are."""
-    found: dict[int, Any] = {
-        symbol.index: row for symbol, row in zip(listing.inputs, inputs, strict=True)
-    }
+    found: dict[int, Any] = {symbol.index: row for symbol, row in zip(listing.inputs, inputs, strict=True)}
 
     def value(operand: Any) -> Any:
         return found[operand.index] if isinstance(operand, Symbol) else operand

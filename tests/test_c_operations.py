@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from generated_code import COMPILERS, Compiled, compile_c
 from test_tracing import ELEMENTWISE, samples
-from test_tracing_nested import guarded, interpolated, nested, square_root, swapped
+from test_tracing_nested import FUNCTIONS as NESTED
 
 from vsacli.arrays import BoolArray, FloatArray
 from vsacli.codegen.interface import Array, Function, Structure
@@ -31,8 +31,6 @@ EXACT = ("operators", "add", "subtract", "multiply", "divide", "sqrt", "small po
 
 PROCESSORS = ("native", "x86-64", "x86-64-v3") if platform.machine() == "x86_64" else ("native",)
 """Registers of different widths, and a processor for which there are no vector functions."""
-
-NESTED = (square_root, swapped, guarded, nested, interpolated)
 
 
 def as_number(name: str, x: Any, y: Any) -> Any:

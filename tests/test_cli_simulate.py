@@ -169,6 +169,6 @@ def test_files_that_exist_are_kept(vsacli, quick, tmp_path):
 def test_a_simulation_is_no_result_of_invdyn(vsacli, quick, tmp_path):
     vsacli("simulate", ROBOT, quick, "-o", "s.h5")
     with pytest.raises(
-        InputError, match="has the format vsacli-simulation/1, but expected is a file of the format"
+        InputError, match=r"is a simulation \(vsacli-simulation/1\), expected a result \(vsacli-result/1\)"
     ):
         open_result(tmp_path / "s.h5")

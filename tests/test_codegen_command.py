@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
 from cli_samples import REPOSITORY, ROBOT, contents, edited
 from conftest import Outcome
 from generated_code import COMPILERS, STRICT, compile_c
+
 from vsacli.cli.exit_codes import Exit
 from vsacli.codegen.project import prefix_of
 from vsacli.robot import Robot
@@ -45,12 +45,12 @@ def test_the_written_files_compile(vsacli: Run, tmp_path: Path) -> None:
 
 def test_existing_files_stay_unless_told_otherwise(vsacli: Run, tmp_path: Path) -> None:
     (tmp_path / "arm").mkdir()
-    (tmp_path / "arm" / "vsa_3r.h").write_text("mine")
+    (tmp_path / "arm" / "README.md").write_text("mine")
     (tmp_path / "arm" / "main.c").write_text("mine too")
     before = contents(tmp_path)
     outcome = vsacli("codegen", ROBOT, "-o", "arm")
     assert outcome.code == Exit.STORAGE
-    assert "arm/vsa_3r.h: " in outcome.err
+    assert "arm/README.md: " in outcome.err
     assert "--overwrite" in outcome.err
     assert contents(tmp_path) == before
 
@@ -58,7 +58,7 @@ def test_existing_files_stay_unless_told_otherwise(vsacli: Run, tmp_path: Path) 
     after = contents(tmp_path / "arm")
     assert after.pop("main.c") == b"mine too"
     assert set(after) == FILES
-    assert after["vsa_3r.h"] != b"mine"
+    assert after["README.md"] != b"mine"
 
 
 def test_a_file_in_place_of_the_folder(vsacli: Run, tmp_path: Path) -> None:
@@ -112,7 +112,10 @@ def test_a_wrong_robot_writes_nothing(vsacli: Run, tmp_path: Path) -> None:
 def test_what_is_left_out_is_said(vsacli: Run) -> None:
     outcome = vsacli("codegen", REPOSITORY / "robots" / "mixed_3r.yaml", "-o", "arm")
     assert outcome.code == Exit.OK
-    assert "no feedback_linearization: feedback linearization needs springs at all joints or at none" in outcome.err
+    assert (
+        "no feedback_linearization: feedback linearization needs springs at all joints or at none"
+        in outcome.err
+    )
 
 
 @pytest.mark.parametrize(

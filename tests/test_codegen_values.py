@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from codegen_samples import CLOSE, clear, commands, motion_of, shipped, with_springs
 from generated_code import COMPILERS, compiled_robot
 from plants import all_rigid, elastic, random_state, with_actuators
-from robots import random_robot
 from spring_samples import SPRINGS
+
+from robots import random_robot
 from vsacli.arrays import FloatArray
 from vsacli.codegen.feedback_function import feedback_linearization_function
 from vsacli.codegen.robot_functions import inverse_dynamics_function, link_torques_function
@@ -89,7 +89,8 @@ def test_inverse_dynamics_of_what_is_no_number(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.isnan(found["tau_motor"]), np.isnan(block.tau_motor))
     bad = [0, 1, 2, 5, 6]
     assert np.isnan(found["tau_motor"][bad, 2]).all()
-    assert np.all(np.array(returned)[bad] != 0)
+    assert np.all(found["flags"][bad, 2] & Flag.INFEASIBLE)
+    assert np.all(np.array(returned)[bad] & Flag.INFEASIBLE)
 
 
 @pytest.mark.parametrize("types", ["R", "PRP", "RRPR"])
@@ -112,19 +113,31 @@ def loop_inputs(robot: Robot, order: int) -> tuple[State, dict[str, FloatArray],
     return state, commands(robot, 40, seed=7), Gains.from_poles(poles, (-25.0, -26.0, -27.0)), integral
 
 
-def run_feedback(robot: Robot, folder: Path, order: int) -> tuple[dict[str, FloatArray], list[int], FloatArray]:
+def run_feedback(
+    robot: Robot, folder: Path, order: int
+) -> tuple[dict[str, FloatArray], list[int], FloatArray]:
     """What C and the tool make of the same inputs."""
-    function = feedback_linearization_function(robot)
     state, command, gains, integral = loop_inputs(robot, order)
-    joints = len(robot.joints)
-    of_gains = {
-        name: np.broadcast_to(values, (40, joints, *values.shape[1:])) for name, values in vars(gains).items()
-    }
-    c = compiled_robot(folder / "c", robot, [function], "double")
-    found, returned = c(function, vars(state), command, of_gains, integral._asdict())
+    found, returned = call(robot, folder, state, command, gains, integral)
     with np.errstate(all="ignore"):
         expected = FeedbackLinearization(robot, gains)(state, motion_of(command), integral)
     return found, returned, expected
+
+
+def call(
+    robot: Robot,
+    folder: Path,
+    state: State,
+    command: dict[str, FloatArray],
+    gains: Gains,
+    integral: Integral,
+) -> tuple[dict[str, FloatArray], list[int]]:
+    function, shape = feedback_linearization_function(robot), state.q.shape
+    of_gains = {
+        name: np.broadcast_to(values, (*shape, *values.shape[1:])) for name, values in vars(gains).items()
+    }
+    c = compiled_robot(folder / "c", robot, [function], "double")
+    return c(function, vars(state), command, of_gains, integral._asdict())
 
 
 CONTROLLED = {
@@ -155,13 +168,33 @@ def test_feedback_linearization(name: str, tmp_path: Path) -> None:
 def test_a_singular_joint_is_flagged_and_the_others_are_not(tmp_path: Path) -> None:
     """Springs alike and deflected alike: det A is zero."""
     robot = shipped("vsa_3r")
-    function = feedback_linearization_function(robot)
-    state, command, gains, integral = loop_inputs(robot, 4)
+    state, *others = loop_inputs(robot, 4)
     state.theta[:, 1] = state.q[:, 1, None] + 0.1
-    of_gains = {name: np.broadcast_to(values, (40, 3, *values.shape[1:])) for name, values in vars(gains).items()}
-    c = compiled_robot(tmp_path / "c", robot, [function], "double")
-    found, returned = c(function, vars(state), command, of_gains, integral._asdict())
+    found, returned = call(robot, tmp_path, state, *others)
     assert np.isnan(found["tau_motor"][:, 1]).all()
     assert np.isfinite(found["tau_motor"][:, [0, 2]]).all()
     np.testing.assert_array_equal(found["flags"], np.broadcast_to([0, Flag.SINGULAR, 0], (40, 3)))
     assert set(returned) == {int(Flag.SINGULAR)}
+
+
+def test_limits_of_a_controlled_robot(tmp_path: Path) -> None:
+    """Of what is measured, and of the torque that comes out; beside a singular matrix, too."""
+    robot = with_springs("sinh")
+    state, *others = loop_inputs(robot, 4)
+    state.theta[:5, 0] = state.q[:5, 0, None] + 0.1
+    found, _ = call(robot, tmp_path, state, *others)
+    low, high = robot.joints[0].limits.position
+    expected = np.where((state.q < low) | (state.q > high), int(Flag.POSITION_LIMIT), 0)
+    expected |= np.where(np.abs(state.dq) > 0.9, int(Flag.VELOCITY_LIMIT), 0)
+    expected |= np.where(np.any(np.abs(state.dtheta) > 2.5, axis=-1), int(Flag.MOTOR_VELOCITY_LIMIT), 0)
+    excess = np.any(np.abs(found["tau_motor"]) > 20.0, axis=-1)
+    expected |= np.where(excess, int(Flag.MOTOR_TORQUE_LIMIT), 0)
+    expected[:5, 0] |= int(Flag.SINGULAR)
+    np.testing.assert_array_equal(found["flags"], expected)
+    for flag in (
+        Flag.POSITION_LIMIT,
+        Flag.VELOCITY_LIMIT,
+        Flag.MOTOR_VELOCITY_LIMIT,
+        Flag.MOTOR_TORQUE_LIMIT,
+    ):
+        assert 0 < np.count_nonzero(expected & flag) < expected.size

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from course_samples import (
     DWELL,
@@ -17,6 +18,7 @@ from course_samples import (
     STANDING,
     STEPS,
     VIA,
+    load,
     problems,
 )
 
@@ -86,11 +88,11 @@ CASES = {
     ),
     "huge points": (
         LASTING + "position: {type: via, degree: 7, points: [-1e308, 1e308, 0]}\n" + FIRM,
-        "5: position: the points are too unevenly spaced in time",
+        "5: points of joint arm: must be at most 1e+30 in size, not -1e+308",
     ),
     "huge times": (
-        HEAD + "rate: 1e-307\n" + VIA + "  times: [0, 1e308, 1.5e308]\n" + FIRM,
-        "4: position: a profile must last a positive time (1e-30 to 1e+30 s), not from 0 to 1.5e+308 s",
+        HEAD + "rate: 1e-30\n" + VIA + "  times: [0, 1e30, 1.5e30]\n" + FIRM,
+        "8: times: must be at most 1e+30 in size, not 1.5e+30",
     ),
     "a stiffness that is not positive": (
         LASTING + STANDING + SOFTENING.replace("900,", "-900,"),
@@ -113,8 +115,8 @@ CASES = {
         "7: frequency: must be positive, not 0",
     ),
     "too high a frequency": (
-        LASTING + SINUSOIDS.replace("0.5", "1e300") + "  sine: [1]\n" + FIRM,
-        "7: position.frequency: gives 4e+300 periods in 4 s; at most 1e+09 are possible",
+        LASTING + SINUSOIDS.replace("0.5", "1e29") + "  sine: [1]\n" + FIRM,
+        "7: position.frequency: gives 4e+29 periods in 4 s; at most 1e+09 are possible",
     ),
     "too many harmonics": (
         LASTING + SINUSOIDS + f"  sine: [{'0, ' * 100} 1]\n" + FIRM,
@@ -182,8 +184,8 @@ CASES = {
         "5: position: parts: durations from 1e-30 to 1.5 s cannot follow one another",
     ),
     "parts that last too long together": (
-        HEAD + SEQUENCE + GO.replace("1.5", "1e308") + DWELL.replace("0.7", "1e308") + FIRM,
-        "5: position: parts: durations from 1e+308 to 1e+308 s cannot follow one another",
+        HEAD + SEQUENCE + GO.replace("1.5", "1e30") + DWELL.replace("0.7", "1e30") + FIRM,
+        "5: position: parts: durations from 1e+30 to 1e+30 s cannot follow one another",
     ),
     "a duration that is not that of the parts": (
         LASTING + SEQUENCE + GO + DWELL + FIRM,
@@ -219,7 +221,7 @@ CASES = {
     ),
     "a polynomial of no duration": (
         HEAD + "duration: 1e-300\nposition: {type: polynomial, degree: 7, start: 0, end: 1}\n" + FIRM,
-        "4: position: a profile must last a positive time (1e-30 to 1e+30 s), not from 0 to 1e-300 s",
+        "3: duration: must be at least 1e-30 in size, not 1e-300",
     ),
 }
 
@@ -239,10 +241,12 @@ def test_every_joint_that_begins_elsewhere_is_named_at_once():
     ]
 
 
-@pytest.mark.parametrize("end", ["1e308", "[1e308, 0]"])
-def test_numbers_whose_derivatives_are_none_are_refused(end):
-    text = LASTING.replace("4", "1e-9").replace("100", "1e10")
-    text += f"position: {{type: polynomial, degree: 7, start: 0, end: {end}}}\n" + FIRM
-    assert problems(text) == [
-        "move.yaml:5: position: its numbers are so large that derivatives are none any more"
-    ]
+@pytest.mark.parametrize(("duration", "rate"), [("1e-30", "1e30"), ("1e30", "1e-30")])
+@pytest.mark.parametrize(
+    "position", ["polynomial, degree: 15, start: 0, end: 1e30", "via, degree: 9, points: [-1e30, 1e30, 0]"]
+)
+def test_the_largest_numbers_have_derivatives(duration, rate, position):
+    timing = f"duration: {duration}\nrate: {rate}\n"
+    moving = load(HEAD + timing + f"position: {{type: {position}}}\n" + FIRM)
+    block = moving.at(np.linspace(0, float(duration), 9))
+    assert np.isfinite([block.q, block.dq, block.ddq, block.d3q, block.d4q]).all()

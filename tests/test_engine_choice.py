@@ -12,7 +12,7 @@ from engine_samples import needs_compiler
 
 from robots import random_motion, vsa_3r
 from vsacli.engine import NUMPY, choice, choose
-from vsacli.engine.choice import COMPILE_FROM, LOOK_FROM
+from vsacli.engine.choice import LOOK_FROM
 from vsacli.engine.engines import CompiledEngine
 from vsacli.engine.loading import _loaded
 from vsacli.errors import InputError
@@ -49,7 +49,7 @@ def test_few_samples_are_left_to_numpy_and_nothing_is_compiled(name: str, own_ca
 
 @needs_compiler
 def test_auto_compiles_for_many_samples_and_remembers_it_for_fewer():
-    rarely, often = COMPILE_FROM - 1, COMPILE_FROM
+    rarely, often = LOOK_FROM, 10_000_000
     assert (
         choose("auto", KERNEL, rarely).reason == f"NumPy computes: {rarely} samples would not repay compiling"
     )
@@ -85,7 +85,7 @@ def test_compiler_that_does_not_work(
         program(tmp_path, "nocc", text)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     monkeypatch.setenv("CC", "nocc")
-    chosen = choose("auto", KERNEL, COMPILE_FROM)
+    chosen = choose("auto", KERNEL, 10_000_000)
     assert not isinstance(chosen.engine, CompiledEngine)
     assert chosen.reason.startswith("NumPy computes: ")
     assert reason in chosen.reason

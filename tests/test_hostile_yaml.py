@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from vsacli.errors import InputError
 from vsacli.robot_file import load_robot
-from vsacli.spec.source import MAX_DOCUMENT_BYTES, check_input_file
+from vsacli.spec.source import HDF5_SIGNATURE, MAX_DOCUMENT_BYTES, check_input_file
 from vsacli.trajectory_file import load_trajectory
 
 ROOT = Path(__file__).parent.parent
@@ -85,6 +85,12 @@ def test_200_megabytes_are_refused_by_their_size():
         file.truncate(200_000_000)
     expected = "noise.yaml: the file has 200,000,000 bytes, more than the 1,000,000 allowed here"
     assert only_problem("noise.yaml") == expected
+
+
+@pytest.mark.parametrize("size", [2000, 2_000_000])
+def test_a_result_in_place_of_a_robot(size):
+    Path("result.h5").write_bytes(HDF5_SIGNATURE + bytes(size))
+    assert only_problem("result.h5") == "result.h5: is an HDF5 file, such as a result; expected text"
 
 
 def test_the_largest_document():

@@ -64,6 +64,8 @@ def test_poles() -> None:
         ("format: vsacli-robot/1", "format: vsacli-robot/2"),
         ("mass: 9.0478", "mas: 9.0478"),
         ("mass: 9.0478", "mass: -1"),
+        ("mass: 9.0478", "mass: 1.0e+31"),
+        ("com: [0, 0, 0]", "com: [0, 0, -1.0e+31]"),
         ("mass: 9.0478", "mass: heavy"),
         ("mass: 9.0478", "mass: on"),
         ("mass: 9.0478", "mass: 90 deg"),

@@ -123,7 +123,11 @@ def test_numbers_of_joints_start_at_one(csv):
 
 def test_absent_signal_is_named_by_joint(csv):
     assert problems(csv(columns(*by_joint("q")))) == [
-        (1, "there is no column base.stiffness, elbow.stiffness")
+        (
+            1,
+            "there are no columns base.stiffness, elbow.stiffness;"
+            " a trajectory in YAML can take the motion from here and set the stiffness itself",
+        )
     ]
 
 

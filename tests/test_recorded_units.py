@@ -79,6 +79,17 @@ def test_units_of_a_wrench_are_forces_then_moments(robot):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11)  # of 1 kN, by a few operations
 
 
+def test_units_in_parentheses_are_told_to_stand_in_brackets():
+    header = ["time (ms)", "arm.q (deg)", "slide.q", "arm.stiffness", "slide.stiffness"]
+    write("m.csv", header, 1e3 * TIME, motion(), stiffness())
+    with pytest.raises(InputError) as caught:
+        recorded_trajectory("m.csv", JOINTS)
+    assert [str(problem) for problem in caught.value.problems][:2] == [
+        "m.csv:1: 'time (ms)': units are written in square brackets, time [ms]",
+        "m.csv:1: 'arm.q (deg)': units are written in square brackets, arm.q [deg]",
+    ]
+
+
 def test_all_units_that_do_not_fit_are_named_with_the_line():
     header = ["time[h]", "arm.q[m]", "slide.q[m]", "arm.stiffness[N/m]", "slide.stiffness[]"]
     write("m.csv", header, TIME, motion(), stiffness())

@@ -101,11 +101,12 @@ def test_whole_report_of_a_run_without_trouble():
     [
         (JointEnergy(9.66, NAN, NAN, NAN, NAN), []),
         (
-            JointEnergy(0.0, 3.0, 1.0, NAN, NAN),
-            ["energy: motors spend 3 J, take back 1 J; springs hold up to 0 J (elbow)"],
+            JointEnergy(0.5, 3.0, 1.0, NAN, NAN),
+            ["energy: motors spend 3 J, take back 1 J; springs hold up to 0.5 J (elbow)"],
         ),
+        (JointEnergy(0.0, 3.0, 1.0, NAN, NAN), ["energy: motors spend 3 J, take back 1 J"]),
     ],
-    ids=["a step without torques", "one motor"],
+    ids=["a step without torques", "one motor", "no springs"],
 )
 def test_energy_that_does_not_exist_is_not_mentioned(energy, expected):
     lines = render(report(QUIET._replace(energy=energy))).splitlines()
@@ -162,6 +163,7 @@ def test_one_step_is_singular_in_both_senses():
         (816.541821, 816.547384, ("816.5418", "816.5474")),
         (790.0, 790.0000012, ("790", "790.0000012")),
         (12000.0, 11999.5, ("12000", "11999.5")),
+        (7535.4, 12536.9, ("7535", "12537")),
         (800.0, 800.0, ("800", "800")),
     ],
 )
@@ -233,6 +235,11 @@ def test_times_between_milliseconds_are_told_apart():
 def test_small_margins_do_not_round_to_zero(margin, shown):
     row = line(render(report(QUIET._replace(margin=margin))), "elbow ")
     assert row.endswith(f"  {shown}")
+
+
+def test_peaks_next_to_a_singular_step_are_short():
+    row = line(render(report(QUIET._replace(peak_tau_motor=(1.2345678e9, 98.87)))), "elbow ")
+    assert "1.23e+09 / 98.9 N m" in row
 
 
 def test_peak_that_never_existed_is_a_dash():

@@ -159,6 +159,8 @@ def test_a_spring_shared_by_an_alias(load):
         ("mass: 2", "mass: -2", "9: mass: must be zero or positive, not -2"),
         ("inertia: 3.2", "inertia: 0", "15: inertia: must be positive, not 0"),
         ("k: 400", "k: -400", "16: k: must be positive, not -400"),
+        ("k: 400", "k: 1e300", "16: k: must be at most 1e+30 in size, not 1e+300"),
+        ("inertia: 3.2", "inertia: 1e-40", "15: inertia: must be at least 1e-30 in size, not 1e-40"),
         ("a: 0.2", "a: 10 deg", "7: a: expected a number in m, found '10 deg': degrees are"),
         # vectors, tensors, intervals
         ("[0.1, 0, 0]", "[0.1, 0]", "10: com: expected 3 numbers, found 2"),
@@ -166,6 +168,7 @@ def test_a_spring_shared_by_an_alias(load):
         ("yy: 0.2", "yy: -0.2", "11: inertia: the tensor has the negative eigenvalue -0.2 kg m^2"),
         ("yz: -0.01", "yz: -0.2", "21: inertia: the tensor has the negative eigenvalue -0.1 kg m^2"),
         ("[-pi, 90 deg]", "[90 deg, -pi]", "17: position: the lower bound 1.5708 exceeds"),
+        ("[-pi, 90 deg]", "[-pi, 1e31]", "17: position: must be at most 1e+30 in size, not 1e+31"),
         ("[-pi, 90 deg]", "[1, 2, 3]", "17: position: expected [lower, upper] or one number"),
         ("velocity: 3", "velocity: -3", "17: velocity: the lower bound 3 exceeds the upper bound -3"),
         # nesting

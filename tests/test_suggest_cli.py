@@ -19,7 +19,7 @@ def test_suggestions_follow_the_report(vsacli, too_soft):
     heading, slow_down, offset, profile = done.out[len(plain.out) :].splitlines()
     assert (
         heading
-        == "suggestions, any one of which gives every step a margin of at least 1 % and within every limit:"
+        == "suggestions, with any one of which every step has a margin of at least 1 % and keeps every limit:"
     )
     assert slow_down.startswith(
         "- no slow-down: even at rest, under gravity alone, base needs at least 808.081 N m"
@@ -56,7 +56,7 @@ def test_slow_down_with_its_durations(vsacli, tmp_path, motion):
     again = vsacli("check-feasibility", ROBOT, slower, "--suggest")
     assert again.code == 0
     assert again.out.endswith(
-        "nothing to change: every step has a margin of at least 1 % and within every limit\n"
+        "nothing to change: every step has a margin of at least 1 % and keeps every limit\n"
     )
 
 
@@ -73,7 +73,7 @@ def test_nothing_needs_to_change(vsacli, motion):
 def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml")
     assert (done.code, done.err) == (3, "wrote fixed.yaml and fixed.csv\n")
-    assert "suggestions, any one of which" in done.out
+    assert "suggestions, with any one of which" in done.out
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml", "fixed.csv"}
     run = vsacli("invdyn", ROBOT, "fixed.yaml")
     assert run.code == 0
@@ -157,7 +157,7 @@ def test_suggestions_keep_the_margin_that_is_asked_for(vsacli, motion):
     again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--near-singular", "0.1", "--suggest")
     assert (again.code, again.out.splitlines()[-1]) == (
         0,
-        "nothing to change: every step has a margin of at least 10 % and within every limit",
+        "nothing to change: every step has a margin of at least 10 % and keeps every limit",
     )
 
 

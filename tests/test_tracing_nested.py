@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from listings import carry_out, recorded
+
 from vsacli.springs.loops import look_up, repeat, where_needed
 from vsacli.tracing import Tape, TracedArray
 
@@ -38,6 +38,23 @@ def swapped(x: Any) -> Any:
     return list(repeat(step, (x, 2 * x), (), 9))
 
 
+def handed_down(x: Any) -> Any:
+    """Only the first entry of the state is looked at, which gets the last one's values two steps later."""
+
+    def step(state: Any, constants: Any) -> Any:
+        (first, second, third, idle), (x,) = state, constants
+        return (second, third, 2 * third + x, idle + first), first > 40
+
+    first, *_ = repeat(step, (x, x + 1, x + 2, x), (x,), 8)
+    return first
+
+
+def half_used(x: Any) -> Any:
+    """The first of two results is not looked at."""
+    _, second = where_needed(x > 1, lambda y, z: (np.sqrt(y), y * z), (x, x + 3), (x, -x))
+    return second
+
+
 def guarded(x: Any) -> Any:
     """A function that is only called where it has a value."""
     return list(where_needed(x > 1, lambda y: (np.log(y), y * y), (x,), (-x, np.full_like(x, 7.0))))
@@ -63,7 +80,10 @@ def interpolated(x: Any) -> Any:
     return look_up(TABLE, index) + look_up(TABLE, index + 1) * (x - look_up(NODES, index))
 
 
-@pytest.mark.parametrize("function", [square_root, swapped, guarded, nested, interpolated])
+FUNCTIONS = (square_root, swapped, handed_down, half_used, guarded, nested, interpolated)
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
 def test_a_program_does_for_each_sample_what_numpy_does_for_all(function: Any) -> None:
     with np.errstate(all="ignore"):
         expected = function(X)
@@ -86,7 +106,9 @@ def test_a_loop_is_recorded_once() -> None:
 def test_what_is_known_while_recording_leaves_no_branch() -> None:
     tape = Tape()
     row = TracedArray(tape, tape.inputs(1))
-    (result,) = where_needed(np.ones_like(row, dtype=bool) & (row != row) & False, lambda y: (y,), (row,), (-row,))
+    (result,) = where_needed(
+        np.ones_like(row, dtype=bool) & (row != row) & False, lambda y: (y,), (row,), (-row,)
+    )
     assert [symbol.operation for symbol in tape.listing(result.cells).operations] == ["negative"]
 
 

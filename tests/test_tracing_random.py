@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from listings import carry_out, recorded
+
 from vsacli.arrays import FloatArray
 
 Expression = Callable[[Any, Any], Any]
@@ -32,7 +32,11 @@ def leaves(constants: list[float]) -> st.SearchStrategy[Expression]:
 
 def larger(parts: st.SearchStrategy[Expression]) -> st.SearchStrategy[Expression]:
     def unary(ufunc: np.ufunc, a: Expression) -> Expression:
-        return (lambda x, y: np.where(ufunc(a(x, y)), x, y)) if ufunc is np.isnan else lambda x, y: ufunc(a(x, y))
+        return (
+            (lambda x, y: np.where(ufunc(a(x, y)), x, y))
+            if ufunc is np.isnan
+            else lambda x, y: ufunc(a(x, y))
+        )
 
     def binary(ufunc: np.ufunc, a: Expression, b: Expression) -> Expression:
         return lambda x, y: ufunc(a(x, y), b(x, y))

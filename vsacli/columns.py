@@ -26,7 +26,10 @@ _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
 _WRENCH_WAY: Way = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
 
+_MOTION_ALONE = "; a trajectory in YAML can take the motion from here and set the stiffness itself"
+
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
+_PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
 
 
 @dataclass(frozen=True)
@@ -134,7 +137,12 @@ def _all(way: Way) -> list[str]:
 def _strangers(header: Sequence[str], expected: Sequence[str], known: Collection[str]) -> Iterator[str]:
     meant = [column for column in expected if column not in header]
     for column in header:
-        if column not in known:
+        if column in known:
+            continue
+        unit = _PARENTHESISED.fullmatch(column)
+        if unit is not None and unit["name"] in known:
+            yield f"{column!r}: units are written in square brackets, {unit['name']} [{unit['unit']}]"
+        else:
             yield f"unknown column {column!r}{did_you_mean(column, meant)}"
 
 
@@ -143,11 +151,15 @@ def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[
         yield f"there is no column {TIME!r}"
     for name, columns in way.items():
         absent = [column for column in columns.values() if column not in header]
-        if absent and name in needed:
-            yield f"there is no column {', '.join(absent)}"
-        elif absent and len(absent) < len(columns):
+        if not absent:
+            continue
+        missing = f"there {'is no column' if len(absent) == 1 else 'are no columns'} {', '.join(absent)}"
+        if name in needed:
+            alone = name in STIFFNESS.names and len(absent) == len(columns)
+            yield missing + (_MOTION_ALONE if alone else "")
+        elif len(absent) < len(columns):
             every = "axes" if name in WRENCH.names else "joints"
-            yield f"there is no column {', '.join(absent)}; {name} is given for all {every} or for none"
+            yield f"{missing}; {name} is given for all {every} or for none"
 
 
 def _measured(

@@ -27,7 +27,7 @@ def as_standard(robot: Robot) -> Robot:
     Zeros and right angles stay exact.
 
     Raises:
-        InvalidRecordError: a number overflows.
+        InvalidRecordError: a number becomes too large.
     """
     rows = (*(joint.dh for joint in robot.joints), LAST)
     joints = (

@@ -56,7 +56,7 @@ class Motor:
     def __post_init__(self) -> None:
         problems = []
         inertia = self.at_joint.inertia
-        if POSITIVE.holds(self.inertia) and self.gear_ratio and not POSITIVE.holds(inertia):
+        if self.gear_ratio and POSITIVE.problem(inertia) and not POSITIVE.problem(self.inertia):
             reason = f"makes the inertia on the joint side {inertia:g}, too far from anything built"
             problems.append(FieldProblem(("gear_ratio",), reason))
         check_fields(self, *problems)

@@ -120,7 +120,8 @@ class Run:
     def _self_check(self) -> SelfCheck:
         """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
         bound = SPRING_BOUND if self._following is None else DRIFT_BOUND
-        return SelfCheck(self._spring_residual, ladder(self.robot, self.trajectory), bound)
+        found = ladder(self.robot, self.trajectory, self.choice.engine)
+        return SelfCheck(self._spring_residual, found, bound)
 
 
 def inverse_dynamics(

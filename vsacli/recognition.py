@@ -10,11 +10,10 @@ from vsacli.documents import DOCUMENTS
 from vsacli.errors import InputError
 from vsacli.spec import tree
 from vsacli.spec.problems import Problems
-from vsacli.spec.source import check_input_file, read_source
-from vsacli.spec.table import MAX_BYTES
+from vsacli.spec.source import HDF5_SIGNATURE, check_input_file, read_source
 from vsacli.spec.yaml_tree import parse_yaml
 from vsacli.store import schema, simulation
-from vsacli.store.reader import SIGNATURE, stored_format
+from vsacli.store.reader import stored_format
 from vsacli.suggestions import nearest
 
 
@@ -42,10 +41,10 @@ def recognise(path: str | os.PathLike[str]) -> FileKind:
         InputError: it cannot be read, or is none of the kinds.
         StorageError: the operating system refuses to read a result file.
     """
-    check_input_file(path, MAX_BYTES)
+    check_input_file(path)
     start = _beginning(path)
     suffix = Path(path).suffix.lower()
-    if start.startswith(SIGNATURE) or suffix == ".h5":
+    if start.startswith(HDF5_SIGNATURE) or suffix == ".h5":
         return _stored_kind(path)
     if suffix == ".csv":
         return FileKind.TABLE

@@ -14,6 +14,9 @@ from vsacli.units import POSITION, TORQUE
 WIDTH = 78
 JOINTS_PER_LINE = 3
 
+HUGE = 1e8
+"""Torque or stiffness shown with an exponent, as next to a singular step."""
+
 QUANTITY_OF_LIMIT = {
     Flag.POSITION_LIMIT.label: "position",
     Flag.VELOCITY_LIMIT.label: "velocity",
@@ -116,8 +119,8 @@ def _span(low: float, high: float) -> str:
 
 
 def _number(value: float) -> str:
-    """One decimal for large numbers, three digits for small ones."""
-    return "-" if math.isnan(value) else f"{value:.1f}" if abs(value) >= 10 else f"{value:.3g}"
+    """One decimal for large numbers, three digits for small ones and for those that no machine has."""
+    return "-" if math.isnan(value) else f"{value:.1f}" if 10 <= abs(value) < HUGE else f"{value:.3g}"
 
 
 def _percent(share: float) -> str:
@@ -130,10 +133,15 @@ def _percent(share: float) -> str:
 def _apart(value: float, bound: float) -> tuple[str, str]:
     """Both with as many digits as it takes to see how far they are apart, at least four."""
     for digits in range(4, 17):
-        shown = f"{value:.{digits}g}", f"{bound:.{digits}g}"
+        shown = _rounded(value, digits), _rounded(bound, digits)
         if math.isclose(float(shown[0]) - float(shown[1]), value - bound, rel_tol=0.1):
             return shown
     return repr(value), repr(bound)
+
+
+def _rounded(value: float, digits: int) -> str:
+    """To so many significant digits, or to all those before the point."""
+    return f"{value:.{max(digits, len(f'{abs(value):.0f}'))}g}"
 
 
 def _time(time: float) -> str:
@@ -223,8 +231,8 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
             _number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
         )
         name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
-        held = f"springs hold up to {_number(most.elastic_peak)} J ({name})"
-        yield f"energy: motors spend {spent} J, take back {recovered} J; {held}"
+        held = f"; springs hold up to {_number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
+        yield f"energy: motors spend {spent} J, take back {recovered} J{held}"
     paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
     if paired:
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)

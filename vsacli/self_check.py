@@ -8,6 +8,7 @@ import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
 from vsacli.drivetrain import SIDES, motors_and_springs
+from vsacli.engine import NUMPY, Engine
 from vsacli.feasibility import has, margin
 from vsacli.flags import Flag
 from vsacli.robot import Robot
@@ -52,6 +53,12 @@ STEP_SCALES = np.array([8.0**-power for power in range(5)])
 
 The smallest are for motions that leave the corridor within a thousandth of their duration.
 """
+
+FIRST_SCALES = STEP_SCALES[:2]
+"""Those that are tried first: for most motions the smaller ones only add rounding."""
+
+CLEAR = 1e-10
+"""Error at which smaller steps are not tried any more, a hundredth of the bound."""
 
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
 """Central first difference of sixth order over the offsets -3..3."""
@@ -102,16 +109,24 @@ def spring_residual(robot: Robot, block: Block) -> float:
     return float(np.max(np.concatenate([np.zeros(1), *errors])))
 
 
-def ladder(robot: Robot, trajectory: Trajectory) -> float:
+def ladder(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> float:
     """Largest error of a derivative of `RUNGS` against first differences, relative to its peak.
 
     Differences are taken at about 200 times with steps of their own, over which the trajectory is analytic.
-    Motor motion is compared where it is smooth over the difference.
+    Motor motion is compared where it is smooth over the difference. The engine is that of the run.
     """
+    error, everywhere = _ladder(robot, trajectory, engine, FIRST_SCALES)
+    if everywhere and error <= CLEAR:
+        return error
+    return _ladder(robot, trajectory, engine, STEP_SCALES)[0]
+
+
+def _ladder(robot: Robot, trajectory: Trajectory, engine: Engine, scales: FloatArray) -> tuple[float, bool]:
+    """The error by the best of some difference steps; whether all motors could be compared at all times."""
     times, reach = trajectory.check_points(PROBES)
-    steps = STEP_SCALES[:, None] * np.minimum(reach / 3, trajectory.duration / 500)
+    steps = scales[:, None] * np.minimum(reach / 3, trajectory.duration / 500)
     grid = times + steps[:, None, :] * np.arange(-3, 4)[None, :, None]
-    block = compute_block(robot, trajectory.at(grid.ravel()))
+    block = compute_block(robot, trajectory.at(grid.ravel()), engine=engine)
     smooth = _motors_move_smoothly(block, grid.shape)
     motors = np.array([len(motors_and_springs(joint.actuator)) for joint in robot.joints])
     absent = np.arange(SIDES) >= motors[:, None]
@@ -130,7 +145,7 @@ def ladder(robot: Robot, trajectory: Trajectory) -> float:
         )
         for rung in RUNGS
     ]
-    return float(np.max(errors))
+    return float(np.max(errors)), bool(smooth.any(axis=0).all())
 
 
 def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:

@@ -256,7 +256,8 @@ class Trajectory:
     def breakpoints(self) -> FloatArray:
         """Ascending times between which all its functions are analytic; the first and last are its span."""
         times = np.sort(np.concatenate([profile.breakpoints for _, profile in self._profiles()]))
-        return times[np.append(True, np.diff(times) > 0)]  # np.unique would import numpy.ma
+        distinct: FloatArray = times[np.append(True, np.diff(times) > 0)]  # np.unique would import numpy.ma
+        return distinct
 
     def check_points(self, count: int) -> tuple[FloatArray, FloatArray]:
         """`count` times all over the span at which the derivatives can be checked by finite differences.

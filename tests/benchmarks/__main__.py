@@ -1,6 +1,6 @@
 """Measure vsacli beside its peers, all in one run: `python tests/benchmarks`.
 
-Needs the extra `bench` and gcc. `--write` puts what was found into docs/performance.md.
+Needs the extra `bench` and gcc. `--write` puts what was found into docs/performance.md and docs/codegen.md.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ import compiled
 import growth
 import kernel
 import page
+import recorders
 import stages
 from machine import description
 from subjects import ROOT
 
-PAGE = ROOT / "docs" / "performance.md"
+PAGES = (ROOT / "docs" / "performance.md", ROOT / "docs" / "codegen.md")
 FIGURE = ROOT / "docs" / "images" / "performance-growth.png"
 PART = re.compile(r"(<!-- measured: (?P<name>\S+) -->\n).*?(<!-- end of measured part -->)", re.DOTALL)
 
@@ -39,6 +40,7 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     yield "kernel", page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats))
     yield "batches", page.batch_table(compiled.batches(SAMPLES, repeats))
     yield "calls", page.call_sentence(compiled.single_calls())
+    yield "recorders", page.recorder_table(recorders.compare(SAMPLES, repeats))
     yield "costs", page.cost_table(compiled.costs())
     yield "stages", page.stage_table(stages.split(SAMPLES, repeats))
     yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, repeats))
@@ -57,7 +59,7 @@ def main() -> None:
     """Run what the command line says."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=3, help="rounds, of which the medians count")
-    parser.add_argument("--write", action="store_true", help=f"write the results into {PAGE.name}")
+    parser.add_argument("--write", action="store_true", help="write the results into the pages of docs")
     options = parser.parse_args()
 
     parts: dict[str, str] = {}
@@ -70,9 +72,10 @@ def main() -> None:
 
 
 def rewrite(part: Callable[[str], str]) -> None:
-    """Put each part into its place on the page."""
-    text = PAGE.read_text(encoding="utf-8")
-    PAGE.write_text(PART.sub(lambda m: f"{m[1]}\n{part(m['name'])}\n\n{m[3]}", text), encoding="utf-8")
+    """Put each part into its place on the pages."""
+    for path in PAGES:
+        text = path.read_text(encoding="utf-8")
+        path.write_text(PART.sub(lambda m: f"{m[1]}\n{part(m['name'])}\n\n{m[3]}", text), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ from actuation import JOINTS, Actuation
 from compiled import CALLS, SCALAR_FLAGS, Calls, Cost
 from growth import Growth
 from kernel import CASADI, Kernel
+from recorders import Recorder
 from stages import Stages
 from timing import Seconds
 
@@ -53,9 +54,9 @@ def _way(name: str) -> list[str]:
 def call_sentence(calls: Calls) -> str:
     """How long single calls of generated code take."""
     return (
-        f"{CALLS:,} single calls of the generated `inverse_dynamics`, 7R arm, `{' '.join(SCALAR_FLAGS)}`: median "
-        f"{calls.median:.2g} µs, 99.9 % below {calls.most:.2g} µs, the worst {calls.worst:.2g} µs, when the "
-        "operating system let something else run."
+        f"{CALLS:,} single calls of the generated `inverse_dynamics`, 7R arm, "
+        f"`{' '.join(SCALAR_FLAGS)}`: median {calls.median:.2g} µs, 99.9 % below {calls.most:.2g} µs, "
+        f"the worst {calls.worst:,.0f} µs, when the operating system let something else run."
     )
 
 
@@ -74,6 +75,26 @@ def cost_table(costs: Mapping[int, Cost]) -> str:
                 f"{cost.compiling:.1f} s",
             ]
             for joints, cost in costs.items()
+        ),
+    )
+
+
+def recorder_table(recorders: Iterable[Recorder]) -> str:
+    """What recording by vsacli and by casadi leaves."""
+    header = ("tau_e, dtau_e, ddtau_e", "operations", "C", "code", "compiling", "µs a call", "installed")
+    return table(
+        header,
+        (
+            [
+                each.name,
+                f"{each.operations:,}",
+                f"{each.source / 1e3:.0f} kB",
+                f"{each.code / 1e3:.0f} kB",
+                f"{each.compiling:.1f} s",
+                micro(each.seconds),
+                f"{each.installed / 1e6:.3g} MB",
+            ]
+            for each in recorders
         ),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import wraps
 from typing import Any, TextIO, cast
@@ -51,8 +51,16 @@ class Talk:
 
     def progress(self, steps: int, *, shown_from: int = PROGRESS_FROM) -> AbstractContextManager[Any]:
         """A progress bar over steps, shown only for long work on a terminal."""
-        hidden = self.quiet or steps < shown_from or not sys.stderr.isatty()
-        return click.progressbar(length=steps, label="computing", file=sys.stderr, hidden=hidden)
+        if self.quiet or steps < shown_from or not sys.stderr.isatty():
+            return nullcontext(_NoProgress())
+        return click.progressbar(length=steps, label="computing", file=sys.stderr)
+
+
+class _NoProgress:
+    """In place of a progress bar."""
+
+    def update(self, steps: int) -> None:
+        """Show nothing."""
 
 
 def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -6,11 +6,9 @@ import textwrap
 from collections.abc import Iterator, Sequence
 
 from vsacli.codegen.interface import Array, Function, Structure
-from vsacli.codegen.scalar import signature
+from vsacli.codegen.scalar import WIDTH, signature
 from vsacli.flags import Flag
 from vsacli.robot import Robot
-
-WIDTH = 110
 
 
 def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precision: str, head: str) -> str:
@@ -45,7 +43,11 @@ def _joints(prefix: str, robot: Robot) -> str:
         f"{index} {joint.name} ({joint.type}, {joint.actuator_type})"
         for index, joint in enumerate(robot.joints)
     )
-    text = f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN."
+    text = (
+        f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN. SI units; signs, "
+        "frames and gravity as in the robot file; nothing acts on the end effector. Functions keep nothing "
+        "between calls."
+    )
     return f"{comment(text)}\nenum {{ {prefix.upper()}_JOINTS = {len(robot.joints)} }};"
 
 

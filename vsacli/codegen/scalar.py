@@ -15,6 +15,9 @@ from vsacli.tracing.c_text import Writer, table_declarations, table_names
 
 PRECISIONS = ("double", "float")
 
+WIDTH = 110
+"""Characters of a line, at most, but for comments behind code."""
+
 _OPERATORS = {"and": " && ", "or": " || "}
 
 HELPERS = {
@@ -140,11 +143,14 @@ def _helper(name: str, precision: str) -> str:
 
 
 def signature(prefix: str, function: Function) -> str:
-    """The head of a function."""
+    """The head of a function; each argument in a line of its own if they do not fit into one."""
     arguments = [f"const {prefix}_{structure.name} *{name}" for name, structure in function.arguments]
     result = f"{prefix}_{function.result.name} *{function.result.name}"
     returned = "unsigned" if function.flagged else "void"
-    return f"{returned} {prefix}_{function.name}({', '.join([*arguments, result])})"
+    lines = [f"{returned} {prefix}_{function.name}({', '.join([*arguments, result])})"]
+    if len(lines[0]) > WIDTH:
+        lines = [f"{returned} {prefix}_{function.name}(", ",\n    ".join([*arguments, result]) + ")"]
+    return "\n    ".join(lines)
 
 
 def _definition(prefix: str, function: Function, listing: Listing, writer: Writer) -> Iterator[str]:

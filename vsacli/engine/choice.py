@@ -13,8 +13,11 @@ from vsacli.suggestions import did_you_mean
 NAMES = ("numpy", "c", "auto")
 """Engines that may be asked for."""
 
-COMPILE_FROM = 200_000
-"""Samples with which NumPy is busy for longer than the compiler; with more joints both take longer."""
+NUMPY_SECONDS = 0.9e-9
+"""What NumPy takes for an operation on a sample."""
+
+COMPILER_SECONDS = (0.25, 2.5e-8)
+"""What the compiler takes to start, and the square of the operations times this."""
 
 LOOK_FROM = 20_000
 """Samples with which it is busy for longer than it takes to see whether there is compiled code."""
@@ -49,7 +52,8 @@ def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) 
         threads: of compiled code; as many as there are processors if None.
 
     Raises:
-        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works.
+        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works, or
+            nothing that it could compile.
     """
     if name not in NAMES:
         raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
@@ -63,10 +67,14 @@ def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) 
     remarks: list[str] = []
     try:
         engine = CompiledEngine(system_compiler(), threads, remarks.append)
-        loaded = engine.prepare(kernel, build=name == "c" or samples >= COMPILE_FROM)
+        loaded = engine.prepare(kernel, lambda operations: name == "c" or _repays(operations, samples))
     except CompilerError as error:
         if name == "c":
             raise InputError.one(f"{error}; the engine numpy needs none") from error
+        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(remarks))
+    except NotImplementedError as error:
+        if name == "c":
+            raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
         return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(remarks))
     if loaded is None:
         return Choice(
@@ -74,6 +82,12 @@ def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) 
         )
     when = "now" if loaded.compiled else "before"
     return Choice(engine, f"C code computes, compiled {when}, in {_counted(threads)}", tuple(remarks))
+
+
+def _repays(operations: int, samples: int) -> bool:
+    """Whether NumPy would be busy for longer than the compiler."""
+    start, growth = COMPILER_SECONDS
+    return operations * samples * NUMPY_SECONDS > start + growth * operations**2
 
 
 def _numpy(samples: int) -> Engine:

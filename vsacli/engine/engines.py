@@ -12,7 +12,7 @@ from vsacli.engine.kernel import Kernel
 
 if TYPE_CHECKING:
     from vsacli.engine.compiler import Compiler
-    from vsacli.engine.loading import Loaded, Tell
+    from vsacli.engine.loading import Build, Loaded, Tell
 
 SAMPLES_PER_PASS = 4096
 """Samples that NumPy takes at a time: fewer waste time in the interpreter, more leave the caches."""
@@ -58,8 +58,8 @@ class CompiledEngine:
         self._tell = tell
         self._loaded: dict[Kernel, Loaded] = {}
 
-    def prepare(self, kernel: Kernel, *, build: bool = True) -> Loaded | None:
-        """Load a kernel's code, if need be and if told to by compiling it; None if there is no such code.
+    def prepare(self, kernel: Kernel, build: Build = lambda _operations: True) -> Loaded | None:
+        """Load a kernel's code, compiled if need be and if `build` wants it; None if there is no such code.
 
         Raises:
             CompilerError: it cannot be compiled.
@@ -67,7 +67,7 @@ class CompiledEngine:
         if kernel not in self._loaded:
             from vsacli.engine.loading import load
 
-            loaded = load(kernel, self._compiler, self._tell, build=build)
+            loaded = load(kernel, self._compiler, self._tell, build)
             if loaded is None:
                 return None
             self._loaded[kernel] = loaded

@@ -6,7 +6,10 @@ from collections.abc import Hashable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from vsacli.tracing import Listing
+    from vsacli.tracing import Listing, Symbol
+
+TURNS = 5
+"""How often a loop is usually repeated."""
 
 
 class Kernel(Hashable, Protocol):
@@ -25,6 +28,17 @@ class Kernel(Hashable, Protocol):
 
         Every sample is computed by itself, without a branch on its values.
         """
+
+
+def operations(listing: Listing) -> int:
+    """How many operations a program has, those of loops counted as often as they are usually repeated."""
+    return sum(map(_weight, listing.operations))
+
+
+def _weight(symbol: Symbol) -> int:
+    if symbol.operation == "loop":
+        return TURNS * operations(symbol.operands[0].body)
+    return operations(symbol.operands[0].body) if symbol.operation == "branch" else 1
 
 
 def record(kernel: Kernel) -> Listing:

@@ -27,7 +27,21 @@ typedef int64_t integers __attribute__((vector_size(8 * LANES)));
 typedef double unaligned __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
 
 static inline reals load(const double *from) { return *(const unaligned *)from; }
-static inline void store(double *to, reals x) { *(unaligned *)to = x; }
+
+/* Results are more than the caches hold: they go past them, to rows that begin at whole vectors. */
+#if LANES == 8
+#include <immintrin.h>
+static inline void store(double *to, reals x) { _mm512_stream_pd(to, (__m512d)x); }
+static inline void finish(void) { _mm_sfence(); }
+#elif LANES == 4
+#include <immintrin.h>
+static inline void store(double *to, reals x) { _mm256_stream_pd(to, (__m256d)x); }
+static inline void finish(void) { _mm_sfence(); }
+#else
+static inline void store(double *to, reals x) { *(reals *)to = x; }
+static inline void finish(void) {}
+#endif
+
 static inline reals spread(double x) { return x - (reals){0}; }
 static inline integers spread_integer(int64_t x) { return x - (integers){0}; }
 static inline reals choose(integers where, reals a, reals b) { return (reals)((where & (integers)a) | (~where & (integers)b)); }
@@ -136,13 +150,14 @@ BINARY(atan2)
 BINARY(hypot)
 BINARY(pow)
 
-/* Computes LANES samples from the rows in[.] + at to the rows out[.] + at. */
+/* Computes LANES samples from the rows in[.] + at to the rows out[.] + at, which begin at whole vectors. */
 static void group(const double *const *in, double *const *out, int64_t at);
 
 /* The last samples, fewer than LANES, go through rows of their own, filled up with copies of the last one. */
 static void last_group(const double *const *in, double *const *out, int64_t at, int count)
 {
-    double inputs[INPUTS][LANES], outputs[OUTPUTS][LANES];
+    double inputs[INPUTS][LANES];
+    reals outputs[OUTPUTS];
     const double *from[INPUTS];
     double *to[OUTPUTS];
     for (int row = 0; row < INPUTS; row++) {
@@ -151,10 +166,11 @@ static void last_group(const double *const *in, double *const *out, int64_t at, 
         from[row] = inputs[row];
     }
     for (int row = 0; row < OUTPUTS; row++)
-        to[row] = outputs[row];
+        to[row] = (double *)&outputs[row];
     group(from, to, 0);
+    finish();
     for (int row = 0; row < OUTPUTS; row++)
-        memcpy(out[row] + at, outputs[row], sizeof(double) * (size_t)count);
+        memcpy(out[row] + at, &outputs[row], sizeof(double) * (size_t)count);
 }
 
 void run(int64_t start, int64_t stop, const double *const *in, double *const *out)
@@ -164,4 +180,5 @@ void run(int64_t start, int64_t stop, const double *const *in, double *const *ou
         group(in, out, at);
     if (at < stop)
         last_group(in, out, at, (int)(stop - at));
+    finish();
 }

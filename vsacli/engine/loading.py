@@ -10,12 +10,15 @@ from typing import NamedTuple
 
 from vsacli.engine.cache import LIBRARY, Cache, CacheError, key_of, open_cache
 from vsacli.engine.compiler import Compiler
-from vsacli.engine.kernel import Kernel, record
+from vsacli.engine.kernel import Kernel, operations, record
 from vsacli.engine.lanes import batch_source
 from vsacli.engine.library import Library
 
 Tell = Callable[[str], None]
 """Receives a message for the user."""
+
+Build = Callable[[int], bool]
+"""Says whether code of so many operations shall be compiled."""
 
 
 class Loaded(NamedTuple):
@@ -25,26 +28,26 @@ class Loaded(NamedTuple):
     compiled: bool
 
 
-def load(kernel: Kernel, compiler: Compiler, tell: Tell, *, build: bool = True) -> Loaded | None:
+def load(kernel: Kernel, compiler: Compiler, tell: Tell, build: Build) -> Loaded | None:
     """The library of a kernel.
 
     Args:
         kernel: what it computes.
         compiler: what compiles it.
         tell: learns what is wrong with the cache, which is no reason to fail.
-        build: whether to compile if it is not in the cache; else there may be none.
+        build: whether to compile so many operations if they are not in the cache; else there may be none.
 
     Raises:
         CompilerError: it cannot be compiled or loaded.
     """
-    source = _source(kernel)
+    source, count = _source(kernel)
     key = key_of(source, compiler.identity)
     if key not in _loaded:
         cache = _opened(tell)
         path = None if cache is None else _found(cache, key, tell)
         if path is not None:
             _loaded[key] = Loaded(Library(path, kernel.outputs), compiled=False)
-        elif build:
+        elif build(count):
             _loaded[key] = Loaded(_built(source, key, kernel.outputs, compiler, cache, tell), compiled=True)
     return _loaded.get(key)
 
@@ -54,8 +57,10 @@ _loaded: dict[str, Loaded] = {}
 
 
 @lru_cache(maxsize=32)
-def _source(kernel: Kernel) -> str:
-    return batch_source(record(kernel))
+def _source(kernel: Kernel) -> tuple[str, int]:
+    """The code of a kernel, and how many operations it has."""
+    listing = record(kernel)
+    return batch_source(listing), operations(listing)
 
 
 def _opened(tell: Tell) -> Cache | None:

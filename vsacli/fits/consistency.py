@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
+from vsacli.fits.choice import SMALL
 from vsacli.fits.fit import Fit
 from vsacli.fits.noise import INTERPOLATION_GAIN, LEAST_SQUARES_GAIN
 
@@ -16,9 +17,6 @@ SHARE = 0.05
 
 DEVIATIONS = 10.0
 """Standard deviations by which the derivative of the fit itself may be wrong."""
-
-SMALL = 1e-3
-"""Share of the largest component's derivative against which smaller ones are measured."""
 
 FACTORS = {
     180 / math.pi: "degrees instead of radians?",

@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any, NamedTuple, TypeAlias
 
 from vsacli.errors import FieldProblem, InvalidRecordError
@@ -21,6 +22,12 @@ from vsacli.suggestions import did_you_mean
 from vsacli.units import Quantity
 
 REQUIRED = dataclasses.MISSING
+LARGEST = 1e30
+"""Size of a finite number, in SI units, beyond which it is refused: products of a few still are numbers."""
+
+SMALLEST = 1e-30
+"""Size below which a number is refused if it cannot be zero: one may divide by it."""
+
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 
 
@@ -35,6 +42,16 @@ class Check:
     requirement: str
     keywords: Mapping[str, Any] = dataclasses.field(default_factory=dict, compare=False)
 
+    def problem(self, number: float) -> str | None:
+        """Why a number is refused, by the condition or for its size; None if it is not."""
+        if not self.holds(number):
+            return f"must be {self.requirement}, not {number:g}"
+        if math.isfinite(number) and abs(number) > LARGEST:
+            return f"must be at most {LARGEST:g} in size, not {number:g}"
+        if 0 < abs(number) < SMALLEST and not self.holds(0.0):
+            return f"must be at least {SMALLEST:g} in size, not {number:g}"
+        return None
+
 
 _ABOVE_ZERO = {"exclusiveMinimum": 0}
 POSITIVE = Check(lambda value: value > 0 and math.isfinite(value), "positive", _ABOVE_ZERO)
@@ -44,6 +61,7 @@ NON_ZERO = Check(
     lambda value: value != 0 and math.isfinite(value), "finite and not zero", {"not": {"const": 0}}
 )
 FINITE = Check(math.isfinite, "finite")
+_ANY = Check(lambda _: True, "any number")
 
 
 class Number(NamedTuple):
@@ -124,9 +142,8 @@ class PerJoint(NamedTuple):
     unit: Quantity
 
 
-Kind: TypeAlias = (
-    "Number | Integer | Text | Choice | Vector | Interval | Record | OneOf | Items | Pair | TableFile | PerJoint"
-)
+Single: TypeAlias = "Number | Integer | Text | Choice | Vector | Interval | PerJoint | TableFile"
+Kind: TypeAlias = "Single | Record | OneOf | Items | Pair"
 """What a value may look like in a file."""
 
 
@@ -228,7 +245,7 @@ def field_problems(name: str, field: Field, content: Any) -> Iterator[FieldProbl
         case Items(unique=str(key)):
             for index, message in repeated(getattr(item, key) for item in content):
                 yield FieldProblem((name, index, key), message)
-        case _ if field.check is not None:
+        case _:
             yield from _check_numbers((name,), field.check, content)
 
 
@@ -257,9 +274,11 @@ def _wrong_lengths(path: tuple[str | int, ...], length: int, content: Any) -> It
         yield FieldProblem(path, f"expected {length} numbers, found {len(content)}")
 
 
-def _check_numbers(path: tuple[str | int, ...], check: Check, content: Any) -> Iterator[FieldProblem]:
+def _check_numbers(path: tuple[str | int, ...], check: Check | None, content: Any) -> Iterator[FieldProblem]:
     if isinstance(content, tuple):
         for index, item in enumerate(content):
             yield from _check_numbers((*path, index), check, item)
-    elif content is not None and not check.holds(content):
-        yield FieldProblem(path, f"must be {check.requirement}, not {content:g}")
+    elif (check is not None and content is not None) or isinstance(content, Real):
+        problem = (check or _ANY).problem(content)
+        if problem:
+            yield FieldProblem(path, problem)

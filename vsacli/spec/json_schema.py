@@ -15,6 +15,7 @@ from typing import Any, TypeAlias
 from vsacli.spec.expression import ANGLES, MAX_LENGTH
 from vsacli.spec.fields import (
     IDENTIFIER,
+    LARGEST,
     REQUIRED,
     Check,
     Choice,
@@ -170,7 +171,7 @@ class _Builder:
 
 
 def _number(unit: Quantity, check: Check | None) -> Schema:
-    keywords = {} if check is None else check.keywords
+    keywords = {"minimum": -LARGEST, "maximum": LARGEST, **({} if check is None else check.keywords)}
     pattern = ANGLE if {unit.revolute, unit.prismatic} & set(ANGLES) else EXPRESSION
     return {"anyOf": [{"type": "number", **keywords}, _expression(pattern)]}
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,10 @@ from vsacli.suggestions import nearest
 
 MAX_DOCUMENT_BYTES = 1_000_000
 """Size up to which a text document is read, and up to which the text of any input is kept."""
+
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""How an HDF5 file begins, which is what results are."""
 
 
 class Source(NamedTuple):
@@ -50,7 +55,7 @@ def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTE
     return Source(name, hashlib.sha256(content).hexdigest(), text), text
 
 
-def check_input_file(path: str | os.PathLike[str], max_bytes: int) -> None:
+def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize) -> None:
     """Refuse, before it is opened, what is no regular file of at most `max_bytes`.
 
     Raises:
@@ -64,6 +69,8 @@ def check_input_file(path: str | os.PathLike[str], max_bytes: int) -> None:
     if not stat.S_ISREG(status.st_mode):
         raise InputError.one("is no regular file (a device, pipe or socket)", name)
     if status.st_size > max_bytes:
+        with _refusing(name), open(name, "rb") as file:
+            _refuse_hdf5(file.read(len(HDF5_SIGNATURE)), name)
         raise _too_large(name, status.st_size, max_bytes)
 
 
@@ -73,6 +80,7 @@ def decode_utf8(content: bytes, name: str) -> str:
     Raises:
         InputError: naming the first byte that is not UTF-8.
     """
+    _refuse_hdf5(content, name)
     try:
         return content.decode("utf-8").removeprefix("\ufeff")
     except UnicodeDecodeError as error:
@@ -80,6 +88,11 @@ def decode_utf8(content: bytes, name: str) -> str:
         line = content.count(b"\n", 0, error.start) + 1
         problem = f"the file is not UTF-8 text (byte 0x{byte:02x} at offset {error.start}); save it as UTF-8"
         raise InputError.one(problem, name, line) from None
+
+
+def _refuse_hdf5(content: bytes, name: str) -> None:
+    if content.startswith(HDF5_SIGNATURE):
+        raise InputError.one("is an HDF5 file, such as a result; expected text", name)
 
 
 @contextmanager

@@ -29,6 +29,8 @@ MOST_PIECES = 24
 LEAST_STIFFNESS = 1e-3
 """Share of its mean stiffness that a spring which pushes and pulls has at rest, since sigma > 0 is needed."""
 
+TINY = float(np.finfo(float).tiny)
+
 
 @dataclass(frozen=True)
 class MeasuredCurve:
@@ -74,7 +76,7 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> MeasuredCurve:
     knots = _knots(float(deflection[0]), float(deflection[-1]), len(deflection))
     shapes = [_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
     columns = np.column_stack([deflection, *(shape((1,), deflection)[0] for shape in shapes)])
-    sizes = np.abs(columns).max(axis=0)
+    sizes = np.maximum(np.abs(columns).max(axis=0), TINY)
     least = LEAST_STIFFNESS * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
     excess, *weights = nnls(columns / sizes, torque - least * deflection)[0] / sizes
     curve = _curve(knots, np.array(weights), least + excess)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError, Problem
-from vsacli.spec.fields import TableFile, value
+from vsacli.spec.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
 from vsacli.spec.source import Source
 from vsacli.spec.table import Table
 from vsacli.springs.inversion import FirstGuess, inverse
@@ -133,6 +133,8 @@ def _problems(table: Table) -> Iterator[Problem]:
 
     if len(deflection) < LEAST_ROWS:
         yield Problem(path, 0, f"expected at least {LEAST_ROWS} rows, found {len(deflection)}")
+    elif sizes := list(_wrong_sizes(deflection, torque)):
+        yield from (at(row, message) for row, message in sizes)
     elif not deflection[0] <= 0 < deflection[-1]:
         yield at(0, "the deflections must go from zero (a spring that only pulls) or below to above zero")
     elif (steps := np.flatnonzero(np.diff(deflection) <= 0)).size:
@@ -145,6 +147,16 @@ def _problems(table: Table) -> Iterator[Problem]:
         )
     else:
         yield from (at(row, message) for row, message in _wrong_bends(deflection, torque))
+
+
+def _wrong_sizes(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
+    """Rows with numbers too large, or with an end of the curve too small, for the declared fields of a file."""
+    for name, column in (("deflection", deflection), ("torque", torque)):
+        for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:
+            yield int(row), f"the {name} {FINITE.problem(column[row])}"
+        for row in (0, len(column) - 1):
+            if 0 < abs(column[row]) < SMALLEST:
+                yield row, f"the {name} {NON_ZERO.problem(column[row])}"
 
 
 def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:

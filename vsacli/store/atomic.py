@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import secrets
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -96,7 +95,7 @@ class AtomicFile:
             StorageError: as `check_target`, or if the folder cannot be written.
         """
         self.target = check_target(self._path, overwrite=self._overwrite)
-        self.temporary = self.target.with_name(f".vsacli-{secrets.token_hex(8)}.tmp")
+        self.temporary = self.target.with_name(f".vsacli-{os.urandom(8).hex()}.tmp")
         with reporting_storage_errors(self._path):
             self.temporary.open("xb").close()
         return self

@@ -12,6 +12,7 @@ import numpy as np
 from vsacli import __version__
 from vsacli.robot import Robot
 from vsacli.store.inputs import write_robot, write_sources
+from vsacli.store.quickly import add_array, attach_scales, set_attributes
 from vsacli.store.schema import TEXT, chunk_rows, row_shape, storable, storage_type, variable_attributes
 from vsacli.trajectory import Trajectory
 from vsacli.variables import MOTORS, VARIABLES, Variable
@@ -30,20 +31,24 @@ def create_layout(
     trajectory: Trajectory,
     variables: tuple[Variable, ...],
     command_line: str,
-) -> None:
-    """Write everything that is known before the first sample; the time axis has its planned length."""
-    file.attrs["format"] = format_name
-    file.attrs.update(_root_attributes(robot, trajectory, command_line))
-    _create_coordinates(file, robot, trajectory.samples)
+) -> dict[str, h5py.Dataset]:
+    """Write everything that is known before the first sample; the time axis has its planned length.
+
+    Returns:
+        The datasets that take samples, by the names of their variables, `time` first.
+    """
+    set_attributes(file, {"format": format_name, **_root_attributes(robot, trajectory, command_line)})
+    scales = _create_coordinates(file, robot, trajectory.samples)
     if trajectory.wrench is not None and any("wrench_axis" in variable.dims for variable in variables):
-        _create_wrench_axis(file, trajectory.wrench.frame)
+        scales["wrench_axis"] = _create_wrench_axis(file, trajectory.wrench.frame)
+    stored = {"time": scales["time"]}
     for variable in variables:
-        dataset = _create_variable(file, variable, robot, trajectory.samples)
-        for axis, dim in enumerate(("time", *variable.dims)):
-            dataset.dims[axis].attach_scale(file[dim])
+        dataset = stored[variable.name] = _create_variable(file, variable, robot, trajectory.samples)
+        attach_scales(dataset, [scales[dim] for dim in ("time", *variable.dims)])
     inputs = file.create_group("inputs", track_order=True)
     write_sources(inputs, robot.sources + trajectory.sources)
-    write_robot(inputs, robot)
+    write_robot(inputs, robot, scales)
+    return stored
 
 
 def _root_attributes(robot: Robot, trajectory: Trajectory, command_line: str) -> dict[str, str]:
@@ -64,25 +69,30 @@ def _root_attributes(robot: Robot, trajectory: Trajectory, command_line: str) ->
     }
 
 
-def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> None:
-    _create_variable(file, VARIABLES["time"], robot, samples).make_scale("time")
+def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str, h5py.Dataset]:
+    """The dimension scales by name."""
+    time = _create_variable(file, VARIABLES["time"], robot, samples)
     joint = _create_labels(file, "joint", robot.joint_names, "joint name")
-    joint.make_scale("joint")
-    _create_labels(file, "joint_type", robot.joint_types, "revolute or prismatic").dims[0].attach_scale(joint)
-    motor = file.create_dataset("motor", data=np.array(MOTORS, dtype="<i8"), track_order=True)
-    motor.attrs["long_name"] = "motor of a joint"
-    motor.make_scale("motor")
+    joint_type = _create_labels(file, "joint_type", robot.joint_types, "revolute or prismatic")
+    motor = add_array(file, "motor", np.array(MOTORS, dtype="<i8"))
+    set_attributes(motor, {"long_name": "motor of a joint"})
+    scales = {"time": time, "joint": joint, "motor": motor}
+    for name, scale in scales.items():
+        scale.make_scale(name)
+    attach_scales(joint_type, [joint])
+    return scales
 
 
-def _create_wrench_axis(file: h5py.File, frame: str) -> None:
+def _create_wrench_axis(file: h5py.File, frame: str) -> h5py.Dataset:
     axis = _create_labels(file, "wrench_axis", WRENCH_AXES, "force and moment along the axes of a frame")
-    axis.attrs["frame"] = frame
+    set_attributes(axis, {"frame": frame})
     axis.make_scale("wrench_axis")
+    return axis
 
 
 def _create_labels(file: h5py.File, name: str, labels: tuple[str, ...], long_name: str) -> h5py.Dataset:
-    dataset = file.create_dataset(name, data=labels, dtype=TEXT, track_order=True)
-    dataset.attrs["long_name"] = long_name
+    dataset = add_array(file, name, np.array(labels, dtype=TEXT))
+    set_attributes(dataset, {"long_name": long_name})
     return dataset
 
 
@@ -98,5 +108,5 @@ def _create_variable(file: h5py.File, variable: Variable, robot: Robot, samples:
         compression="gzip" if variable.name == "flags" else None,
         track_order=True,
     )
-    dataset.attrs.update(variable_attributes(variable, robot.joint_types))
+    set_attributes(dataset, variable_attributes(variable, robot.joint_types))
     return dataset

@@ -14,12 +14,12 @@ import numpy as np
 
 from vsacli.arrays import FlagArray, FloatArray
 from vsacli.errors import InputError, StorageError
+from vsacli.spec.source import HDF5_SIGNATURE
 from vsacli.store.damage import bounded, check_heaps, own_dataset, reporting_damage
 from vsacli.store.schema import FORMAT, row_shape, storage_type
 from vsacli.variables import MOTORS, VARIABLES, Variable, select_variables
 
 GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class StoredResult:
@@ -182,7 +182,7 @@ def _check_signature(path: str | Path) -> None:
         if Path(path).is_fifo():
             raise InputError.one("is a pipe; expected a result file, as invdyn writes it", path)
         with Path(path).open("rb") as file:
-            start = file.read(len(SIGNATURE))
+            start = file.read(len(HDF5_SIGNATURE))
     except FileNotFoundError:
         raise InputError.one(
             "there is no such file; expected a result file, as invdyn writes it", path
@@ -191,7 +191,7 @@ def _check_signature(path: str | Path) -> None:
         raise InputError.one("is a folder; expected a result file, as invdyn writes it", path) from None
     except OSError as error:
         raise StorageError(path, f"cannot be read: {error.strerror}") from error
-    if start != SIGNATURE:
+    if start != HDF5_SIGNATURE:
         kind = "is empty" if not start else "is not an HDF5 file"
         raise InputError.one(f"{kind}; expected a result file, as invdyn writes it", path)
 
@@ -200,5 +200,6 @@ def _foreign(found: object, expected: str) -> str:
     if not isinstance(found, str) or not found.startswith("vsacli-"):
         return f"is an HDF5 file, but no result file: it has no attribute format = {expected!r}"
     if found.partition("/")[0] != expected.partition("/")[0]:
-        return f"has the format {found}, but expected is a file of the format {expected}"
+        kind, wanted = (name.partition("/")[0].removeprefix("vsacli-") for name in (found, expected))
+        return f"is a {kind} ({found}), expected a {wanted} ({expected})"
     return f"has the format {found}, but this version reads {expected}; run invdyn again"

@@ -68,7 +68,6 @@ class ResultWriter:
         self._robot = robot
         self._trajectory = trajectory
         self._variables = self._selected(variables, trajectory)
-        self._stored = ("time", *(variable.name for variable in self._variables))
         self._overwrite = overwrite
         self._command_line = command_line
         self._written = 0
@@ -143,19 +142,20 @@ class ResultWriter:
         with self._hdf5():
             file = h5py.File(self._sink, "w", libver=("earliest", "v110"), track_order=True)
             self._file = self._cleanup.enter_context(file)
-            create_layout(
+            self._stored = create_layout(
                 file, self._format, self._robot, self._trajectory, self._variables, self._command_line
             )
 
     def _append(self, block: Samples) -> None:
         stop = self._written + len(block.time)
-        for name in self._stored:
-            self._file[name][self._written : stop] = getattr(block, name)
+        for name, dataset in self._stored.items():
+            dataset[self._written : stop] = getattr(block, name)
         self._written = stop
 
     def _complete(self, report: Mapping[str, Any]) -> None:
-        for name in self._stored:
-            self._file[name].resize(self._written, axis=0)
+        if self._written < self._trajectory.samples:
+            for dataset in self._stored.values():
+                dataset.resize(self._written, axis=0)
         text = storable(json.dumps(report, ensure_ascii=False, allow_nan=False))
         self._file.create_group("report").create_dataset("json", data=text, dtype=TEXT)
         self._file.attrs["verdict"] = report["verdict"]

@@ -149,11 +149,11 @@ class Suggestions:
 
     def lines(self) -> Iterator[str]:
         """One sentence for each kind, under a heading."""
-        rule = f"a margin of at least {100 * self.near_singular:.6g} % and within every limit"
+        margin = f"a margin of at least {100 * self.near_singular:.6g} %"
         if self.slow_down is None:
-            yield f"nothing to change: every step has {rule}"
+            yield f"nothing to change: every step has {margin} and keeps every limit"
             return
-        yield f"suggestions, any one of which gives every step {rule}:"
+        yield f"suggestions, with any one of which every step has {margin} and keeps every limit:"
         for kind, name in self.KINDS.items():
             found = getattr(self, kind)
             if isinstance(found, NotPossible):

@@ -145,5 +145,5 @@ def _known(index: Any) -> Any:
     if not isinstance(index, TracedArray):
         return index
     if any(isinstance(cell, Symbol) for cell in index.cells.flat):
-        raise TypeError("what is known only when the program runs cannot decide what is recorded")
+        raise NotImplementedError("what is known only when the program runs cannot decide what is recorded")
     return index.cells.astype(bool)

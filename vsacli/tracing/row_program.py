@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vsacli.arrays import FloatArray
-from vsacli.tracing.symbol import Kind, Operand, Symbol
 from vsacli.tracing.pruning import Listing
+from vsacli.tracing.symbol import Kind, Operand, Symbol
 
 _DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint16}
 _LETTERS = {Kind.REAL: "r", Kind.TRUTH: "t", Kind.BITS: "b"}

@@ -12,7 +12,8 @@ from vsacli.tracing.symbol import Operand, Symbol
 def simplified(operation: str, operands: Sequence[Operand]) -> Operand | None:
     """The result if it is a constant or one of the operands; None if the operation has to be carried out.
 
-    What NumPy would compute is kept, NaN and infinity included: 0 x is not 0. Only the sign of a zero may differ.
+    What NumPy would compute is kept, NaN and infinity included: 0 x is not 0. But x + 0 is x, also where x
+    is -0.
     """
     if operation in LETTING_NAN_PASS and any(map(_is_nan, operands)):
         return math.nan

@@ -1,0 +1,45 @@
+"""Many small things into an HDF5 file by h5py's low-level calls, in a third of the time of its objects.
+
+A result has some 70 datasets with 200 attributes, nearly all of which are known before the first sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+from h5py import h5a, h5d, h5ds, h5p, h5s, h5t
+
+from vsacli.arrays import AnyArray
+from vsacli.store.schema import TEXT
+
+_TEXT_TYPE = h5t.py_create(TEXT, logical=True)
+_SCALAR = h5s.create(h5s.SCALAR)
+
+
+def set_attributes(target: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
+    """New attributes of a group or dataset, texts or arrays."""
+    for name, content in attributes.items():
+        if isinstance(content, str):
+            h5a.create(target.id, name.encode(), _TEXT_TYPE, _SCALAR).write(np.array(content, dtype=TEXT))
+        else:
+            target.attrs[name] = content
+
+
+def add_array(group: h5py.Group, name: str, values: AnyArray) -> h5py.Dataset:
+    """A new dataset of numbers, or of texts in an array of the type `TEXT`; attributes keep their order."""
+    layout = h5p.create(h5p.DATASET_CREATE)
+    layout.set_obj_track_times(False)
+    layout.set_attr_creation_order(h5p.CRT_ORDER_TRACKED | h5p.CRT_ORDER_INDEXED)
+    stored = h5t.py_create(values.dtype, logical=True)
+    made = h5d.create(group.id, name.encode(), stored, h5s.create_simple(values.shape), layout)
+    made.write(h5s.ALL, h5s.ALL, values)
+    return h5py.Dataset(made)
+
+
+def attach_scales(dataset: h5py.Dataset, scales: Iterable[h5py.Dataset]) -> None:
+    """Attach to each axis its scale."""
+    for axis, scale in enumerate(scales):
+        h5ds.attach_scale(dataset.id, scale.id, axis)
