@@ -9,7 +9,7 @@ import subprocess
 
 import click
 import pytest
-from cli_samples import COMMAND, ROBOT, contents, edited, installed
+from cli_samples import COMMAND, REST_TO_REST, ROBOT, contents, edited, installed
 
 from vsacli import __version__
 from vsacli.cli.exit_codes import Exit
@@ -29,6 +29,12 @@ def test_help_names_every_command_and_exit_code(vsacli):
         assert re.search(rf"^  {command} +\w.*\.$", short.out, re.MULTILINE)  # a whole sentence, not cut off
     for code in Exit:
         assert f"{code.value:<3}  {code.meaning}" in short.out
+
+
+def test_help_lists_commands_by_use(vsacli):
+    listing = vsacli("--help").out.partition("\nComputing:\n")[2].partition("Example:")[0]
+    assert re.findall(r"^  ([\w-]+) ", listing, re.MULTILINE) == list(group.commands)
+    assert re.findall(r"^(\w+):$", listing, re.MULTILINE) == ["Results", "Files"]
 
 
 @pytest.mark.parametrize("command", group.commands)
@@ -200,3 +206,11 @@ def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
     done = installed("check-feasibility", "r.yaml", motion, folder=tmp_path, env=environment)
     assert done.returncode == 0
     assert done.stdout.startswith("\\u03c6-arm, rest-to-rest: 401 steps")
+
+
+@pytest.mark.parametrize("command", ["invdyn", "simulate"])
+def test_a_csv_name_for_an_hdf5_file_is_refused(vsacli, tmp_path, command):
+    done = vsacli(command, ROBOT, REST_TO_REST, "-o", "torques.csv")
+    assert done.code == Exit.USAGE
+    assert "'torques.csv': the file is HDF5; `vsacli export` makes CSV of invdyn results" in done.err
+    assert not list(tmp_path.iterdir())

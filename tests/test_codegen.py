@@ -75,7 +75,7 @@ def test_no_undefined_behaviour(name: str, tmp_path: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["3R", "mixed", "sinh", "table"])
+@pytest.mark.parametrize("name", ["3R", "mixed", "sinh", "table", "four_bar"])
 def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_path: Path) -> None:
     flags = ("-Wconversion", "-Wdouble-promotion") if name == "3R" else ()
     folder = tmp_path / "library"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from engine_samples import assert_agree, demands, kinds_of_steps, needs_compiler
 
 from robots import MotionArrays, random_motion, random_robot, vsa_3r
 from vsacli import load_robot
-from vsacli.engine import choose
+from vsacli.engine import choose, compiler
 from vsacli.engine.engines import Engine
 from vsacli.flags import Flag
 from vsacli.newton_euler import link_torques
@@ -43,8 +44,6 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 @pytest.fixture
 def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compile without optimisation, for code that is run on a few samples only."""
-    from vsacli.engine import compiler
-
     flags = tuple("-O0" if flag == "-O2" else flag for flag in compiler.FLAGS)
     monkeypatch.setattr(compiler, "FLAGS", flags)
     compiler._examined.cache_clear()
@@ -138,12 +137,39 @@ def test_wrench_counts_in_either_frame(frame: str):
     assert not np.allclose(found.tau_e, compute_block(robot, demands(robot, SAMPLES)).tau_e)
 
 
+@pytest.mark.usefixtures("quickly")
+def test_robots_that_differ_in_a_limit_alone_are_told_apart():
+    """Springs compare equal whatever their limits, for pairs of them to be alike."""
+    motion = demands(one_joint(ALIKE, ALIKE), SAMPLES)
+    beyond = []
+    for largest in (0.3, 0.4):
+        limited = replace(ALIKE, max_deflection=largest)
+        robot = one_joint(limited, limited)
+        expected = compute_block(robot, motion)
+        beyond.append(kinds_of_steps(expected)[Flag.DEFLECTION_LIMIT])
+        assert_agree(compute_block(robot, motion, engine=compiled(robot)), expected)
+    assert beyond[0] > beyond[1] > 0
+
+
 def joined(robot: Robot, motion: MotionArrays, starts: list[int]) -> np.ndarray:
     parts = [
         np.array(link_torques(robot, *(array[start:stop] for array in motion), engine="c"))
         for start, stop in zip(starts, [*starts[1:], None], strict=True)
     ]
     return np.concatenate(parts, axis=1)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names processors of that kind")
+@pytest.mark.parametrize("processor", ["x86-64", "haswell"])
+def test_shorter_vectors_agree(processor: str, monkeypatch: pytest.MonkeyPatch):
+    """2 lanes without, 4 with functions of math.h for vectors; any number of samples is left over."""
+    flags = tuple(f"-march={processor}" if flag == compiler.NATIVE else flag for flag in compiler.FLAGS)
+    monkeypatch.setattr(compiler, "FLAGS", flags)
+    compiler._examined.cache_clear()
+    robot = one_joint(ALIKE, Cubic(k=440, k_c=2000))
+    for samples in (SAMPLES, SAMPLES + 1, 3):
+        motion = demands(robot, samples)
+        assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))
 
 
 def test_results_depend_neither_on_blocks_nor_on_threads():

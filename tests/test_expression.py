@@ -110,7 +110,7 @@ def test_degrees_of_an_ambiguous_expression_are_refused(text):
         ("__import__('os')", "unknown word '__import__'"),
         ("5 # comment", "unexpected character '#'"),
         ("1; 2", "unexpected character ';'"),
-        ("90°", "unexpected character '°'"),
+        ("90°", "unexpected character '°'; degrees are written as in `90 deg`"),
         ("٣", "unexpected character '٣'"),
         ("1" * 201, "longer than 200 characters"),
     ],

@@ -208,7 +208,7 @@ def test_where_a_is_singular_there_is_no_torque():
 def test_rigid_joints_among_others_are_refused():
     robot = with_actuators(vsa_3r(), {1: rigid()})
     with pytest.raises(
-        InputError, match=r"springs at all joints or at none: shoulder is rigid, base, elbow is not"
+        InputError, match=r"springs at all joints or at none: shoulder is rigid, base, elbow are not"
     ):
         FeedbackLinearization(robot, GAINS)
 

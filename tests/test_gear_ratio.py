@@ -187,7 +187,10 @@ def test_a_robot_with_single_motors_stores_its_ratios_too(vsacli: Callable[..., 
     [
         ("0", "gear_ratio: must be finite and not zero, not 0"),
         ("1e20", "motor: gear_ratio: makes the inertia on the joint side 2e+38, too far from anything built"),
-        ("1e-20", "motor: gear_ratio: makes the inertia on the joint side 2e-42, too far from anything built"),
+        (
+            "1e-20",
+            "motor: gear_ratio: makes the inertia on the joint side 2e-42, too far from anything built",
+        ),
         ("ten", "gear_ratio: expected a number, found 'ten'"),
     ],
 )

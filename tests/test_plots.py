@@ -156,6 +156,12 @@ def test_title_and_legend_name_robot_trajectory_and_joints() -> None:
     assert legend_labels(figures["motion"]) == ["base", "shoulder", "elbow", "infeasible", "reachable"]
 
 
+def test_a_name_that_robot_and_trajectory_share_stands_once() -> None:
+    result = rest_to_rest()
+    result.trajectory_name = result.robot_name
+    assert plot_result(result)["motion"].get_suptitle() == "vsa-3r"
+
+
 def test_an_incomplete_run_says_where_it_stopped() -> None:
     result = rest_to_rest()
     result.complete = False

@@ -132,6 +132,14 @@ TABLES = {
         rows(row_2="-0.3,-19"),
         "4: the torque -19 lies below -16.8, the line between the rows before and after: it is not concave",
     ),
+    "too large": (
+        rows(row_8="0.3,1e40"),
+        "10: the torque must be at most 1e+30 in size, not 1e+40",
+    ),
+    "too small": (
+        rows(row_0="-5e-50,-47"),
+        "2: the deflection must be at least 1e-30 in size, not -5e-50",
+    ),
     "too few rows": ("\n".join(["deflection,torque", *ROWS[4:8]]), ": expected at least 6 rows, found 4"),
     "no negative side": (
         "\n".join(["deflection,torque", *ROWS[6:], "1,400"]),

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from spring_samples import SPRINGS, on_side_2
+from spring_samples import SPRINGS, measured, on_side_2
 from test_branch import stiffness_under
 
 from vsacli.springs import SpringLaw
@@ -14,6 +14,7 @@ from vsacli.springs.cubic import Cubic
 from vsacli.springs.folds import map_folds
 from vsacli.springs.four_bar import FourBar
 from vsacli.springs.hardening import sample_hardening
+from vsacli.springs.mirrored import Mirrored
 from vsacli.springs.polynomial import Polynomial
 
 EPS = float(np.finfo(float).eps)
@@ -55,6 +56,16 @@ def test_two_humps_have_three_turns():
     hardening = sample_hardening(LAWS["two humps"])
     assert hardening is not None
     assert len(hardening.peaks) == 3
+
+
+@pytest.mark.parametrize("low", [-1e-6, -1e-7])
+def test_a_measured_curve_that_rounds_at_its_end_has_no_peak_there(low: float):
+    deflection = np.linspace(low, 0.5, 30)
+    law = Mirrored(law=measured(deflection, 100 * deflection**3))
+    hardening = sample_hardening(law)
+    assert hardening is not None
+    assert np.all((hardening.peaks > 0) & (hardening.peaks < len(hardening.phi) - 1))
+    assert np.all(np.diff(map_folds(law.law, law.law).edges) > 0)
 
 
 def test_a_tendon_that_pulls_the_other_way_has_no_positive_torque():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.arrays import BoolArray
+from vsacli.loops import Values, repeat, where_needed
 from vsacli.springs.bracketing import bracketed_root
-from vsacli.springs.loops import Values, repeat, where_needed
 
 EPS = float(np.finfo(float).eps)
 

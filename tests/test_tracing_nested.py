@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from listings import carry_out, recorded
 
-from vsacli.springs.loops import look_up, repeat, where_needed
+from vsacli.loops import look_up, repeat, where_needed
 from vsacli.tracing import Tape, TracedArray
 
 RNG = np.random.default_rng(3)

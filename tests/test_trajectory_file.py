@@ -167,7 +167,7 @@ def test_a_bare_table(robot):
 
 def test_a_bare_table_without_stiffness(robot):
     write_csv("motion.csv", "q")
-    with pytest.raises(InputError, match=r"^motion.csv:1: there are no columns arm.stiffness, slide.stiffness"):
+    with pytest.raises(InputError, match=r"^motion.csv:1: there are no columns arm.stiffness, slide.stiff"):
         load_trajectory("motion.csv", robot)
 
 

@@ -82,10 +82,14 @@ def control_law(plant: Plant, gains: Gains) -> Decoupling | ComputedTorque:
 def _mixed(robot: Robot, plant: Plant) -> str:
     drivetrain = plant.drivetrain
     rigid, sprung = (
-        ", ".join(dict.fromkeys(robot.joint_names[joint] for joint in drivetrain.joint[with_spring]))
+        list(dict.fromkeys(robot.joint_names[joint] for joint in drivetrain.joint[with_spring]))
         for with_spring in (~drivetrain.sprung, drivetrain.sprung)
     )
     return (
-        f"feedback linearization needs springs at all joints or at none: {rigid} is rigid, {sprung} is not; "
-        "give the rigid one an elastic actuator, or use the controller feedforward"
+        f"feedback linearization needs springs at all joints or at none: {_are(rigid)} rigid, "
+        f"{_are(sprung)} not; give rigid joints an elastic actuator, or use the controller feedforward"
     )
+
+
+def _are(names: list[str]) -> str:
+    return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"

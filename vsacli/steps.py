@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from vsacli.arrays import FloatArray, by_joint, over_time
 from vsacli.drivetrain import SIDES
 from vsacli.engine import NUMPY, Engine
 from vsacli.errors import InputError
-from vsacli.feasibility import NEAR_SINGULAR
+from vsacli.feasibility import NEAR_SINGULAR, LimitCheck, limit_checks
 from vsacli.motion import Motion
 from vsacli.newton_euler import MOTION_NAMES, LinkTorques, link_torques
 from vsacli.robot import Antagonistic, Robot
@@ -42,12 +42,18 @@ class InverseDynamics:
         frame: of the wrench; None if there is none.
         near_singular: margin below which a step is near-singular.
         followed: whether deflections of antagonistic joints are given, else they are solved for.
+        limits: those of each joint, since springs compare equal whatever their limits.
     """
 
     robot: Robot
     frame: str | None = None
     near_singular: float = NEAR_SINGULAR
     followed: bool = False
+    limits: tuple[tuple[LimitCheck, ...], ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        limits = tuple(tuple(limit_checks(joint)) for joint in self.robot.joints)
+        object.__setattr__(self, "limits", limits)
 
     @property
     def links(self) -> LinkTorques:

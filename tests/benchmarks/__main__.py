@@ -42,7 +42,8 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     yield "calls", page.call_sentence(compiled.single_calls())
     yield "recorders", page.recorder_table(recorders.compare(SAMPLES, repeats))
     yield "costs", page.cost_table(compiled.costs())
-    yield "stages", page.stage_table(stages.split(SAMPLES, repeats))
+    runs = (stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c"))
+    yield "stages", page.stage_table(*runs)
     yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, repeats))
     yield "startup", page.startup_table(commands.startup(3 * repeats))
     memory = commands.peak_memory(LONG_RUN) / 1e6

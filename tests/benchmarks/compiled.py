@@ -114,7 +114,7 @@ def single_calls(calls: int = CALLS) -> Calls:
 
 
 class Cost(NamedTuple):
-    """What code of inverse dynamics costs: operations, bytes of machine code and of stack, seconds to make it.
+    """What code of inverse dynamics costs: operations, bytes of machine code and of stack, seconds.
 
     `recording` and `compiling` are of the batch library, the rest of the generated function.
     """

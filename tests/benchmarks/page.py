@@ -99,14 +99,13 @@ def recorder_table(recorders: Iterable[Recorder]) -> str:
     )
 
 
-def stage_table(stages: Stages) -> str:
-    """The stages of a run, against computing."""
-    rows = [
-        *stages._asdict().items(),
-        ("recursion, actuation and bookkeeping", stages.computing),
-    ]
-    header = ("stage, 7R arm", "µs a sample", "of computing")
-    return table(header, ([name, micro(took), f"{took / stages.computing:.0%}"] for name, took in rows))
+def stage_table(numpy: Stages, compiled: Stages) -> str:
+    """The stages of a run, with either engine."""
+    rows = (
+        [name, micro(by_numpy), micro(by_code)]
+        for name, by_numpy, by_code in zip(Stages._fields, numpy, compiled, strict=True)
+    )
+    return table(("stage, µs a sample of the 7R arm", "NumPy", "compiled, 1 thread"), rows)
 
 
 def actuation_table(found: Iterable[Actuation]) -> str:

@@ -1,8 +1,9 @@
-"""A whole run taken apart: sampling the trajectory, computing, writing."""
+"""A whole run taken apart: sampling the trajectory, computing, bookkeeping, writing."""
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,13 +11,15 @@ from subjects import SEVEN_JOINTS, seven_joints
 from timing import medians
 
 from vsacli import load_trajectory
-from vsacli.actuation import Drive, drive
-from vsacli.newton_euler import link_torques
+from vsacli.engine import choose
+from vsacli.newton_euler import LinkTorques, link_torques
 from vsacli.pipeline import BLOCK_SAMPLES, Run
-from vsacli.steps import command_of, elastic_torques
+from vsacli.robot import Robot
+from vsacli.steps import InverseDynamics, compute_block
 from vsacli.store.writer import ResultWriter
 from vsacli.times import UniformTimes
 from vsacli.trajectory import Trajectory
+from vsacli.variables import Block
 
 VARIABLES = ("tau_motor", "flags")
 
@@ -30,11 +33,6 @@ class Stages(NamedTuple):
     bookkeeping: float
     writing: float
 
-    @property
-    def computing(self) -> float:
-        """From the motion to variables and report."""
-        return self.recursion + self.actuation + self.bookkeeping
-
 
 def trajectory_of(samples: int) -> Trajectory:
     """The motion of the arm at so many samples."""
@@ -43,47 +41,43 @@ def trajectory_of(samples: int) -> Trajectory:
     return Trajectory(times, shipped.position, shipped.stiffness, name=shipped.name)
 
 
-def split(samples: int, repeats: int) -> Stages:
-    """Time each stage by itself over the blocks of one run."""
+def split(samples: int, repeats: int, engine: str) -> Stages:
+    """Time what ends with each stage over the blocks of one run, in a single thread."""
     robot, trajectory = seven_joints(), trajectory_of(samples)
     starts = range(0, trajectory.samples, BLOCK_SAMPLES)
     motions = [trajectory.block(start, start + BLOCK_SAMPLES) for start in starts]
-    commands = [{**motion.variables(), **elastic_torques(robot, motion)} for motion in motions]
     blocks = list(Run(robot, trajectory))
+    links = choose(engine, LinkTorques(robot), samples, threads=1).engine
+    whole = choose(engine, InverseDynamics(robot), samples, threads=1).engine
 
-    def sample() -> None:
-        for start in starts:
-            trajectory.block(start, start + BLOCK_SAMPLES)
-
-    def recur() -> None:
-        for motion in motions:
-            link_torques(robot, motion.q, motion.dq, motion.ddq, motion.d3q, motion.d4q)
-
-    def actuate() -> list[Drive]:
-        return [
-            drive(joint, command_of(index, command))
-            for command in commands
-            for index, joint in enumerate(robot.joints)
-        ]
-
-    def run() -> None:
-        walk = Run(robot, trajectory)
-        for _ in walk:
-            pass
-        walk.report()
-
-    def write() -> None:
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            ResultWriter(Path(folder, "result.h5"), robot, trajectory, VARIABLES) as writer,
-        ):
-            for block in blocks:
-                writer.write(block)
-            writer.finish({"verdict": "ok", "complete": True})
-
-    taken = medians(
-        {"sampling": sample, "recursion": recur, "actuation": actuate, "run": run, "writing": write}, repeats
+    ways = {
+        "sample": lambda: [trajectory.block(start, start + BLOCK_SAMPLES) for start in starts],
+        "recur": lambda: [link_torques(robot, m.q, m.dq, m.ddq, m.d3q, m.d4q, engine=links) for m in motions],
+        "compute": lambda: [compute_block(robot, m, engine=whole) for m in motions],
+        "run": lambda: _run(Run(robot, trajectory, engine=engine, threads=1)),
+        "write": lambda: _write(blocks, robot, trajectory),
+    }
+    each = {name: seconds / samples for name, seconds in medians(ways, repeats).items()}
+    return Stages(
+        sampling=each["sample"],
+        recursion=each["recur"],
+        actuation=each["compute"] - each["recur"],
+        bookkeeping=each["run"] - each["compute"] - each["sample"],
+        writing=each["write"],
     )
-    rest = taken["run"] - taken["sampling"] - taken["recursion"] - taken["actuation"]
-    each = {name: seconds / samples for name, seconds in {**taken, "bookkeeping": rest}.items()}
-    return Stages(**{name: each[name] for name in Stages._fields})
+
+
+def _run(run: Run) -> None:
+    for _ in run:
+        pass
+    run.report()
+
+
+def _write(blocks: Sequence[Block], robot: Robot, trajectory: Trajectory) -> None:
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        ResultWriter(Path(folder, "result.h5"), robot, trajectory, VARIABLES) as writer,
+    ):
+        for block in blocks:
+            writer.write(block)
+        writer.finish({"verdict": "ok", "complete": True})

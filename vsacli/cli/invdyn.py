@@ -13,6 +13,7 @@ from vsacli.cli.options import (
     deflections_option,
     engine_options,
     example,
+    hdf5_name,
     json_option,
     overwrite_option,
     robot_argument,
@@ -38,7 +39,11 @@ from vsacli.cli.running import (
 @robot_argument
 @trajectory_argument
 @click.option(
-    "-o", "--output", metavar="FILE", help="Result file; by default ROBOT-TRAJECTORY.h5 in this folder."
+    "-o",
+    "--output",
+    metavar="FILE",
+    callback=hdf5_name,
+    help="Result file; by default ROBOT-TRAJECTORY.h5 in this folder.",
 )
 @variables_option("all")
 @click.option(

@@ -15,6 +15,7 @@ from vsacli import __version__
 from vsacli.cli.console import OutputClosedError, reporting_stdout_errors, tell
 from vsacli.cli.exit_codes import Exit
 from vsacli.cli.options import example
+from vsacli.cli.sections import SectionedGroup
 from vsacli.errors import InputError, StorageError
 from vsacli.on_demand import OnDemand
 
@@ -22,25 +23,32 @@ _EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.ya
 _EPILOG += "\n\n\b\nExit codes:\n" + "\n".join(f"  {code.value:<3}  {code.meaning}" for code in Exit)
 
 
-_COMMANDS = OnDemand(
-    {
+_SECTIONS = {
+    "Computing": {
         "invdyn": "vsacli.cli.invdyn:invdyn",
         "check-feasibility": "vsacli.cli.check_feasibility:check_feasibility",
-        "plot": "vsacli.cli.plot:plot",
-        "export": "vsacli.cli.export:export",
         "simulate": "vsacli.cli.simulate:simulate",
         "codegen": "vsacli.cli.codegen:codegen",
+    },
+    "Results": {
+        "plot": "vsacli.cli.plot:plot",
+        "export": "vsacli.cli.export:export",
+    },
+    "Files": {
+        "new": "vsacli.cli.new:new",
         "examples": "vsacli.cli.examples:examples",
         "import-urdf": "vsacli.cli.import_urdf:import_urdf",
         "validate": "vsacli.cli.validate:validate",
         "info": "vsacli.cli.info:info",
-        "new": "vsacli.cli.new:new",
         "schema": "vsacli.cli.schema:schema",
-    }
-)
+    },
+}
+_COMMANDS = OnDemand({name: home for section in _SECTIONS.values() for name, home in section.items()})
 
 
 @click.group(
+    cls=SectionedGroup,
+    sections={heading: tuple(section) for heading, section in _SECTIONS.items()},
     commands=cast("MutableMapping[str, click.Command]", _COMMANDS),  # click looks commands up, no more
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog=_EPILOG,

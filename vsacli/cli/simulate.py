@@ -13,7 +13,14 @@ import click
 
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.exit_codes import Exit
-from vsacli.cli.options import example, json_option, overwrite_option, robot_argument, trajectory_argument
+from vsacli.cli.options import (
+    example,
+    hdf5_name,
+    json_option,
+    overwrite_option,
+    robot_argument,
+    trajectory_argument,
+)
 from vsacli.cli.running import load_inputs, refuse_input_as_output
 from vsacli.errors import InputError
 
@@ -86,7 +93,11 @@ def _numbers(_context: click.Context, _parameter: click.Parameter, written: str)
 @click.option("--rtol", type=float, default=1e-9, show_default=True, help="Relative tolerance.")
 @click.option("--atol", type=float, default=1e-10, show_default=True, help="Absolute tolerance.")
 @click.option(
-    "-o", "--output", metavar="FILE", help="Result; by default ROBOT-TRAJECTORY-simulation.h5 in this folder."
+    "-o",
+    "--output",
+    metavar="FILE",
+    callback=hdf5_name,
+    help="Result; by default ROBOT-TRAJECTORY-simulation.h5 in this folder.",
 )
 @click.option(
     "--plot", "plot_folder", metavar="FOLDER", help="Also draw figures of the errors there, as png."

@@ -44,9 +44,9 @@ def _joints(prefix: str, robot: Robot) -> str:
         for index, joint in enumerate(robot.joints)
     )
     text = (
-        f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN. SI units; signs, "
-        "frames and gravity as in the robot file; nothing acts on the end effector. Functions keep nothing "
-        "between calls."
+        f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN. SI units; "
+        "signs, frames and gravity as in the robot file; nothing acts on the end effector. Functions keep "
+        "nothing between calls."
     )
     return f"{comment(text)}\nenum {{ {prefix.upper()}_JOINTS = {len(robot.joints)} }};"
 

@@ -68,6 +68,11 @@ class Reference:
             for array, part in zip(function.result.arrays, parts, strict=True)
         }
 
+    @property
+    def largest_stiffness(self) -> float:
+        """Largest stiffness demanded, of joints of either kind."""
+        return float(np.nanmax(self._inputs["command"]["stiffness"]))
+
     def _drawn(self, scale: float) -> FloatArray:
         return self._rng.uniform(-scale, scale, (CASES, len(self._robot.joints)))
 

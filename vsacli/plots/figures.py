@@ -90,7 +90,7 @@ def _motion(result: StoredResult, failures: Failures) -> Figure:
 
 def _motor_torque(result: StoredResult, failures: Failures) -> Figure:
     """Fig. 2: motor 1 at the left, motor 2 at the right."""
-    return grouped_figure(result, failures, "tau_motor", [partial(_motor_label, motor) for motor in MOTORS])
+    return grouped_figure(result, failures, "tau_motor", [partial(motor_label, motor) for motor in MOTORS])
 
 
 def _elastic_torque(result: StoredResult, failures: Failures) -> Figure:
@@ -145,7 +145,8 @@ def _position_label(joint_type: str) -> str:
     return f"joint position $q$ [{POSITION.unit(joint_type)}]"
 
 
-def _motor_label(motor: int, joint_type: str) -> str:
+def motor_label(motor: int, joint_type: str) -> str:
+    """Of the axis for the torque, or force, of a motor."""
     return rf"motor {_force(joint_type)} $\tau_{motor}$ [{TORQUE.unit(joint_type)}]"
 
 

@@ -107,9 +107,9 @@ def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
 
 
 def result_title(result: StoredResult) -> str:
-    """Robot and trajectory, and where an incomplete run ended."""
+    """Robot and trajectory, once if they are called alike, and where an incomplete run ended."""
     ending = "" if result.complete else f" (stopped at {result.time[-1]:.4g} s)"
-    return f"{result.robot_name}, {result.trajectory_name}{ending}"
+    return ", ".join(dict.fromkeys((result.robot_name, result.trajectory_name))) + ending
 
 
 def missing_variables(figure: str, variables: Sequence[str]) -> str:

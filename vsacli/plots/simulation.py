@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from vsacli.plots.curves import Failures
-from vsacli.plots.figures import grouped_figure
+from vsacli.plots.figures import grouped_figure, motor_label
 from vsacli.plots.style import house_style
 from vsacli.store.simulation import StoredSimulation
-from vsacli.units import POSITION, STIFFNESS, TORQUE
+from vsacli.units import POSITION, STIFFNESS
 from vsacli.variables import MOTORS, existing
 
 
@@ -35,14 +35,10 @@ def _stiffness_error(joint_type: str) -> str:
     return rf"stiffness error $\sigma - \sigma_d$ [{STIFFNESS.unit(joint_type)}]"
 
 
-def _motor_torque(motor: int, joint_type: str) -> str:
-    return rf"motor {motor}: $\tau_{motor}$ [{TORQUE.unit(joint_type)}]"
-
-
 _FIGURES: dict[str, tuple[str, list[Callable[[str], str]]]] = {
     "position-error": ("q_error", [_position_error]),
     "stiffness-error": ("stiffness_error", [_stiffness_error]),
-    "motor-torque": ("tau_motor_actual", [partial(_motor_torque, motor) for motor in MOTORS]),
+    "motor-torque": ("tau_motor_actual", [partial(motor_label, motor) for motor in MOTORS]),
 }
 
 SIMULATION_FIGURES = tuple(_FIGURES)

@@ -94,7 +94,8 @@ def _check_tokens(text: str) -> None:
     while position < len(text):
         token = _TOKEN.match(text, position)
         if not token:
-            raise ExpressionError(f"unexpected character {text[position]!r}")
+            hint = "; degrees are written as in `90 deg`" if text[position] == "°" else ""
+            raise ExpressionError(f"unexpected character {text[position]!r}{hint}")
         if token["name"] and token["name"] != "pi":
             raise ExpressionError(f"unknown word {token['name']!r}; only `pi` may stand in an expression")
         if token["number"] and re.match(r"0\d", token["number"]):

@@ -13,7 +13,6 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, NamedTuple, TypeAlias
 
 from vsacli.errors import FieldProblem, InvalidRecordError
@@ -278,7 +277,7 @@ def _check_numbers(path: tuple[str | int, ...], check: Check | None, content: An
     if isinstance(content, tuple):
         for index, item in enumerate(content):
             yield from _check_numbers((*path, index), check, item)
-    elif (check is not None and content is not None) or isinstance(content, Real):
+    elif (check is not None and content is not None) or isinstance(content, float | int):
         problem = (check or _ANY).problem(content)
         if problem:
             yield FieldProblem(path, problem)

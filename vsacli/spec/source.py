@@ -70,7 +70,8 @@ def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize)
         raise InputError.one("is no regular file (a device, pipe or socket)", name)
     if status.st_size > max_bytes:
         with _refusing(name), open(name, "rb") as file:
-            _refuse_hdf5(file.read(len(HDF5_SIGNATURE)), name)
+            start = file.read(len(HDF5_SIGNATURE))
+        _refuse_hdf5(start, name)
         raise _too_large(name, status.st_size, max_bytes)
 
 

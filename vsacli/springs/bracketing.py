@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
-from vsacli.springs.loops import Values, repeat
+from vsacli.loops import Values, repeat
 
 Function = Callable[..., FloatArray]
 """f(x, *constants) on arrays of one shape."""

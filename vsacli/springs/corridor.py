@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
+from vsacli.loops import Values, look_up, repeat, where_needed
 from vsacli.springs.balance import Balance
 from vsacli.springs.bracketing import bracketed_root
 from vsacli.springs.folds import Folds
-from vsacli.springs.loops import Values, look_up, repeat, where_needed
 
 MOST_STEPS = 12
 """Newton steps to a fold; three or four do next to a node of the map."""
@@ -48,6 +48,7 @@ class Corridor(NamedTuple):
         rising: whether the stiffness increases with the preload.
         critical: whether the inner end is a critical point (else the end of a law's domain).
         slack: whether a side that only pulls carries no torque at the inner end.
+        states: torque, stiffness, slope and curvature of both springs at the inner end.
     """
 
     inner: End
@@ -55,6 +56,7 @@ class Corridor(NamedTuple):
     rising: BoolArray
     critical: BoolArray
     slack: BoolArray
+    states: tuple[Values, Values]
 
 
 def corridor(balance: Balance, folds: Folds, tau_e: FloatArray) -> Corridor:
@@ -71,12 +73,14 @@ def corridor(balance: Balance, folds: Folds, tau_e: FloatArray) -> Corridor:
         (tau_e, largest),
         (endless, -endless, endless, endless),
     )
+    states = balance.first.derivatives(phi_1, 3), balance.second.derivatives(phi_2, 3)
     return Corridor(
-        inner=End(phi_1, phi_2, balance.stiffness(phi_1, phi_2)).where(carried),
+        inner=End(phi_1, phi_2, states[0][1] + states[1][1]).where(carried),
         outer=End(outer[0], outer[1], outer[2]).where(carried),
         rising=outer[3] >= 0,
         critical=critical,
         slack=balance.is_slack(tau_e, least),
+        states=states,
     )
 
 
@@ -90,6 +94,8 @@ def _outer_end(balance: Balance, tau_e: FloatArray, t: FloatArray) -> Values:
 
 def _outermost_fold(balance: Balance, folds: Folds, tau_e: FloatArray) -> Values:
     """Deflections at the outermost critical point, by Newton's method within its box of the map."""
+    if np.isnan(folds.tau_e).all():
+        return np.full_like(tau_e, np.nan), np.full_like(tau_e, np.nan)
     cell = np.clip(np.searchsorted(folds.edges, tau_e, side="right") - 1, 0, len(folds.edges) - 2)
     (tau_0, tau_1), (from_1, to_1), (from_2, to_2) = (
         [look_up(corner, cell) for corner in corners] for corners in folds[1:]

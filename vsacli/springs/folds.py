@@ -9,8 +9,8 @@ are born.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import product
+from collections.abc import Iterable, Iterator
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -65,11 +65,12 @@ def _positive_folds(first: SpringLaw, second: SpringLaw) -> Folds:
     corners = np.full((3, 2, middle.size), np.nan)
     outermost = np.full(middle.size, -np.inf)
     for curve in curves:
-        preload = np.interp(middle, curve.tau_e, curve.preload, left=-np.inf, right=-np.inf)
+        tau_e = curve.tau_e
+        preload = np.interp(middle, tau_e, curve.preload, left=-np.inf, right=-np.inf)
         further = preload > outermost
         outermost[further] = preload[further]
-        cell = np.clip(np.searchsorted(curve.tau_e, middle[further]) - 1, 0, len(curve.tau_e) - 2)
-        for values, nodes in zip(corners, curve[:3], strict=True):
+        cell = np.clip(np.searchsorted(tau_e, middle[further]) - 1, 0, len(tau_e) - 2)
+        for values, nodes in zip(corners, (tau_e, curve.phi_1, curve.phi_2), strict=True):
             values[:, further] = nodes[cell], nodes[cell + 1]
     changes = np.flatnonzero(_differ(corners[0, :, 1:], corners[0, :, :-1])) + 1
     cells = np.append(0, changes)
@@ -84,10 +85,20 @@ def _differ(cells: FloatArray, others: FloatArray) -> BoolArray:
 class _Curve(NamedTuple):
     """Points on a curve of critical points, in order; arrays (points,)."""
 
-    tau_e: FloatArray
     phi_1: FloatArray
     phi_2: FloatArray
-    preload: FloatArray
+    tau_1: FloatArray
+    tau_2: FloatArray
+
+    @property
+    def tau_e(self) -> FloatArray:
+        """Elastic torque."""
+        return self.tau_1 + self.tau_2
+
+    @property
+    def preload(self) -> FloatArray:
+        """Preload torque."""
+        return (self.tau_1 - self.tau_2) / 2
 
     def at(self, chosen: slice | IndexArray) -> _Curve:
         """Some of the points."""
@@ -105,33 +116,50 @@ class _Nodes(NamedTuple):
 
 def _rising_curves(one: Hardening, two: Hardening) -> Iterator[_Curve]:
     """All curves in parts over which tau_e increases."""
+    curves = list(_curves(one, two))
+    if not curves:
+        return
+    turns = [_turns(curve.tau_e) for curve in curves]
+    low, high = (
+        _Curve(*_joined(curve.at(turn[end]) for curve, turn in zip(curves, turns, strict=True)))
+        for end in (0, 1)
+    )
+    births = _births(one.law, two.law, low, high)
+    before = np.cumsum([0, *(len(low) for low, _ in turns)])
+    for curve, turn, first, last in zip(curves, turns, before[:-1], before[1:], strict=True):
+        yield from _rising_parts(curve, *turn, births.at(slice(first, last)))
+
+
+def _curves(one: Hardening, two: Hardening) -> Iterator[_Curve]:
+    """The curve of each pair of pieces of hardening, if there are two points on it.
+
+    Along it both torques increase together if the pieces both rise or both fall, else one against the other.
+    Where a hardening has become constant but for rounding, so has the torque of the other spring.
+    """
     pieces = list(product(one.pieces(), two.pieces()))
     of_one = [_nodes(one, first, two, second) for first, second in pieces]
     of_two = [_nodes(two, second, one, first) for first, second in pieces]
-    points = zip(_with_partners(of_one, two.law), _with_partners(of_two, one.law), pieces, strict=True)
-    for (phi_1, partner_of_1), (phi_2, partner_of_2), (first, second) in points:
-        curve = _points(
-            one.law,
-            two.law,
-            np.concatenate((phi_1, partner_of_2)),
-            np.concatenate((partner_of_1, phi_2)),
-            alike=one.rises(first) == two.rises(second),
-        )
-        if len(curve.tau_e) > 1:
-            yield from _rising_parts(one.law, two.law, curve)
-
-
-def _points(
-    first: SpringLaw, second: SpringLaw, phi_1: FloatArray, phi_2: FloatArray, *, alike: bool
-) -> _Curve:
-    """In the order of both torques, which increase together if `alike`, else one against the other.
-
-    Where a hardening has become constant but for rounding, so has the torque of the other spring.
-    """
-    tau_1, tau_2 = first.torque(phi_1), second.torque(phi_2)
+    points = _points(one.law, two.law, _Nodes(*_joined(of_one)), _Nodes(*_joined(of_two)))
+    alike = [one.rises(first) == two.rises(second) for first, second in pieces]
+    piece = np.repeat([*range(len(pieces))] * 2, [len(nodes.phi) for nodes in (*of_one, *of_two)])
     with np.errstate(divide="ignore"):
-        order = np.argsort(np.log(tau_1) + (np.log(tau_2) if alike else -np.log(tau_2)), kind="stable")
-    return _Curve(tau_1 + tau_2, phi_1, phi_2, (tau_1 - tau_2) / 2).at(order)
+        along = np.log(points.tau_1) + np.where(alike, 1.0, -1.0)[piece] * np.log(points.tau_2)
+    order = np.lexsort((along, piece))
+    bounds = np.searchsorted(piece[order], range(len(pieces) + 1))
+    for first, last in pairwise(bounds.tolist()):
+        if last - first > 1:
+            yield points.at(order[first:last])
+
+
+def _joined(parts: Iterable[tuple[FloatArray, ...]]) -> Iterator[FloatArray]:
+    return map(np.concatenate, zip(*parts, strict=True))
+
+
+def _points(first: SpringLaw, second: SpringLaw, of_one: _Nodes, of_two: _Nodes) -> _Curve:
+    """Nodes of each spring with the deflections of the other at the same hardening."""
+    phi_1 = np.concatenate((of_one.phi, _equal_hardening(first, *of_two[1:])))
+    phi_2 = np.concatenate((_equal_hardening(second, *of_one[1:]), of_two.phi))
+    return _Curve(phi_1, phi_2, first.torque(phi_1), second.torque(phi_2))
 
 
 def _nodes(of: Hardening, piece: slice, among: Hardening, other: slice) -> _Nodes:
@@ -145,32 +173,27 @@ def _nodes(of: Hardening, piece: slice, among: Hardening, other: slice) -> _Node
     return _Nodes(phi[shared], rho[shared], ends[cell - 1], ends[cell])
 
 
-def _with_partners(nodes: list[_Nodes], law: SpringLaw) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """The nodes of each piece with the deflections of the other spring there."""
-    _, rho, low, high = (np.concatenate(values) for values in zip(*nodes, strict=True))
-    ends = np.cumsum([len(part.phi) for part in nodes])[:-1]
-    partners = np.split(_equal_hardening(law, rho, low, high), ends)
-    return zip((part.phi for part in nodes), partners, strict=True)
-
-
 def _equal_hardening(law: SpringLaw, rho: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
     """Deflections between two others at which a spring has a hardening."""
     return bracketed_root(lambda phi, wanted: law.hardening(phi) - wanted, low, high, (rho,))
 
 
-def _rising_parts(first: SpringLaw, second: SpringLaw, curve: _Curve) -> Iterator[_Curve]:
-    """A curve split where tau_e turns around, at the birth of two folds."""
-    change = np.diff(curve.tau_e)
-    noticed = np.flatnonzero(np.abs(change) > RESOLVED * curve.tau_e[1:])
+def _turns(tau_e: FloatArray) -> tuple[IndexArray, IndexArray]:
+    """Points of a curve between which tau_e turns around, at the birth of two folds."""
+    change = np.diff(tau_e)
+    noticed = np.flatnonzero(np.abs(change) > RESOLVED * tau_e[1:])
     turns = np.flatnonzero(np.diff(np.sign(change[noticed])))
-    low, high = noticed[turns], noticed[turns + 1] + 1
-    births = _births(first, second, curve.at(low), curve.at(high)) if turns.size else curve.at(low)
-    starts, ends = [0, *high.tolist()], [*low.tolist(), len(curve.tau_e) - 1]
+    return noticed[turns], noticed[turns + 1] + 1
+
+
+def _rising_parts(curve: _Curve, low: IndexArray, high: IndexArray, births: _Curve) -> Iterator[_Curve]:
+    """A curve split at the births between two points each."""
+    starts, ends = [0, *high.tolist()], [*low.tolist(), len(curve.phi_1) - 1]
     for index, (start, end) in enumerate(zip(starts, ends, strict=True)):
         around = births.at(slice(max(index - 1, 0), index)), births.at(slice(index, index + 1))
-        inside = curve.at(slice(start, end + 1))
-        part = _Curve(*map(np.concatenate, zip(around[0], inside, around[1], strict=True)))
-        yield part if part.tau_e[-1] > part.tau_e[0] else part.at(slice(None, None, -1))
+        part = _Curve(*_joined((around[0], curve.at(slice(start, end + 1)), around[1])))
+        tau_e = part.tau_e
+        yield part if tau_e[-1] > tau_e[0] else part.at(slice(None, None, -1))
 
 
 def _births(first: SpringLaw, second: SpringLaw, low: _Curve, high: _Curve) -> _Curve:
@@ -184,7 +207,8 @@ def _births(first: SpringLaw, second: SpringLaw, low: _Curve, high: _Curve) -> _
 
     ends = (low.phi_2, high.phi_2)
     phi_1 = bracketed_root(turning, low.phi_1, high.phi_1, ends)
-    return _points(first, second, phi_1, partner(phi_1, *ends), alike=False)
+    phi_2 = partner(phi_1, *ends)
+    return _Curve(phi_1, phi_2, first.torque(phi_1), second.torque(phi_2))
 
 
 def _bend(law: SpringLaw, phi: FloatArray) -> FloatArray:

@@ -96,5 +96,6 @@ def _peaks(law: SpringLaw, phi: FloatArray) -> FloatArray:
     sign = np.sign(bend(phi))
     kept = np.flatnonzero(sign)
     turn = np.flatnonzero(sign[kept[:-1]] != sign[kept[1:]])
-    low, high = phi[kept[turn]], phi[kept[turn + 1]]
-    return np.unique(bracketed_root(bend, low, high)) if turn.size else np.empty(0)
+    peaks: FloatArray = np.unique(bracketed_root(bend, phi[kept[turn]], phi[kept[turn + 1]]))
+    inner: FloatArray = peaks[(peaks > phi[0]) & (peaks < phi[-1])]  # rounding moves one onto an end
+    return inner

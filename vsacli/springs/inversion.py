@@ -5,14 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
+from vsacli.loops import Values, look_up, repeat
 from vsacli.springs.law import SpringLaw
-from vsacli.springs.loops import Values, look_up, repeat
 
 MOST_STEPS = 200
 """More than bisection alone needs for all digits of a double."""
 
 LAST_STEP = 1e-8
 """Relative error of the torque from which one more Newton step leaves rounding only: it squares the error."""
+
+TINY = 1e-100
+"""Instead of the difference of torques that rounding has made equal, N m."""
 
 
 def inverse(
@@ -41,15 +44,15 @@ class FirstGuess:
     def __init__(self, law: SpringLaw, nodes: FloatArray) -> None:
         torque, stiffness = law.derivatives(nodes, 1)
         compliance = 1 / np.where(stiffness == 0, np.inf, stiffness)
-        width, rise = np.diff(torque), np.diff(nodes)
-        first, last = compliance[:-1] * width, compliance[1:] * width
-        self._torque, self._width = torque, width
-        self._coefficients = (nodes[:-1], first, 3 * rise - 2 * first - last, first + last - 2 * rise)
+        width, rise = np.maximum(np.diff(torque), TINY), np.diff(nodes)
+        mean, first, last = rise / width, compliance[:-1], compliance[1:]
+        bend, twist = (3 * mean - 2 * first - last) / width, (first + last - 2 * mean) / width**2
+        self._torque = torque[:-1]
+        self._coefficients = nodes[:-1], first, bend, twist
 
     def __call__(self, torque: FloatArray) -> FloatArray:
         """The deflection under torques within those of the nodes."""
-        cell = np.searchsorted(self._torque, torque, side="right") - 1
-        cell = np.clip(cell, 0, len(self._width) - 1)
-        share = (torque - look_up(self._torque, cell)) / look_up(self._width, cell)
+        cell = np.searchsorted(self._torque[1:], torque, side="right")
+        beyond = torque - look_up(self._torque, cell)
         a, b, c, d = (look_up(row, cell) for row in self._coefficients)
-        return a + share * (b + share * (c + share * d))
+        return a + beyond * (b + beyond * (c + beyond * d))

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vsacli.arrays import FloatArray
-from vsacli.springs.loops import look_up
+from vsacli.loops import look_up
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -30,6 +30,7 @@ LEAST_STIFFNESS = 1e-3
 """Share of its mean stiffness that a spring which pushes and pulls has at rest, since sigma > 0 is needed."""
 
 TINY = float(np.finfo(float).tiny)
+"""Instead of the size of a shape between two measured deflections, which is zero at both."""
 
 
 @dataclass(frozen=True)
@@ -49,24 +50,28 @@ class MeasuredCurve:
     coefficients: FloatArray
     residual: float
 
-    def __call__(self, orders: Sequence[int], phi: FloatArray) -> tuple[FloatArray, ...]:
-        """Derivatives of the energy of some orders, from 0 to 4."""
-        piece = np.clip(np.searchsorted(self.edges, phi, side="right") - 1, 0, len(self.origins) - 1)
+    def __call__(self, phi: FloatArray, first: int, last: int) -> tuple[FloatArray, ...]:
+        """Derivatives of the energy from one order to another, of 0 to 4."""
+        piece = np.searchsorted(self.edges[1:-1], phi, side="right")
         x = np.abs(phi) - look_up(self.origins, piece)
-        coefficients = [look_up(row, piece) for row in self.coefficients[min(orders) :]]
-        found = (self._derivative(order, x, coefficients[order - min(orders) :]) for order in orders)
-        return tuple(
-            np.copysign(size, phi) if order % 2 else size for order, size in zip(orders, found, strict=True)
-        )
+        sizes = _with_derivatives([look_up(row, piece) for row in self._derivative(first)], x, last - first)
+        return tuple(np.copysign(size, phi) if order % 2 else size for order, size in enumerate(sizes, first))
 
-    def _derivative(self, order: int, x: FloatArray, coefficients: list[FloatArray]) -> FloatArray:
-        """From the coefficients of the energy from that order on."""
-        *lower, result = (
-            math.perm(power, order) * coefficient for power, coefficient in enumerate(coefficients, order)
-        )
-        for term in reversed(lower):
-            result = result * x + term
-        return result
+    def _derivative(self, order: int) -> FloatArray:
+        """Coefficients of a derivative of the energy, from the constant on, (powers, pieces)."""
+        powers = range(order, len(self.coefficients))
+        factors = np.array([math.perm(power, order) for power in powers], dtype=float)
+        return factors[:, None] * self.coefficients[order:]
+
+
+def _with_derivatives(coefficients: list[FloatArray], x: FloatArray, order: int) -> list[FloatArray]:
+    """A polynomial and its derivatives up to an order, by Horner's scheme repeated on the quotients."""
+    values: list[FloatArray] = []
+    for coefficient in reversed(coefficients):
+        higher = [value * x + lower for lower, value in pairwise(values)]
+        latest = values[-1:] if 0 < len(values) <= order else []
+        values = [values[0] * x + coefficient if values else coefficient, *higher, *latest]
+    return [math.factorial(power) * value for power, value in enumerate(values)]
 
 
 def fit_curve(deflection: FloatArray, torque: FloatArray) -> MeasuredCurve:
@@ -75,12 +80,12 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> MeasuredCurve:
 
     knots = _knots(float(deflection[0]), float(deflection[-1]), len(deflection))
     shapes = [_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
-    columns = np.column_stack([deflection, *(shape((1,), deflection)[0] for shape in shapes)])
+    columns = np.column_stack([deflection, *(shape(deflection, 1, 1)[0] for shape in shapes)])
     sizes = np.maximum(np.abs(columns).max(axis=0), TINY)
     least = LEAST_STIFFNESS * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
     excess, *weights = nnls(columns / sizes, torque - least * deflection)[0] / sizes
     curve = _curve(knots, np.array(weights), least + excess)
-    return dataclasses.replace(curve, residual=float(np.abs(curve((1,), deflection)[0] - torque).max()))
+    return dataclasses.replace(curve, residual=float(np.abs(curve(deflection, 1, 1)[0] - torque).max()))
 
 
 def _knots(low: float, high: float, samples: int) -> FloatArray:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
+from vsacli.loops import Values, repeat, where_needed
 from vsacli.springs.balance import Balance
 from vsacli.springs.bracketing import bracketed_root
 from vsacli.springs.corridor import Corridor
-from vsacli.springs.loops import Values, repeat, where_needed
 
 MOST_STEPS = 30
 """Newton steps; four to eight do, except next to the birth of folds."""
@@ -38,7 +38,7 @@ def deflections_at(balance: Balance, piece: Corridor, tau_e: FloatArray, demand:
     inner, outer = piece.inner, piece.outer
     scale = np.maximum(inner.stiffness, SMALL * demand)
     reach = stretch(sign * (demand - inner.stiffness) / scale)
-    start = _first_guess(balance, piece, scale * reach * reach / 2)
+    start = _first_guess(piece, scale * reach * reach / 2)
     ends = inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2
     phi_1, phi_2, change = repeat(
         lambda state, constants: _towards_demand(balance, state, constants),
@@ -61,11 +61,10 @@ def stretch(excess: FloatArray) -> FloatArray:
     return stretched
 
 
-def _first_guess(balance: Balance, piece: Corridor, excess: FloatArray) -> Values:
+def _first_guess(piece: Corridor, excess: FloatArray) -> Values:
     """From the inner end along the tangent of tau_1 + tau_2 = tau_e, by two derivatives of the stiffness."""
     phi_1, phi_2, stiffness = piece.inner
-    _, sigma_1, zeta_1, eta_1 = balance.first.derivatives(phi_1, 3)
-    _, sigma_2, zeta_2, eta_2 = balance.second.derivatives(phi_2, 3)
+    (_, sigma_1, zeta_1, eta_1), (_, sigma_2, zeta_2, eta_2) = piece.states
     slack = stiffness == 0
     total = np.where(slack, 1.0, stiffness)
     share_1, share_2 = np.where(slack, 0.5, sigma_2 / total), np.where(slack, 0.5, sigma_1 / total)

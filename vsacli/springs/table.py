@@ -19,7 +19,7 @@ from vsacli.springs.measured import MeasuredCurve, fit_curve
 from vsacli.springs.mirrored import Mirrored
 
 LEAST_ROWS = 6
-NODES = 100
+NODES = 1000
 """Points of the curve on either side between which the inverse begins."""
 
 SHAPE_TOLERANCE = 1e-3
@@ -88,27 +88,27 @@ class MeasuredSpring(SpringLaw):
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Of the fitted curve, looked up once."""
-        return self._curve(range(1, order + 2), phi)
+        return self._curve(phi, 1, order + 1)
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque of the fitted curve."""
-        return self._curve((1,), phi)[0]
+        return self._curve(phi, 1, 1)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Stiffness of the fitted curve."""
-        return self._curve((2,), phi)[0]
+        return self.derivatives(phi, 1)[1]
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope of the fitted curve."""
-        return self._curve((3,), phi)[0]
+        return self.derivatives(phi, 2)[2]
 
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Curvature of the fitted curve."""
-        return self._curve((4,), phi)[0]
+        return self.derivatives(phi, 3)[3]
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Energy of the fitted curve."""
-        return self._curve((0,), phi)[0]
+        return self._curve(phi, 0, 0)[0]
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration within the measured range."""
@@ -150,7 +150,7 @@ def _problems(table: Table) -> Iterator[Problem]:
 
 
 def _wrong_sizes(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
-    """Rows with numbers too large, or with an end of the curve too small, for the declared fields of a file."""
+    """Rows with numbers too large, or with an end of the curve too near to zero, as in declared fields."""
     for name, column in (("deflection", deflection), ("torque", torque)):
         for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:
             yield int(row), f"the {name} {FINITE.problem(column[row])}"

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from vsacli.tracing.c_dialect import Dialect, digits
-from vsacli.tracing.operations import BITWISE, LOGICAL
+from vsacli.tracing.operations import BITWISE, LOGICAL, kind_of
 from vsacli.tracing.pruning import Branch, Listing, Loop
 from vsacli.tracing.symbol import Kind, Operand, Symbol, Table
 
@@ -118,7 +118,7 @@ class Writer:
         count = len(body.outputs)
         truth, otherwise, arguments = operands[0], operands[1 : 1 + count], operands[1 + count :]
         results = [f"{own}_{number}" for number in branch.numbers]
-        kinds = [output.kind if isinstance(output, Symbol) else Kind.REAL for output in body.outputs]
+        kinds = [kind_of(output) for output in body.outputs]
         given = [
             self.value(operand, kind, names, prefix) for operand, kind in zip(otherwise, kinds, strict=True)
         ]
@@ -140,7 +140,7 @@ class Writer:
         """Statements of a body, and its outputs put into variables all at once."""
         prefix = f"{own}_v"
         yield from self.statements(body, names, prefix)
-        kinds = [output.kind if isinstance(output, Symbol) else Kind.REAL for output in body.outputs]
+        kinds = [kind_of(output) for output in body.outputs]
         for result, output, kind in zip(results, body.outputs, kinds, strict=False):
             value = self.value(output, kind, names, prefix)
             yield f"const {self._dialect.types[kind]} {result}_new = {value};"

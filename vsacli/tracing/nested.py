@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vsacli.loops import branching, looking_up, repeating
 from vsacli.tracing.array import TracedArray, cells_of
 from vsacli.tracing.operations import kind_of
 from vsacli.tracing.pruning import Listing
@@ -17,10 +18,11 @@ from vsacli.tracing.ufuncs import each
 Function = Callable[..., Any]
 
 
+@repeating.register(TracedArray)
 def repeat_traced(
     first: TracedArray, step: Function, state: Sequence[Any], constants: Sequence[Any], limit: int
 ) -> tuple[TracedArray, ...]:
-    """`vsacli.springs.loops.repeat`: the step is recorded once, and repeated when the program runs."""
+    """`vsacli.loops.repeat`: the step is recorded once, and repeated when the program runs."""
     tape, count = first.tape, len(state)
 
     def body(symbols: list[Symbol]) -> Sequence[Operand]:
@@ -35,10 +37,11 @@ def repeat_traced(
     return _each(one, first, [*state, *constants], count)
 
 
+@branching.register(TracedArray)
 def branch_traced(
     mask: TracedArray, function: Function, arguments: Sequence[Any], otherwise: Sequence[Any]
 ) -> tuple[TracedArray, ...]:
-    """`vsacli.springs.loops.where_needed`: the function is recorded, and runs where the mask holds."""
+    """`vsacli.loops.where_needed`: the function is recorded, and runs where the mask holds."""
     tape, count = mask.tape, len(otherwise)
 
     def body(symbols: list[Symbol]) -> Sequence[Operand]:
@@ -53,8 +56,9 @@ def branch_traced(
     return _each(one, mask, [mask, *otherwise, *arguments], count)
 
 
+@looking_up.register(TracedArray)
 def look_up_traced(index: TracedArray, constants: Any) -> TracedArray:
-    """`vsacli.springs.loops.look_up`."""
+    """`vsacli.loops.look_up`."""
     table = Table(tuple(np.asarray(constants, dtype=np.float64).tolist()))
     return TracedArray(index.tape, each(lambda cell: index.tape.record("take", table, cell), index.cells))
 

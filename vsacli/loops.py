@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.tracing import TracedArray
-from vsacli.tracing.nested import branch_traced, look_up_traced, repeat_traced
 
 Values = tuple[FloatArray, ...]
 Step = Callable[[Values, Values], tuple[Values, BoolArray]]
@@ -97,8 +95,3 @@ def _put(result: Values, samples: IndexArray, state: Values, chosen: BoolArray) 
 
 def _take(arrays: Values, samples: IndexArray) -> Values:
     return tuple(values[samples] for values in arrays)
-
-
-repeating.register(TracedArray)(repeat_traced)
-branching.register(TracedArray)(branch_traced)
-looking_up.register(TracedArray)(look_up_traced)
