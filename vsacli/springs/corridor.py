@@ -27,7 +27,8 @@ LAST_STEP = 1e-9
 class End(NamedTuple):
     """Deflections at an end of the piece, and the joint stiffness there; arrays (samples,).
 
-    NaN where tau_e cannot be carried; infinite where the piece has no end.
+    NaN where tau_e cannot be carried. Where the piece has no end, an infinite stiffness at the deflections
+    that the laws come close to.
     """
 
     phi_1: FloatArray
@@ -66,12 +67,13 @@ def corridor(balance: Balance, folds: Folds, tau_e: FloatArray) -> Corridor:
     fold = _outermost_fold(balance, folds, tau_e)
     critical = carried & ~np.isnan(fold[0]) & ((tau_e != 0) | ((least < 0) & (largest > 0)))
     phi_1, phi_2 = where_needed(carried & ~critical, balance.at, (tau_e, least), fold)
+    farthest_1, farthest_2 = balance.first.domain[1], balance.second.domain[0]
     endless = np.full_like(tau_e, np.inf)
     outer = where_needed(
         carried & (largest < np.inf),
         lambda tau_e, t: _outer_end(balance, tau_e, t),
         (tau_e, largest),
-        (endless, -endless, endless, endless),
+        (np.full_like(tau_e, farthest_1), np.full_like(tau_e, farthest_2), endless, endless),
     )
     states = balance.first.derivatives(phi_1, 3), balance.second.derivatives(phi_2, 3)
     return Corridor(

@@ -39,7 +39,7 @@ def deflections_at(balance: Balance, piece: Corridor, tau_e: FloatArray, demand:
     scale = np.maximum(inner.stiffness, SMALL * demand)
     reach = stretch(sign * (demand - inner.stiffness) / scale)
     start = _first_guess(piece, scale * reach * reach / 2)
-    ends = inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2
+    ends = inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, outer.stiffness
     phi_1, phi_2, change = repeat(
         lambda state, constants: _towards_demand(balance, state, constants),
         (*start, np.zeros_like(tau_e)),
@@ -75,16 +75,19 @@ def _first_guess(piece: Corridor, excess: FloatArray) -> Values:
     steepness = np.abs(slope) + np.sqrt(slope * slope + 2 * bend * excess)
     spread = np.where(excess > 0, 2 * excess / steepness, 0.0)
     aside = np.clip(turn * spread / 2, -MOST_TURN, MOST_TURN) * spread
+    outer = piece.outer
     return (
-        np.clip(phi_1 + share_1 * spread - aside, phi_1, piece.outer.phi_1),
-        np.clip(phi_2 - share_2 * spread - aside, piece.outer.phi_2, phi_2),
+        _short_of(phi_1, np.maximum(phi_1 + share_1 * spread - aside, phi_1), outer.phi_1, outer.stiffness),
+        -_short_of(
+            -phi_2, np.maximum(-phi_2 + share_2 * spread + aside, -phi_2), -outer.phi_2, outer.stiffness
+        ),
     )
 
 
 def _towards_demand(balance: Balance, state: Values, constants: Values) -> tuple[Values, BoolArray]:
     """A Newton step on (14), with the stiffness stretched until it is nearly met."""
     phi_1, phi_2, _ = state
-    tau_e, demand, reach, end, scale, inner_1, outer_1, inner_2, outer_2 = constants
+    tau_e, demand, reach, end, scale, inner_1, outer_1, inner_2, outer_2, largest = constants
     tau_1, sigma_1, zeta_1 = balance.first.derivatives(phi_1, 2)
     tau_2, sigma_2, zeta_2 = balance.second.derivatives(phi_2, 2)
     torque, missing = tau_e - tau_1 - tau_2, demand - (sigma_1 + sigma_2)
@@ -97,14 +100,19 @@ def _towards_demand(balance: Balance, state: Values, constants: Values) -> tuple
     step_1 = (zeta_2 * torque - sigma_2 * wanted) / divisor
     step_2 = (sigma_1 * wanted - zeta_1 * torque) / divisor
     change = np.where(met, 0.0, (np.abs(step_1) + np.abs(step_2)) / (np.abs(phi_1) + np.abs(phi_2)))
-    moved_1 = np.minimum(_beyond(phi_1, phi_1 + step_1, inner_1), outer_1)
-    moved_2 = np.maximum(-_beyond(-phi_2, -phi_2 - step_2, -inner_2), outer_2)
+    moved_1 = _short_of(phi_1, _beyond(phi_1, phi_1 + step_1, inner_1), outer_1, largest)
+    moved_2 = -_short_of(-phi_2, _beyond(-phi_2, -phi_2 - step_2, -inner_2), -outer_2, largest)
     return (np.where(met, phi_1, moved_1), np.where(met, phi_2, moved_2), change), ~(change > LAST_STEP)
 
 
 def _beyond(here: FloatArray, there: FloatArray, inner: FloatArray) -> FloatArray:
     """There, or half way to the inner end if it lies on the other side of that."""
     return np.where(there < inner, (here + inner) / 2, there)
+
+
+def _short_of(here: FloatArray, there: FloatArray, outer: FloatArray, largest: FloatArray) -> FloatArray:
+    """There, but not beyond the outer end; half way to it instead if the stiffness grows without bound."""
+    return np.where(there >= outer, np.where(np.isinf(largest), (here + outer) / 2, outer), there)
 
 
 def _bracketed(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1: FloatArray) -> Values:
