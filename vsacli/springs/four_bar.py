@@ -20,7 +20,7 @@ STRETCHED = 1e-6
 """How close to 1 the domain lets C sin(phi/2) come. Beyond, where the torque grows without bound, deflections
 that are neighbouring doubles differ in stiffness by more than 1e-10."""
 
-NODES = 2000
+NODES = 500
 """Points of the curve between which the inverse begins."""
 
 

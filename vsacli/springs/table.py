@@ -19,7 +19,7 @@ from vsacli.springs.measured import MeasuredCurve, fit_curve
 from vsacli.springs.mirrored import Mirrored
 
 LEAST_ROWS = 6
-NODES = 1000
+NODES = 200
 """Points of the curve on either side between which the inverse begins."""
 
 SHAPE_TOLERANCE = 1e-3
