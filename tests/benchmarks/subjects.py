@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vsacli import load_robot
-from vsacli.arrays import FloatArray
+from vsacli.arrays import FloatArray, over_time
 from vsacli.robot import Robot
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +32,7 @@ def chain(joints: int) -> Robot:
 
 
 def motion(joints: int, samples: int) -> list[FloatArray]:
-    """q and its four derivatives, each (samples, joints): sines of several frequencies."""
-    time = np.linspace(0, 3, samples)[:, None]
-    speed = 1 + np.arange(joints) % 7 / 3
-    return [0.5 * speed**order * np.sin(speed * time + order * np.pi / 2) for order in range(5)]
+    """q and its four derivatives, each (samples, joints), laid out as a trajectory does: sines."""
+    time = np.linspace(0, 3, samples)
+    speed = 1 + np.arange(joints)[:, None] % 7 / 3
+    return [over_time(0.5 * speed**order * np.sin(speed * time + order * np.pi / 2)) for order in range(5)]

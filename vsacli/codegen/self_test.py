@@ -105,7 +105,5 @@ def _test(prefix: str, function: Function, reference: Reference) -> Iterator[str
             both = f"found.{entry}", f"expected->{entry}"
             if array.name == BOUNDED:
                 both = f"at_most({both[0]}, {digits(scale)})", f"at_most({both[1]}, {digits(scale)})"
-            yield (
-                f'        failures += differs("{own}: {entry}", n, {", ".join(both)}, {digits(scale)});'
-            )
+            yield (f'        failures += differs("{own}: {entry}", n, {", ".join(both)}, {digits(scale)});')
     yield "    }\n    return failures;\n}"

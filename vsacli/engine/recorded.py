@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from vsacli.arrays import FloatArray
-from vsacli.engine.engines import SAMPLES_PER_PASS, NumPyEngine
+from vsacli.engine.engines import NumPyEngine
 from vsacli.engine.kernel import Kernel, record
-from vsacli.tracing.row_program import RowProgram
+from vsacli.tracing.row_program import RowProgram, Scratch
+
+SAMPLES_PER_PASS = 8192
+"""Samples at a time: with rows that are used again more of them fit the cache than with new ones."""
+
+KEPT = 8
+"""Programs that are kept for the next call."""
 
 
 class RecordedEngine:
@@ -19,23 +26,26 @@ class RecordedEngine:
     """
 
     def __init__(self) -> None:
-        self._programs: dict[Kernel, RowProgram | None] = {}
+        self._scratch: dict[RowProgram, Scratch] = {}
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
         """As of `Engine`."""
-        program = self._program(kernel)
+        program = row_program(kernel)
         if program is None:
             return NumPyEngine().run(kernel, rows)
+        if program not in self._scratch:
+            self._scratch[program] = program.scratch(SAMPLES_PER_PASS)
         outputs = np.empty((kernel.outputs, len(rows[0])))
         for start in range(0, outputs.shape[1], SAMPLES_PER_PASS):
             part = slice(start, start + SAMPLES_PER_PASS)
-            program([row[part] for row in rows], outputs[:, part])
+            program([row[part] for row in rows], outputs[:, part], self._scratch[program])
         return outputs
 
-    def _program(self, kernel: Kernel) -> RowProgram | None:
-        if kernel not in self._programs:
-            try:
-                self._programs[kernel] = RowProgram(record(kernel))
-            except NotImplementedError:
-                self._programs[kernel] = None
-        return self._programs[kernel]
+
+@lru_cache(maxsize=KEPT)
+def row_program(kernel: Kernel) -> RowProgram | None:
+    """The program of a kernel; None if it has loops or tables."""
+    try:
+        return RowProgram(record(kernel))
+    except NotImplementedError:
+        return None

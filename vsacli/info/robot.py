@@ -46,7 +46,7 @@ def _described_reach(robot: Robot) -> dict[str, Any]:
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
     loads = static_load(robot)
-    least = RELATIVE_ROUNDING * np.max(loads.values[np.isfinite(loads.values)], initial=0.0)
+    least = RELATIVE_ROUNDING * np.max(loads.values, initial=0.0)
     values = np.where(loads.values <= least, 0.0, loads.values)
     return [
         {

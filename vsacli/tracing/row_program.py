@@ -19,6 +19,9 @@ from vsacli.arrays import FloatArray
 from vsacli.tracing.pruning import Listing
 from vsacli.tracing.symbol import Kind, Operand, Symbol
 
+Scratch = tuple[npt.NDArray[Any], ...]
+"""Rows of real numbers, truth values, and bits."""
+
 _DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint16}
 _LETTERS = {Kind.REAL: "r", Kind.TRUTH: "t", Kind.BITS: "b"}
 _CHOOSING = {"where": "{1}, {2}", "bits": "{1}, 0"}
@@ -41,20 +44,16 @@ class RowProgram:
         code = next(constant for constant in module.co_consts if isinstance(constant, CodeType))
         self._run: Callable[..., None] = FunctionType(code, {**vars(np), "nan": np.nan, "inf": np.inf})
         self.rows = kept.counts
-        self._scratch: dict[Kind, npt.NDArray[Any]] = {}
 
-    def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray) -> None:
+    def scratch(self, samples: int) -> Scratch:
+        """Rows for the intermediate values of at most so many samples."""
+        return tuple(np.empty((self.rows[kind], samples), dtype) for kind, dtype in _DTYPES.items())
+
+    def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, scratch: Scratch) -> None:
         """Compute outputs, (outputs, samples), in place from rows of inputs, (samples,)."""
+        samples = len(rows[0])
         with np.errstate(all="ignore"):
-            self._run(rows, self._space(len(rows[0])), outputs)
-
-    def _space(self, samples: int) -> list[npt.NDArray[Any]]:
-        """Rows for intermediate values, of each kind; made anew only for more samples than ever before."""
-        if not self._scratch or self._scratch[Kind.REAL].shape[1] < samples:
-            self._scratch = {
-                kind: np.empty((self.rows[kind], samples), dtype) for kind, dtype in _DTYPES.items()
-            }
-        return [rows[:, :samples] for rows in self._scratch.values()]
+            self._run(rows, [values[:, :samples] for values in scratch], outputs)
 
 
 class _Rows:
