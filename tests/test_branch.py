@@ -205,7 +205,7 @@ def test_any_load_and_stiffness_is_solved_to_rounding(decades: float):
         pair = make_pair(*springs)
         lower = pair.solve(tau_e, np.ones_like(tau_e)).lower
         stiffness = lower * (1 + 10 ** rng.uniform(-6, 3, 100))
-        # The contract; constants a hundred times off use up two or three digits of it.
+        # 1e-12, as documented; constants a hundred times off use up two or three digits of it.
         assert residuals(springs, pair.solve(tau_e, stiffness), tau_e, stiffness) <= 1e-12
 
 

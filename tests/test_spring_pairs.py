@@ -108,7 +108,7 @@ def round_trip(first: Spring, second: Spring, count: int, seed: int = 0) -> Roun
 def test_there_and_back_on_the_branch(first: Spring, second: Spring):
     trip = round_trip(first, second, DRAWS)
     assert trip.draws > DRAWS / 4
-    # As the contract has it.
+    # 1e-12 relative, as documented.
     assert trip.residual <= 1e-12
     assert trip.phi <= 1e-10
     assert trip.refused == trip.elsewhere == 0

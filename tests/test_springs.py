@@ -132,7 +132,7 @@ def test_closed_form_is_what_iteration_finds():
 def test_solution_satisfies_14_down_to_the_smallest_margin(kind):
     tau_e, stiffness = loads_and_demands(20_000, least_margin=1e-9)
     found = kind(SPRING).solve(tau_e, stiffness)
-    # The contract asks for 1e-12; a handful of roundings leave this much.
+    # 1e-12 is documented; a handful of roundings leave this much.
     assert residuals((SPRING, SPRING), found, tau_e, stiffness) <= 20 * EPS
 
 
