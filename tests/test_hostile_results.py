@@ -118,6 +118,16 @@ def test_a_heap_of_texts_that_never_ends(
         open_result(tmp_path / "r.h5")
 
 
+def test_a_text_is_not_longer_than_the_file(small_result: Path, tmp_path: Path) -> None:
+    with h5py.File(small_result) as file:
+        offset = file["joint_type"].id.get_offset()
+    content = bytearray(small_result.read_bytes())
+    struct.pack_into("<I", content, offset, 2**32 - 1)
+    (tmp_path / "r.h5").write_bytes(content)
+    with pytest.raises(InputError, match=r"r.h5: is damaged .*joint_type claims texts of 4,294,967,"):
+        open_result(tmp_path / "r.h5")
+
+
 def test_heaps_are_found_wherever_a_piece_of_the_file_ends(
     small_result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,6 +23,7 @@ PIECE = 2**24
 
 _COLLECTION = struct.Struct("<8xQ")
 _OBJECT = struct.Struct("<HHIQ")
+_REFERENCE = struct.Struct("<IQI")
 _HEAP = b"GCOL\x01\0\0\0"
 _SMALLEST_HEAP = 4096
 _LARGEST_HEAP = 2**26
@@ -96,11 +97,11 @@ def _ends(objects: bytes) -> bool:
 
 
 def own_dataset(file: h5py.File, name: str) -> h5py.Dataset:
-    """A dataset, if its values stand in this file and a chunk takes no more memory than the file has bytes.
+    """A dataset, if its values stand in this file and need no more memory at a time than the file has bytes.
 
     Raises:
         KeyError: there is none.
-        ValueError: it is a link to another file or kept there, or its chunks ask for more.
+        ValueError: it is a link to another file or kept there, or its chunks or texts ask for more.
     """
     for path in accumulate(name.split("/"), "{}/{}".format):
         link = file.get(path, getlink=True)
@@ -112,6 +113,8 @@ def own_dataset(file: h5py.File, name: str) -> h5py.Dataset:
     if not isinstance(dataset, h5py.Dataset) or dataset.external or dataset.is_virtual:
         raise ValueError(f"the values of {name} are not in this file")
     _check_chunks(dataset, file_size(file))
+    if h5py.check_string_dtype(dataset.dtype) is not None:
+        _check_texts(dataset, file_size(file))
     return dataset
 
 
@@ -133,8 +136,27 @@ def bounded(dataset: h5py.Dataset) -> h5py.Dataset:
 
 
 def _check_chunks(dataset: h5py.Dataset, size: int) -> None:
-    rows = dataset.dtype.itemsize
-    for length in dataset.chunks or ():
-        rows *= length
-    if rows > max(size, CHUNK_BYTES):
-        raise ValueError(f"{dataset.name} claims chunks of {rows:,} bytes in a file of {size:,}")
+    """The size that follows from the shape of a chunk, and the one that the library allocates."""
+    if dataset.chunks is None:
+        return
+    claimed = dataset.dtype.itemsize
+    for length in dataset.chunks:
+        claimed *= length
+    if dataset.size:
+        claimed = max(claimed, dataset.id.get_chunk_info_by_coord((0,) * dataset.ndim).size)
+    if claimed > max(size, CHUNK_BYTES):
+        raise ValueError(f"{dataset.name} claims chunks of {claimed:,} bytes in a file of {size:,}")
+
+
+def _check_texts(dataset: h5py.Dataset, size: int) -> None:
+    """Texts of any length are references to heaps, each a length, an address and an index."""
+    offset = dataset.id.get_offset()
+    if offset is None:
+        return
+    with open(dataset.file.filename, "rb") as file:
+        file.seek(offset)
+        references = file.read(min(dataset.size * _REFERENCE.size, size))
+    whole = len(references) // _REFERENCE.size * _REFERENCE.size
+    claimed = sum(length for length, _, _ in _REFERENCE.iter_unpack(references[:whole]))
+    if claimed > size:
+        raise ValueError(f"{dataset.name} claims texts of {claimed:,} bytes in a file of {size:,}")
