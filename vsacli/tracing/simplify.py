@@ -31,24 +31,18 @@ def _is(operand: Operand, constant: float) -> bool:
     return not isinstance(operand, Symbol) and operand == constant
 
 
-def _add(a: Operand, b: Operand) -> Operand | None:
-    if _is(a, 0):
-        return b
-    return a if _is(b, 0) else None
+def _neutral(constant: float) -> Callable[[Operand, Operand], Operand | None]:
+    """The rule of a commutative operation that a constant leaves the other operand as it is."""
+
+    def rule(a: Operand, b: Operand) -> Operand | None:
+        return b if _is(a, constant) else _second_neutral(constant)(a, b)
+
+    return rule
 
 
-def _subtract(a: Operand, b: Operand) -> Operand | None:
-    return a if _is(b, 0) else None
-
-
-def _multiply(a: Operand, b: Operand) -> Operand | None:
-    if _is(a, 1):
-        return b
-    return a if _is(b, 1) else None
-
-
-def _divide(a: Operand, b: Operand) -> Operand | None:
-    return a if _is(b, 1) else None
+def _second_neutral(constant: float) -> Callable[[Operand, Operand], Operand | None]:
+    """The rule of an operation that a constant leaves the first operand as it is."""
+    return lambda a, b: a if _is(b, constant) else None
 
 
 def _negative(a: Operand) -> Operand | None:
@@ -81,26 +75,20 @@ def _where(truth: Operand, a: Operand, b: Operand) -> Operand | None:
     return b if truth is False else None
 
 
-def _bitwise_or(a: Operand, b: Operand) -> Operand | None:
-    if _is(a, 0):
-        return b
-    return a if _is(b, 0) else None
-
-
 def _bitwise_and(a: Operand, b: Operand) -> Operand | None:
     return 0 if _is(a, 0) or _is(b, 0) else None
 
 
 _RULES: dict[str, Callable[..., Operand | None]] = {
-    "add": _add,
-    "subtract": _subtract,
-    "multiply": _multiply,
-    "divide": _divide,
+    "add": _neutral(0),
+    "subtract": _second_neutral(0),
+    "multiply": _neutral(1),
+    "divide": _second_neutral(1),
     "negative": _negative,
     "logical_and": _and,
     "logical_or": _or,
     "logical_not": _not,
     "where": _where,
-    "bitwise_or": _bitwise_or,
+    "bitwise_or": _neutral(0),
     "bitwise_and": _bitwise_and,
 }
