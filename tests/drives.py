@@ -28,6 +28,11 @@ class Stopped(Cubic):
     """A cubic spring that ends at a stop, at 30 N m to either side."""
 
     @property
+    def domain(self) -> tuple[float, float]:
+        low, high = self.deflection(np.array(self.torque_range))
+        return float(low), float(high)
+
+    @property
     def torque_range(self) -> tuple[float, float]:
         return (-30.0, 30.0)
 

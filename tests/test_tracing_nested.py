@@ -77,7 +77,9 @@ def nested(x: Any) -> Any:
 def interpolated(x: Any) -> Any:
     """A table whose place is searched for, and clipped."""
     index = np.clip(np.searchsorted(NODES, x, side="right") - 1, 0, len(NODES) - 2)
-    return look_up(TABLE, index) + look_up(TABLE, index + 1) * (x - look_up(NODES, index))
+    value, node = look_up((TABLE, NODES), index)
+    (following,) = look_up((TABLE,), index + 1)
+    return value + following * (x - node)
 
 
 FUNCTIONS = (square_root, swapped, handed_down, half_used, guarded, nested, interpolated)

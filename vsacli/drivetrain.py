@@ -11,10 +11,10 @@ from functools import singledispatch
 import numpy as np
 
 from vsacli.arrays import FloatArray
-from vsacli.decoupling_matrix import Springs, determinant, spring_state
 from vsacli.motor import JointMotor
 from vsacli.robot import Antagonistic, Elastic, Rigid, Robot
 from vsacli.springs import SpringLaw
+from vsacli.springs.decoupling_matrix import Springs, determinant, spring_state
 
 SIDES = 2
 """Motors that a joint has at most."""
@@ -26,19 +26,19 @@ def motors_and_springs(actuator: object) -> list[tuple[JointMotor, SpringLaw | N
     raise TypeError(f"{type(actuator).__name__} is no actuator")
 
 
-@motors_and_springs.register
+@motors_and_springs.register(Antagonistic)
 def _(actuator: Antagonistic) -> list[tuple[JointMotor, SpringLaw | None]]:
     return [(motor.at_joint, law) for motor, law in zip(actuator.motor, actuator.laws, strict=True)]
 
 
-@motors_and_springs.register
+@motors_and_springs.register(Elastic)
 def _(actuator: Elastic) -> list[tuple[JointMotor, SpringLaw | None]]:
     from vsacli.springs.polynomial import Polynomial
 
     return [(actuator.motor.at_joint, Polynomial(c1=actuator.stiffness))]
 
 
-@motors_and_springs.register
+@motors_and_springs.register(Rigid)
 def _(actuator: Rigid) -> list[tuple[JointMotor, SpringLaw | None]]:
     return [(actuator.motor.at_joint, None)]
 

@@ -7,7 +7,7 @@ as a program for a single one, for which the three functions here have another t
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import singledispatch
 from typing import Any
 
@@ -39,33 +39,40 @@ def where_needed(mask: BoolArray, function: Function, arguments: Values, otherwi
     return result
 
 
-def look_up(constants: FloatArray, index: IndexArray) -> FloatArray:
-    """The constants (count,) at indices of any shape."""
-    result: FloatArray = looking_up(index, constants)
+def look_up(tables: Sequence[FloatArray], index: IndexArray) -> Values:
+    """What each of several tables of constants, (count,), has at indices of any shape."""
+    result: Values = looking_up(index, tables)
     return result
 
 
 @singledispatch
 def repeating(_: Any, step: Step, state: Values, constants: Values, limit: int) -> Values:
-    """`repeat` on NumPy arrays: samples that are done keep their state, and are dropped in time."""
+    """`repeat` on NumPy arrays."""
     shape = state[0].shape
-    result = tuple(values.flatten() for values in state)
-    state, constants = result, tuple(values.ravel() for values in constants)
-    samples: IndexArray = np.arange(result[0].size)
-    over: BoolArray = np.zeros(samples.size, dtype=bool)
-    for _ in range(limit):
-        if not samples.size:
-            break
+    state, constants = (tuple(values.ravel() for values in each) for each in (state, constants))
+    return tuple(values.reshape(shape) for values in _repeated(step, state, constants, limit))
+
+
+def _repeated(step: Step, state: Values, constants: Values, limit: int) -> Values:
+    """Samples that are done keep their state; once they are half of all, the others go on without them."""
+    result = state
+    over: BoolArray = np.zeros(state[0].size, dtype=bool)
+    while limit and 2 * np.count_nonzero(over) < over.size:
         state, done = step(state, constants)
-        ending = done & ~over
-        _put(result, samples, state, ending)
-        over |= done
-        if 2 * np.count_nonzero(over) >= over.size:
-            going = np.flatnonzero(~over)
-            state, constants = _take(state, going), _take(constants, going)
-            samples, over = samples[going], over[going]
-    _put(result, samples, state, ~over)
-    return tuple(values.reshape(shape) for values in result)
+        result = _kept(over, result, state)
+        over = over | done
+        limit -= 1
+    going = np.flatnonzero(~over)
+    if not limit or not going.size:
+        return result
+    rest = _repeated(step, _taken(result, going), _taken(constants, going), limit)
+    return _put(result, going, rest)
+
+
+def _kept(over: BoolArray, result: Values, latest: Values) -> Values:
+    if not over.any():
+        return latest
+    return tuple(np.where(over, *pair) for pair in zip(result, latest, strict=True))
 
 
 @singledispatch
@@ -73,25 +80,23 @@ def branching(mask: Any, function: Function, arguments: Values, otherwise: Value
     """`where_needed` on NumPy arrays."""
     if not mask.any():
         return otherwise
-    result = tuple(np.array(values) for values in otherwise)
-    for values, computed in zip(result, function(*(each[mask] for each in arguments)), strict=True):
-        values[mask] = computed
-    return result
+    if mask.all():
+        return function(*arguments)
+    return _put(otherwise, mask, function(*_taken(arguments, mask)))
 
 
 @singledispatch
-def looking_up(index: Any, constants: FloatArray) -> FloatArray:
+def looking_up(index: Any, tables: Sequence[FloatArray]) -> Values:
     """`look_up` on NumPy arrays."""
-    found: FloatArray = constants[index]
-    return found
+    return tuple(table[index] for table in tables)
 
 
-def _put(result: Values, samples: IndexArray, state: Values, chosen: BoolArray) -> None:
-    if not chosen.any():
-        return
-    for values, latest in zip(result, state, strict=True):
-        values[samples[chosen]] = latest[chosen]
-
-
-def _take(arrays: Values, samples: IndexArray) -> Values:
+def _taken(arrays: Values, samples: IndexArray | BoolArray) -> Values:
     return tuple(values[samples] for values in arrays)
+
+
+def _put(arrays: Values, samples: IndexArray | BoolArray, latest: Values) -> Values:
+    result = tuple(np.array(values) for values in arrays)
+    for values, each in zip(result, latest, strict=True):
+        values[samples] = each
+    return result

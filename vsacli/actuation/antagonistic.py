@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuation.transmission import Command, Transmission
 from vsacli.arrays import BoolArray, FloatArray
-from vsacli.decoupling_matrix import beta, determinant, solve, spring_state
 from vsacli.feasibility import Reach, reach
+from vsacli.records import NamedTuple
 from vsacli.robot import Antagonistic
 from vsacli.springs import PairSolution, make_pair
+from vsacli.springs.decoupling_matrix import beta, determinant, solve, spring_state
 
 Sides = tuple[FloatArray, FloatArray]
 """A quantity of motor 1 or its spring, and of motor 2."""
@@ -25,6 +25,7 @@ class Motors(NamedTuple):
     dphi: Sides
     ddtheta: Sides
     tau_spring: Sides
+    elastic_energy: FloatArray
     det_A: FloatArray  # noqa: N815  (the published name)
 
 
@@ -47,6 +48,7 @@ def transmit(
         dphi=np.stack(motors.dphi),
         ddtheta=np.stack(motors.ddtheta),
         tau_spring=np.stack(motors.tau_spring),
+        elastic_energy=motors.elastic_energy,
         det_A=motors.det_A,
         stiffness_lower=solution.lower,
         stiffness_upper=solution.upper,
@@ -60,7 +62,8 @@ def motor_motion(actuator: Antagonistic, command: Command, reached: Reach, defle
     NaN where the step is infeasible; what needs the inverse of A also where it is singular.
     """
     phi_1, phi_2 = (np.where(reached.infeasible, np.nan, phi) for phi in deflections)
-    one, two = (spring_state(law, phi) for law, phi in zip(actuator.laws, (phi_1, phi_2), strict=True))
+    first, second = actuator.laws
+    (energy_1, one), (energy_2, two) = first.loaded(phi_1), second.loaded(phi_2)
     det_a = determinant(one, two)  # (67)
     divisor = np.where(reached.singular, np.nan, det_a)
     dphi = solve(one, two, divisor, command.dtau_e, command.dstiffness)  # (68)
@@ -70,6 +73,7 @@ def motor_motion(actuator: Antagonistic, command: Command, reached: Reach, defle
         dphi=dphi,
         ddtheta=solve(one, two, divisor, *accelerating),  # (72)
         tau_spring=(one.tau, two.tau),
+        elastic_energy=energy_1 + energy_2,
         det_A=det_a,
     )
 

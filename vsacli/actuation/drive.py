@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from vsacli.actuation.transmission import Command, Transmission
 from vsacli.arrays import FlagArray, FloatArray
 from vsacli.drivetrain import SIDES, motors_and_springs
 from vsacli.feasibility import NEAR_SINGULAR, limit_checks, limit_flags
+from vsacli.records import NamedTuple
 from vsacli.robot import Antagonistic, Elastic, Joint, Rigid
 
 
@@ -67,7 +67,6 @@ def drive(
         theta=transmission.phi + command.q,  # (69)
         dtheta=dtheta,
         tau_motor=tau_motor,
-        elastic_energy=_elastic_energy(joint, transmission.phi),
         motor_power=tau_motor * dtheta,
     )
     return driven._replace(flags=driven.flags | _limit_flags(joint, command, driven))
@@ -83,15 +82,6 @@ def _transmit(
             return elastic.transmit(actuator, command)
         case Rigid():
             return rigid.transmit(command)
-
-
-def _elastic_energy(joint: Joint, phi: FloatArray) -> FloatArray:
-    """Of all springs of a joint, (samples,), from the deflections, (2, samples); 0 without springs."""
-    energy: FloatArray = np.zeros_like(phi[0])
-    for (_, law), deflection in zip(motors_and_springs(joint.actuator), phi, strict=False):
-        if law is not None:
-            energy = energy + law.energy(deflection)
-    return energy
 
 
 def _by_motor(values: list[float]) -> FloatArray:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from vsacli.arrays import FlagArray, FloatArray
+from vsacli.records import NamedTuple
 
 
 class Command(NamedTuple):
@@ -39,6 +38,7 @@ class Transmission(NamedTuple):
     dphi: FloatArray
     ddtheta: FloatArray
     tau_spring: FloatArray
+    elastic_energy: FloatArray
     det_A: FloatArray  # noqa: N815  (the published name)
     stiffness_lower: FloatArray
     stiffness_upper: FloatArray
@@ -73,6 +73,7 @@ def single_motor(
         dphi=np.stack((dphi, none)),
         ddtheta=np.stack((ddtheta, none)),
         tau_spring=np.stack((command.tau_e, none)),
+        elastic_energy=phi * command.tau_e / 2,
         det_A=none,
         stiffness_lower=none,
         stiffness_upper=none,

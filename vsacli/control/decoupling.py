@@ -9,9 +9,9 @@ import numpy as np
 from vsacli.arrays import FloatArray
 from vsacli.control.gains import Gains
 from vsacli.control.linear import Integral, linear_control
-from vsacli.decoupling_matrix import Springs, beta, determinant, solve
 from vsacli.forward_dynamics import Plant
 from vsacli.motion import Motion
+from vsacli.springs.decoupling_matrix import Springs, beta, determinant, solve
 from vsacli.wrench import Wrench
 
 

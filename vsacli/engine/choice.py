@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import NamedTuple
 
 from vsacli.engine.engines import CompiledEngine, Engine, NumPyEngine
 from vsacli.engine.kernel import Kernel
 from vsacli.errors import InputError
+from vsacli.records import NamedTuple
 from vsacli.suggestions import did_you_mean
 
 NAMES = ("numpy", "c", "auto")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -14,11 +15,14 @@ if TYPE_CHECKING:
     from vsacli.engine.compiler import Compiler
     from vsacli.engine.loading import Build, Loaded, Tell
 
-SAMPLES_PER_PASS = 4096
+SAMPLES_PER_PASS = 8192
 """Samples that NumPy takes at a time: fewer waste time in the interpreter, more leave the caches."""
 
 INPUTS_PER_PASS = 5 * 2**19
 """Bound on a kernel's inputs times samples at a time: the recursion keeps about 100 bytes for each."""
+
+KEPT_MEMORY = 2**24
+"""Bytes, more than the arrays of a pass take together."""
 
 
 class Engine(Protocol):
@@ -33,6 +37,7 @@ class NumPyEngine:
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
         """As of `Engine`."""
+        keep_freed_memory()
         samples = len(rows[0])
         outputs = np.empty((kernel.outputs, samples))
         step = max(1, min(SAMPLES_PER_PASS, INPUTS_PER_PASS // len(rows)))
@@ -41,6 +46,17 @@ class NumPyEngine:
             for output, row in zip(outputs, kernel([row[part] for row in rows]), strict=True):
                 output[part] = row
         return outputs
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Have the C library use the memory again that arrays have left.
+
+    That of glibc gives blocks back to the system from a size on that it adjusts to the largest block freed so
+    far, mallopt(3), and the system clears them page by page when they are asked for again. The one freed here
+    is never touched, so it takes no memory itself. Other libraries do as they like.
+    """
+    np.empty(KEPT_MEMORY, dtype=np.uint8)
 
 
 class CompiledEngine:

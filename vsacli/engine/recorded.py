@@ -8,12 +8,9 @@ from functools import lru_cache
 import numpy as np
 
 from vsacli.arrays import FloatArray
-from vsacli.engine.engines import NumPyEngine
+from vsacli.engine.engines import SAMPLES_PER_PASS, NumPyEngine
 from vsacli.engine.kernel import Kernel, record
 from vsacli.tracing.row_program import RowProgram, Scratch
-
-SAMPLES_PER_PASS = 8192
-"""Samples at a time: with rows that are used again more of them fit the cache than with new ones."""
 
 KEPT = 8
 """Programs that are kept for the next call."""

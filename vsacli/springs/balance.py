@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
+from vsacli.springs.decoupling_matrix import spring_state
 from vsacli.springs.law import SpringLaw
+from vsacli.springs.state import PairState
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,10 @@ class Balance:
     def under(self, tau_1: FloatArray, tau_2: FloatArray) -> tuple[FloatArray, FloatArray]:
         """phi_1 and phi_2 under the torques of the two springs."""
         return self.first.deflection(tau_1), self.second.deflection(tau_2)
+
+    def state(self, phi_1: FloatArray, phi_2: FloatArray) -> PairState:
+        """The springs at deflections."""
+        return PairState(phi_1, phi_2, spring_state(self.first, phi_1), spring_state(self.second, phi_2))
 
     def stiffness(self, phi_1: FloatArray, phi_2: FloatArray) -> FloatArray:
         """G."""

@@ -28,13 +28,19 @@ class Exponential(Tendon):
             return ExponentialPair(self, other.law)
         return None
 
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Each a times the one before, from the stiffness on."""
+        torque = self.torque(phi)
+        stiffness = self.a * (torque + self.c)
+        return (torque, stiffness, self.a * stiffness, self.a**2 * stiffness)[: order + 1]
+
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque c (exp(a phi) - 1)."""
         return self.c * np.expm1(self.a * phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Stiffness a c exp(a phi)."""
-        return self.a * self.c * np.exp(self.a * phi)
+        """Stiffness a (tau + c)."""
+        return self.a * (self.torque(phi) + self.c)
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope a sigma."""

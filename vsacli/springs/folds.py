@@ -16,16 +16,21 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.springs.balance import Balance
 from vsacli.springs.bracketing import bracketed_root
 from vsacli.springs.hardening import Hardening, sample_hardening
 from vsacli.springs.law import SpringLaw
 from vsacli.springs.mirrored import Mirrored
+from vsacli.springs.state import PairState
 
 RESOLVED = 1e-11
 """Relative change of tau_e between neighbouring points of a curve that rounding next to a peak does not make.
 
 Folds born closer together differ in stiffness by rounding only, which is of fourth order in their distance.
 """
+
+MONOTONE = 3.0
+"""Most by which the slopes at the ends of a cubic exceed the mean so that it is monotone for sure."""
 
 
 class Folds(NamedTuple):
@@ -36,28 +41,53 @@ class Folds(NamedTuple):
         tau_e: torques at which the fold is at the corners, (2, cells); NaN where there is no fold.
         phi_1: deflections of side 1 there, (2, cells).
         phi_2: deflections of side 2 there, (2, cells).
+        bow_1: how the curve bows out of the straight line between the corners, (2, cells): the slope of
+            phi_1 over the share of the cell, at its first corner less that of the line, at its second the
+            line's less that; zero where a cubic with these slopes would turn around.
+        bow_2: the same of phi_2.
     """
 
     edges: FloatArray
     tau_e: FloatArray
     phi_1: FloatArray
     phi_2: FloatArray
+    bow_1: FloatArray
+    bow_2: FloatArray
 
 
 def map_folds(first: SpringLaw, second: SpringLaw) -> Folds:
     """The outermost folds of a pair."""
     above = _positive_folds(first, second)
     turned = _positive_folds(Mirrored(law=second), Mirrored(law=first))
-    return Folds(
-        np.concatenate((-turned.edges[:0:-1], above.edges)),
-        np.hstack((-turned.tau_e[::-1, ::-1], above.tau_e)),
-        np.hstack((-turned.phi_2[::-1, ::-1], above.phi_1)),
-        np.hstack((-turned.phi_1[::-1, ::-1], above.phi_2)),
-    )
+    edges = np.concatenate((-turned[0][:0:-1], above[0]))
+    tau_e, phi_1, phi_2 = np.concatenate((-turned[1][(0, 2, 1), ::-1, ::-1], above[1]), axis=-1)
+    return Folds(edges, tau_e, phi_1, phi_2, *_bows(first, second, tau_e, phi_1, phi_2))
 
 
-def _positive_folds(first: SpringLaw, second: SpringLaw) -> Folds:
-    """Those of positive tau_e."""
+def _bows(
+    first: SpringLaw, second: SpringLaw, tau_e: FloatArray, phi_1: FloatArray, phi_2: FloatArray
+) -> Iterator[FloatArray]:
+    """By the derivatives over tau_e along curves of equal hardening."""
+    with np.errstate(all="ignore"):  # vertical at a birth, unknown without stiffness, and far away
+        slopes = along_equal_hardening(Balance(first, second).state(phi_1, phi_2))
+        for phi, slope in zip((phi_1, phi_2), slopes[:2], strict=True):
+            rise = phi[1] - phi[0]
+            shares = slope * (tau_e[1] - tau_e[0])
+            monotone = np.all((shares / rise >= 0) & (shares / rise <= MONOTONE), axis=0)
+            yield np.where(monotone, np.stack((shares[0] - rise, rise - shares[1])), 0.0)
+
+
+def along_equal_hardening(state: PairState) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Derivatives of phi_1 and phi_2 over tau_e where rho_1 - rho_2 is kept, and their common divisor."""
+    one, two = state.one, state.two
+    rho_1, rho_2 = state.rho
+    bend_1, bend_2 = one.eta / one.sigma - rho_1 * rho_1, two.eta / two.sigma - rho_2 * rho_2
+    divisor = one.sigma * bend_2 + two.sigma * bend_1
+    return bend_2 / divisor, bend_1 / divisor, divisor
+
+
+def _positive_folds(first: SpringLaw, second: SpringLaw) -> tuple[FloatArray, FloatArray]:
+    """Those of positive tau_e: edges, and tau_e, phi_1, phi_2 at the corners, (3, 2, cells)."""
     one, two = sample_hardening(first), sample_hardening(second)
     curves = list(_rising_curves(one, two)) if one and two else []
     knots = np.unique(np.concatenate([[0.0], *(curve.tau_e for curve in curves)]))
@@ -74,7 +104,7 @@ def _positive_folds(first: SpringLaw, second: SpringLaw) -> Folds:
             values[:, further] = nodes[cell], nodes[cell + 1]
     changes = np.flatnonzero(_differ(corners[0, :, 1:], corners[0, :, :-1])) + 1
     cells = np.append(0, changes)
-    return Folds(np.append(knots[cells], np.inf), *corners[:, :, cells])
+    return np.append(knots[cells], np.inf), corners[:, :, cells]
 
 
 def _differ(cells: FloatArray, others: FloatArray) -> BoolArray:

@@ -11,7 +11,8 @@ import numpy as np
 from vsacli import units
 from vsacli.arrays import FloatArray
 from vsacli.spec.fields import POSITIVE, Check, number
-from vsacli.springs.inversion import FirstGuess, inverse
+from vsacli.springs.decoupling_matrix import Springs
+from vsacli.springs.inversion import FirstGuess, inverse, turned_to
 from vsacli.springs.law import SpringLaw
 
 ABOVE_ONE = Check(lambda ratio: ratio > 1 and math.isfinite(ratio), "greater than 1")
@@ -20,8 +21,8 @@ STRETCHED = 1e-6
 """How close to 1 the domain lets C sin(phi/2) come. Beyond, where the torque grows without bound, deflections
 that are neighbouring doubles differ in stiffness by more than 1e-10."""
 
-NODES = 500
-"""Points of the curve between which the inverse begins."""
+NODES = 20
+"""Points of the curve that the first guess of the inverse begins with."""
 
 
 @dataclass(frozen=True)
@@ -49,35 +50,44 @@ class FourBar(SpringLaw):
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Derivatives of the energy k beta^2/2, which share the angles."""
-        crank = _Crank(self.ratio, phi)
-        return tuple(self.k * derivative(crank) for derivative in _DERIVATIVES[: order + 1])
+        return _derivatives(self.k, self._angle(phi, order + 1))
+
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+        """Energy and all derivatives, which share the angles."""
+        beta = self._angle(phi, 4)
+        return self.k / 2 * beta[0] * beta[0], Springs(*_derivatives(self.k, beta))
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque k beta beta'."""
-        return self.k * _torque(_Crank(self.ratio, phi))
+        return self.derivatives(phi, 0)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Stiffness k (beta'^2 + beta beta'')."""
-        return self.k * _stiffness(_Crank(self.ratio, phi))
+        return self.derivatives(phi, 1)[1]
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope k (3 beta' beta'' + beta beta''')."""
-        return self.k * _slope(_Crank(self.ratio, phi))
+        return self.derivatives(phi, 2)[2]
 
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Curvature k (3 beta''^2 + 4 beta' beta''' + beta beta'''')."""
-        return self.k * _curvature(_Crank(self.ratio, phi))
+        return self.derivatives(phi, 3)[3]
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Energy k beta^2/2."""
-        return self.k * _Crank(self.ratio, phi).beta ** 2 / 2
+        (beta,) = self._angle(phi, 0)
+        return self.k / 2 * beta * beta
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration within the domain."""
+        return self.under(torque)[0]
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+        """Deflection and spring by one iteration."""
         load = np.minimum(np.abs(torque), self.torque_range[1])
         low, high = np.zeros_like(load), np.full_like(load, self.domain[1])
         start = np.clip(self._first_guess(load), low, high)
-        return np.copysign(inverse(self, load, low, high, start), torque)
+        return turned_to(torque, *inverse(self, load, low, high, start))
 
     @cached_property
     def _first_guess(self) -> FirstGuess:
@@ -85,62 +95,45 @@ class FourBar(SpringLaw):
         psi = np.linspace(0, math.pi / 2, NODES)
         return FirstGuess(self, 2 * np.arcsin((1 - STRETCHED) * np.sin(psi) / self.ratio))
 
+    def _angle(self, phi: FloatArray, order: int) -> list[FloatArray]:
+        """Angle beta of the linear spring, and its derivatives up to an order, 4 at most.
 
-class _Crank:
-    """Angle beta of the linear spring over the deflection, with four derivatives.
-
-    With psi = asin(C sin(phi/2)) and beta = psi - phi/2, written by
-    C cos(phi/2) - cos psi = (C^2 - 1)/(C cos(phi/2) + cos psi), so that nothing cancels.
-    """
-
-    def __init__(self, ratio: float, phi: FloatArray) -> None:
-        self._sin, self._cos = np.sin(phi / 2), np.cos(phi / 2)
-        self._sin_psi, self._c_cos = ratio * self._sin, ratio * self._cos
-        self._room = (1 - self._sin_psi) * (1 + self._sin_psi)
-        self._cos_psi: FloatArray = np.sqrt(self._room)
-        self._bend = ratio * (ratio - 1) * (ratio + 1)
-        self._gain = (ratio - 1) * (ratio + 1) / (self._c_cos + self._cos_psi)
-
-    @cached_property
-    def beta(self) -> FloatArray:
-        angle: FloatArray = np.arctan2(
-            self._sin * self._gain, self._cos_psi * self._cos + self._sin_psi * self._sin
-        )
-        return angle
-
-    @cached_property
-    def d1(self) -> FloatArray:
-        return self._gain / (2 * self._cos_psi)
-
-    @cached_property
-    def d2(self) -> FloatArray:
-        return self._bend / 4 * self._sin / (self._room * self._cos_psi)
-
-    @cached_property
-    def d3(self) -> FloatArray:
-        return self._bend / 8 * self._cos * (1 + 2 * self._sin_psi**2) / (self._room**2 * self._cos_psi)
-
-    @cached_property
-    def d4(self) -> FloatArray:
-        grown = 1 + 2 * self._sin_psi**2
-        fourth = self._c_cos**2 * (2 * self._room + 2.5 * grown) - grown * self._room / 2
-        return self._bend / 8 * self._sin * fourth / (self._room**3 * self._cos_psi)
+        With psi = asin(C sin(phi/2)) and beta = psi - phi/2, written by
+        C cos(phi/2) - cos psi = (C^2 - 1)/(C cos(phi/2) + cos psi), so that nothing cancels. The higher
+        derivatives of beta are those of psi, with psi'' = (psi'^2 - 1/4) tan psi.
+        """
+        tangent = np.tan(phi / 4)  # one function for the sine and cosine of phi/2
+        share = 1 / (1 + tangent * tangent)
+        sin, cos = 2 * tangent * share, (1 - tangent) * (1 + tangent) * share
+        sin_psi, ratio_cos = self.ratio * sin, self.ratio * cos
+        cos_psi = np.sqrt((1 - sin_psi) * (1 + sin_psi))
+        gain = (self.ratio - 1) * (self.ratio + 1) / (ratio_cos + cos_psi)
+        beta = [np.arcsin(gain * sin)]
+        if order > 0:
+            half_secant = 0.5 / cos_psi
+            beta.append(gain * half_secant)
+        if order > 1:
+            rate, tan_psi = ratio_cos * half_secant, sin_psi / cos_psi  # psi', tan psi
+            beyond = beta[1] * (rate + 0.5)  # psi'^2 - 1/4
+            beta.append(beyond * tan_psi)
+        if order > 2:
+            squared = tan_psi * tan_psi
+            grown = 1 + 3 * squared
+            beta.append(rate * beyond * grown)
+        if order > 3:
+            rates = 2 * rate * rate
+            beta.append(beta[2] * (grown * (beyond + rates) + 3 * rates * (1 + squared)))
+        return beta
 
 
-def _torque(crank: _Crank) -> FloatArray:
-    return crank.beta * crank.d1
-
-
-def _stiffness(crank: _Crank) -> FloatArray:
-    return crank.d1**2 + crank.beta * crank.d2
-
-
-def _slope(crank: _Crank) -> FloatArray:
-    return 3 * crank.d1 * crank.d2 + crank.beta * crank.d3
-
-
-def _curvature(crank: _Crank) -> FloatArray:
-    return 3 * crank.d2**2 + 4 * crank.d1 * crank.d3 + crank.beta * crank.d4
-
-
-_DERIVATIVES = (_torque, _stiffness, _slope, _curvature)
+def _derivatives(k: float, beta: list[FloatArray]) -> tuple[FloatArray, ...]:
+    """Of k beta^2/2, from beta and its derivatives: as many as there are of these."""
+    k_beta, k_rate = k * beta[0], k * beta[1]
+    derivatives = [k_beta * beta[1]]
+    if len(beta) > 2:
+        derivatives.append(k_rate * beta[1] + k_beta * beta[2])
+    if len(beta) > 3:
+        derivatives.append(3 * k_rate * beta[2] + k_beta * beta[3])
+    if len(beta) > 4:
+        derivatives.append(3 * k * beta[2] * beta[2] + 4 * k_rate * beta[3] + k_beta * beta[4])
+    return tuple(derivatives)

@@ -1,4 +1,4 @@
-"""Inverse of a spring law without a closed one, by Newton's method in a shrinking bracket."""
+"""Inverse of a spring law without a closed one, by Halley's method in a shrinking bracket."""
 
 from __future__ import annotations
 
@@ -6,13 +6,20 @@ import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
 from vsacli.loops import Values, look_up, repeat
+from vsacli.springs.decoupling_matrix import Springs
 from vsacli.springs.law import SpringLaw
 
 MOST_STEPS = 200
 """More than bisection alone needs for all digits of a double."""
 
-LAST_STEP = 1e-8
-"""Relative error of the torque from which one more Newton step leaves rounding only: it squares the error."""
+LAST_STEP = 2e-6
+"""Relative error of the torque from which one more step leaves rounding only: it takes the third power."""
+
+GUESSED = 1e-6
+"""Relative error of the torque with which a first guess is content."""
+
+MOST_HALVINGS = 20
+"""Of the cells between the nodes of a first guess; next to slack the deflection is a root of the torque."""
 
 TINY = 1e-100
 """Instead of the difference of torques that rounding has made equal, N m."""
@@ -20,28 +27,53 @@ TINY = 1e-100
 
 def inverse(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
-) -> FloatArray:
-    """Deflection at which the law has a torque, between `low` and `high` that enclose it."""
+) -> tuple[FloatArray, Springs]:
+    """Deflection at which the law has a torque, between `low` and `high` that enclose it; the spring there.
+
+    The last step is so short that what was known before it tells what the spring is after it.
+    """
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
-        (phi, low, high), (wanted,) = state, constants
-        torque, stiffness = law.derivatives(phi, 1)
-        error = torque - wanted
+        (phi, low, high, *_), (wanted,) = state, constants
+        spring = Springs(*law.derivatives(phi, 3))
+        error = spring.tau - wanted
         low, high = np.where(error <= 0, phi, low), np.where(error >= 0, phi, high)
         with np.errstate(divide="ignore", invalid="ignore"):  # no stiffness at rest: halve the bracket
-            newton = phi - error / stiffness
-        inside = (newton >= low) & (newton <= high)
+            newton = error / spring.sigma
+            halley = phi - newton / np.clip(1 - newton * spring.zeta / (2 * spring.sigma), 0.5, 2)
+        inside = (halley >= low) & (halley <= high)
         met = inside & (np.abs(error) <= LAST_STEP * np.abs(wanted))
-        return (np.where(inside, newton, (low + high) / 2), low, high), met | ~(low < high)
+        following = np.where(inside, halley, (low + high) / 2)
+        return (following, low, high, *spring.after(following - phi)), met | ~(low < high)
 
-    phi, _, _ = repeat(step, (start, low, high), (torque,), MOST_STEPS)
-    return np.where(torque == 0, 0.0, np.where(np.isfinite(torque), phi, np.nan))
+    low = np.where(np.isfinite(torque), low, np.nan)
+    phi, _, _, *spring = repeat(step, (start, low, high, *[start] * 4), (torque,), MOST_STEPS)
+    return np.where(torque == 0, 0.0, phi), Springs(*spring)
+
+
+def turned_to(torque: FloatArray, phi: FloatArray, spring: Springs) -> tuple[FloatArray, Springs]:
+    """Of a law that is odd, from the size of its torque to the torque."""
+    tau, sigma, zeta, eta = spring
+    return np.copysign(phi, torque), Springs(np.copysign(tau, torque), sigma, np.copysign(zeta, torque), eta)
 
 
 class FirstGuess:
     """Deflections of a law by cubic interpolation over the torque, between nodes that are computed once."""
 
     def __init__(self, law: SpringLaw, nodes: FloatArray) -> None:
+        """Begin with ascending nodes, and halve the cells that are too wide for a cubic."""
+        self._interpolate(law, nodes)
+        for _ in range(MOST_HALVINGS):
+            middle = (nodes[:-1] + nodes[1:]) / 2
+            torque = law.torque(middle)
+            guessed = law.torque(np.clip(self(torque), nodes[:-1], nodes[1:]))
+            wide = np.abs(guessed - torque) > GUESSED * np.abs(torque)
+            if not wide.any():
+                break
+            nodes = np.union1d(nodes, middle[wide])
+            self._interpolate(law, nodes)
+
+    def _interpolate(self, law: SpringLaw, nodes: FloatArray) -> None:
         torque, stiffness = law.derivatives(nodes, 1)
         compliance = 1 / np.where(stiffness == 0, np.inf, stiffness)
         width, rise = np.maximum(np.diff(torque), TINY), np.diff(nodes)
@@ -53,6 +85,6 @@ class FirstGuess:
     def __call__(self, torque: FloatArray) -> FloatArray:
         """The deflection under torques within those of the nodes."""
         cell = np.searchsorted(self._torque[1:], torque, side="right")
-        beyond = torque - look_up(self._torque, cell)
-        a, b, c, d = (look_up(row, cell) for row in self._coefficients)
+        start, a, b, c, d = look_up((self._torque, *self._coefficients), cell)
+        beyond = torque - start
         return a + beyond * (b + beyond * (c + beyond * d))

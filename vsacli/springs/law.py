@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from vsacli.arrays import FloatArray
 from vsacli.spec.fields import POSITIVE_OR_INFINITE, check_fields, number
 from vsacli.spec.source import Source
+from vsacli.springs.decoupling_matrix import Springs
 from vsacli.springs.pair import Pair
 from vsacli.units import POSITION
 
@@ -78,6 +79,15 @@ class SpringLaw(ABC):
         """Torque and its derivatives up to an order, 3 at most; for laws in which they share work."""
         methods = (self.torque, self.stiffness, self.slope, self.curvature)
         return tuple(method(phi) for method in methods[: order + 1])
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+        """Deflection under a torque and the spring there; for laws that find both in one."""
+        phi = self.deflection(torque)
+        return phi, Springs(*self.derivatives(phi, 3))
+
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+        """Energy and all derivatives; for laws in which they share work."""
+        return self.energy(phi), Springs(*self.derivatives(phi, 3))
 
     @abstractmethod
     def torque(self, phi: FloatArray) -> FloatArray:

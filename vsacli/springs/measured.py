@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vsacli.arrays import FloatArray
-from vsacli.loops import look_up
+from vsacli.loops import Values, look_up
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -51,11 +52,16 @@ class MeasuredCurve:
     residual: float
 
     def __call__(self, phi: FloatArray, first: int, last: int) -> tuple[FloatArray, ...]:
-        """Derivatives of the energy from one order to another, of 0 to 4."""
+        """Derivatives of the energy from one order, 0 or 1, to another, 4 at most."""
         piece = np.searchsorted(self.edges[1:-1], phi, side="right")
-        x = np.abs(phi) - look_up(self.origins, piece)
-        sizes = _with_derivatives([look_up(row, piece) for row in self._derivative(first)], x, last - first)
+        origin, *coefficients = look_up(self._tables[first], piece)
+        sizes = _with_derivatives(coefficients, np.abs(phi) - origin, last - first)
         return tuple(np.copysign(size, phi) if order % 2 else size for order, size in enumerate(sizes, first))
+
+    @cached_property
+    def _tables(self) -> tuple[Values, Values]:
+        """Origins with the coefficients of the energy, and with those of the torque, each over the pieces."""
+        return (self.origins, *self._derivative(0)), (self.origins, *self._derivative(1))
 
     def _derivative(self, order: int) -> FloatArray:
         """Coefficients of a derivative of the energy, from the constant on, (powers, pieces)."""
@@ -64,14 +70,18 @@ class MeasuredCurve:
         return factors[:, None] * self.coefficients[order:]
 
 
-def _with_derivatives(coefficients: list[FloatArray], x: FloatArray, order: int) -> list[FloatArray]:
+def _with_derivatives(coefficients: Sequence[FloatArray], x: FloatArray, order: int) -> list[FloatArray]:
     """A polynomial and its derivatives up to an order, by Horner's scheme repeated on the quotients."""
-    values: list[FloatArray] = []
-    for coefficient in reversed(coefficients):
-        higher = [value * x + lower for lower, value in pairwise(values)]
-        latest = values[-1:] if 0 < len(values) <= order else []
-        values = [values[0] * x + coefficient if values else coefficient, *higher, *latest]
-    return [math.factorial(power) * value for power, value in enumerate(values)]
+    *lower, highest = coefficients
+    values = [highest]
+    for coefficient in reversed(lower):
+        top = values[-1]
+        for power in range(len(values) - 1, 0, -1):
+            values[power] = values[power] * x + values[power - 1]
+        values[0] = values[0] * x + coefficient
+        if len(values) <= order:
+            values.append(top)
+    return [math.factorial(power) * value if power > 1 else value for power, value in enumerate(values)]
 
 
 def fit_curve(deflection: FloatArray, torque: FloatArray) -> MeasuredCurve:

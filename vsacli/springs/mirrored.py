@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from vsacli.arrays import FloatArray
+from vsacli.springs.decoupling_matrix import Springs
 from vsacli.springs.law import SpringLaw
 
 
@@ -39,6 +40,16 @@ class Mirrored(SpringLaw):
         return tuple(
             sign * value for sign, value in zip(signs, self.law.derivatives(-phi, order), strict=True)
         )
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+        """As the law under the opposite torque."""
+        phi, (tau, sigma, zeta, eta) = self.law.under(-torque)
+        return -phi, Springs(-tau, sigma, -zeta, eta)
+
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+        """Even and odd in turn."""
+        energy, (tau, sigma, zeta, eta) = self.law.loaded(-phi)
+        return energy, Springs(-tau, sigma, -zeta, eta)
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Odd in the deflection."""

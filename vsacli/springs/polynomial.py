@@ -12,7 +12,8 @@ import numpy as np
 from vsacli import units
 from vsacli.arrays import FloatArray
 from vsacli.spec.fields import NON_NEGATIVE, POSITIVE, number
-from vsacli.springs.inversion import inverse
+from vsacli.springs.decoupling_matrix import Springs
+from vsacli.springs.inversion import inverse, turned_to
 from vsacli.springs.law import SpringLaw
 
 
@@ -60,6 +61,10 @@ class Polynomial(SpringLaw):
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration from the bound that each term alone sets."""
+        return self.under(torque)[0]
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+        """Deflection and spring by one iteration."""
         load = np.abs(torque)
         bounds = [
             (load / coefficient) ** (1 / (2 * index + 1))
@@ -67,7 +72,7 @@ class Polynomial(SpringLaw):
             if coefficient > 0
         ]
         high = reduce(np.minimum, bounds)
-        return np.copysign(inverse(self, load, np.zeros_like(load), high, start=high), torque)
+        return turned_to(torque, *inverse(self, load, np.zeros_like(load), high, start=high))
 
     def _derivative(self, order: int, phi: FloatArray) -> FloatArray:
         """Derivative of the torque, without the factor phi that those of even order have."""

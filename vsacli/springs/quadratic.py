@@ -47,7 +47,7 @@ class Quadratic(Tendon):
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Energy k phi^3/3."""
-        return self.k * phi**3 / 3
+        return self.k * phi * phi * phi / 3
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse sqrt(tau/k)."""

@@ -9,15 +9,13 @@ from vsacli.loops import Values, repeat, where_needed
 from vsacli.springs.balance import Balance
 from vsacli.springs.bracketing import bracketed_root
 from vsacli.springs.corridor import Corridor
+from vsacli.springs.state import PairState
 
 MOST_STEPS = 30
-"""Newton steps; four to eight do, except next to the birth of folds."""
+"""Three or four do, except next to the birth of folds or far beyond what the springs are made for."""
 
-LAST_STEP = 1e-9
-"""Relative size of a step after which the next would be rounding."""
-
-ROUNDING = 4 * float(np.finfo(float).eps)
-"""Relative residual of (14) that is none."""
+NONE_LEFT = 1e-17
+"""Relative error after a step that is none: the estimate may be some hundred times too small."""
 
 MOST_DOUBLINGS = 1000
 """From about the demand on, a preload torque leaves the range of numbers before."""
@@ -25,8 +23,8 @@ MOST_DOUBLINGS = 1000
 MOST_TURN = 0.25
 """Largest share of the way by which the curve of equal tau_e is taken to bend off its tangent."""
 
-SHORT = 0.01
-"""Share of the way to the demand that counts as gone where the stiffness is still short of the inner end."""
+FASTER, FAR = 0.025, 3.0
+"""How much faster than cosh springs stiffen, and how far; by trial with all laws."""
 
 SMALL = 1e-4
 """Share of the demand below which the stiffness at the inner end is no measure for it."""
@@ -37,72 +35,115 @@ def deflections_at(balance: Balance, piece: Corridor, tau_e: FloatArray, demand:
     sign = np.where(piece.rising, 1.0, -1.0)
     inner, outer = piece.inner, piece.outer
     scale = np.maximum(inner.stiffness, SMALL * demand)
-    reach = stretch(sign * (demand - inner.stiffness) / scale)
-    start = _first_guess(piece, scale * reach * reach / 2)
-    ends = inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, outer.stiffness
-    phi_1, phi_2, change = repeat(
+    excess = scale * _curved(sign * (demand - inner.stiffness) / scale)
+    near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
+    start = _first_guess(piece, tau_e, sign, excess, near > 0)
+    ends = inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near
+    phi_1, phi_2, error = repeat(
         lambda state, constants: _towards_demand(balance, state, constants),
         (*start, np.zeros_like(tau_e)),
-        (tau_e, demand, reach, inner.stiffness, sign * scale, *ends),
+        (tau_e, demand, sign, inner.stiffness, *ends),
         MOST_STEPS,
     )
     return where_needed(
-        ~(change <= LAST_STEP) & ~np.isnan(demand),
+        ~(error <= NONE_LEFT) & ~np.isnan(demand),
         lambda *known: _bracketed(balance, *known),
         (tau_e, demand, inner.phi_1),
         (phi_1, phi_2),
     )
 
 
-def stretch(excess: FloatArray) -> FloatArray:
-    """acosh(1 + excess): about linear in the deflections, near a fold and where the springs grow stiff."""
+def _curved(excess: FloatArray) -> FloatArray:
+    """The part of an excess that the curvature at the inner end makes.
+
+    If the stiffness grows as cosh it is acosh(1 + excess)^2/2; many springs stiffen still faster.
+    """
     beyond = np.maximum(excess, 0)
-    stretched: FloatArray = np.log1p(beyond + np.sqrt(beyond * (beyond + 2)))
-    return stretched
+    stretched = np.log1p(beyond + np.sqrt(beyond * (beyond + 2)))
+    squared = stretched * stretched
+    curved: FloatArray = squared * (0.5 - FASTER * np.minimum(squared, FAR))
+    return curved
 
 
-def _first_guess(piece: Corridor, excess: FloatArray) -> Values:
-    """From the inner end along the tangent of tau_1 + tau_2 = tau_e, by two derivatives of the stiffness."""
-    phi_1, phi_2, stiffness = piece.inner
-    (_, sigma_1, zeta_1, eta_1), (_, sigma_2, zeta_2, eta_2) = piece.states
-    slack = stiffness == 0
-    total = np.where(slack, 1.0, stiffness)
-    share_1, share_2 = np.where(slack, 0.5, sigma_2 / total), np.where(slack, 0.5, sigma_1 / total)
-    slope = zeta_1 * share_1 - zeta_2 * share_2
-    straight = eta_1 * share_1**2 + eta_2 * share_2**2
-    turn = (zeta_2 * share_2 * stiffness + sigma_2 * slope) / (total * total)
-    bend = np.maximum(straight - (zeta_1 + zeta_2) * turn, straight / 2)
-    steepness = np.abs(slope) + np.sqrt(slope * slope + 2 * bend * excess)
-    spread = np.where(excess > 0, 2 * excess / steepness, 0.0)
-    aside = np.clip(turn * spread / 2, -MOST_TURN, MOST_TURN) * spread
-    outer = piece.outer
+def _first_guess(
+    piece: Corridor, tau_e: FloatArray, sign: FloatArray, excess: FloatArray, near: BoolArray
+) -> Values:
+    """From the inner end, as if the stiffness were quadratic along the curve of equal tau_e."""
+    springs, outer = piece.springs.kept_stiff(), piece.outer
+    step_1, step_2, _ = _step(springs, tau_e, sign * excess, sign)
+    step_1, step_2 = (np.where(excess > 0, step, 0.0) for step in (step_1, step_2))
     return (
-        _short_of(phi_1, np.maximum(phi_1 + share_1 * spread - aside, phi_1), outer.phi_1, outer.stiffness),
-        -_short_of(
-            -phi_2, np.maximum(-phi_2 + share_2 * spread + aside, -phi_2), -outer.phi_2, outer.stiffness
-        ),
+        _short_of(springs.phi_1, springs.phi_1 + step_1, outer.phi_1, near),
+        -_short_of(-springs.phi_2, -springs.phi_2 - step_2, -outer.phi_2, near),
     )
 
 
+def _step(
+    springs: PairState, tau_e: FloatArray, missing: FloatArray, sign: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Steps to tau_e and to a stiffness so much larger, of third order, and the relative error they leave."""
+    one, two = springs.one, springs.two
+    total, hardening = springs.stiffness, one.zeta + two.zeta
+    share_1, share_2 = two.sigma / total, one.sigma / total
+    slope = one.zeta * share_1 - two.zeta * share_2
+    turn = (two.zeta * share_2 + share_1 * slope) / total
+    bend = one.eta * share_1 * share_1 + two.eta * share_2 * share_2 - hardening * turn
+    shift = (tau_e - springs.torque) / total
+    lacking = missing - hardening * shift
+    steepness = slope + sign * np.sqrt(np.maximum(slope * slope + 2 * bend * lacking, 0))
+    spread = 2 * lacking / steepness
+    step_1, step_2 = shift + share_1 * spread, shift - share_2 * spread
+    demand, way = total + missing, np.abs(spread)
+    most = MOST_TURN * way
+    aside = np.clip((tau_e - springs.torque_after(step_1, step_2)) / demand, -most, most)
+    shifted = np.abs(shift)
+    change = np.abs(bend / steepness) * (way + shifted)
+    error = change * (change * np.abs(missing) / demand + shifted / _size(springs.phi_1, springs.phi_2))
+    return step_1 + aside, step_2 + aside, error
+
+
 def _towards_demand(balance: Balance, state: Values, constants: Values) -> tuple[Values, BoolArray]:
-    """A Newton step on (14), with the stiffness stretched until it is nearly met."""
+    """A step of third order on (14)."""
     phi_1, phi_2, _ = state
-    tau_e, demand, reach, end, scale, inner_1, outer_1, inner_2, outer_2, largest = constants
-    tau_1, sigma_1, zeta_1 = balance.first.derivatives(phi_1, 2)
-    tau_2, sigma_2, zeta_2 = balance.second.derivatives(phi_2, 2)
-    torque, missing = tau_e - tau_1 - tau_2, demand - (sigma_1 + sigma_2)
-    balanced = np.abs(torque) <= ROUNDING * (np.abs(tau_1) + np.abs(tau_2))
-    met = (demand == end) | (balanced & (np.abs(missing) <= ROUNDING * demand))
-    excess = np.maximum((sigma_1 + sigma_2 - end) / scale, np.abs(SHORT * (demand - end) / scale))
-    stretched = scale * (reach - stretch(excess)) * np.sqrt(excess * (excess + 2))
-    wanted = np.where(np.abs(missing) <= 0.01 * np.abs(demand - end), missing, stretched)
-    divisor = sigma_1 * zeta_2 - sigma_2 * zeta_1
-    step_1 = (zeta_2 * torque - sigma_2 * wanted) / divisor
-    step_2 = (sigma_1 * wanted - zeta_1 * torque) / divisor
-    change = np.where(met, 0.0, (np.abs(step_1) + np.abs(step_2)) / (np.abs(phi_1) + np.abs(phi_2)))
-    moved_1 = _short_of(phi_1, _beyond(phi_1, phi_1 + step_1, inner_1), outer_1, largest)
-    moved_2 = -_short_of(-phi_2, _beyond(-phi_2, -phi_2 - step_2, -inner_2), -outer_2, largest)
-    return (np.where(met, phi_1, moved_1), np.where(met, phi_2, moved_2), change), ~(change > LAST_STEP)
+    tau_e, demand, sign, inner, *ends = constants
+    low_1, high_1, high_2, low_2, _ = ends
+    springs = balance.state(phi_1, phi_2)
+    missing = demand - springs.stiffness
+    step_1, step_2, error = _step(springs, tau_e, missing, sign)
+    moved_1, moved_2 = phi_1 + step_1, phi_2 + step_2
+    met = demand == inner
+    inside = (low_1 <= moved_1) & (moved_1 < high_1) & (low_2 < moved_2) & (moved_2 <= high_2)
+    moved_1, moved_2, error = where_needed(
+        met | ~inside,
+        _held_back,
+        (np.where(met, 0.0, 1.0), phi_1, phi_2, moved_1, moved_2, error, *ends),
+        (moved_1, moved_2, error),
+    )
+    return (moved_1, moved_2, error), ~(error > NONE_LEFT)
+
+
+def _held_back(
+    going: FloatArray,
+    phi_1: FloatArray,
+    phi_2: FloatArray,
+    moved_1: FloatArray,
+    moved_2: FloatArray,
+    error: FloatArray,
+    inner_1: FloatArray,
+    outer_1: FloatArray,
+    inner_2: FloatArray,
+    outer_2: FloatArray,
+    near: FloatArray,
+) -> Values:
+    """Where the step stays between the ends, or does not take place since the demand is met."""
+    held_1 = _short_of(phi_1, _beyond(phi_1, moved_1, inner_1), outer_1, near > 0)
+    held_2 = -_short_of(-phi_2, _beyond(-phi_2, -moved_2, -inner_2), -outer_2, near > 0)
+    met = going == 0
+    return np.where(met, phi_1, held_1), np.where(met, phi_2, held_2), going * error
+
+
+def _size(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.abs(one) + np.abs(other)
 
 
 def _beyond(here: FloatArray, there: FloatArray, inner: FloatArray) -> FloatArray:
@@ -110,9 +151,9 @@ def _beyond(here: FloatArray, there: FloatArray, inner: FloatArray) -> FloatArra
     return np.where(there < inner, (here + inner) / 2, there)
 
 
-def _short_of(here: FloatArray, there: FloatArray, outer: FloatArray, largest: FloatArray) -> FloatArray:
-    """There, but not beyond the outer end; half way to it instead if the stiffness grows without bound."""
-    return np.where(there >= outer, np.where(np.isinf(largest), (here + outer) / 2, outer), there)
+def _short_of(here: FloatArray, there: FloatArray, outer: FloatArray, near: BoolArray) -> FloatArray:
+    """There, but not beyond the outer end; half way to it if the demand is far from the stiffness there."""
+    return np.where(there >= outer, np.where(near, outer, (here + outer) / 2), there)
 
 
 def _bracketed(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1: FloatArray) -> Values:

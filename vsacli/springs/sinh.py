@@ -25,6 +25,12 @@ class Sinh(SpringLaw):
         """Closed where both sides have the same a."""
         return SinhPair(self, other) if isinstance(other, Sinh) and other.a == self.a else None
 
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Of the torque and the stiffness in turn."""
+        torque = self.torque(phi)
+        stiffness = self.stiffness(phi) if order > 0 else torque
+        return (torque, stiffness, self.a**2 * torque, self.a**2 * stiffness)[: order + 1]
+
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque k sinh(a phi)."""
         return self.k * np.sinh(self.a * phi)

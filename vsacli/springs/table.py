@@ -13,14 +13,15 @@ from vsacli.errors import InputError, Problem
 from vsacli.spec.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
 from vsacli.spec.source import Source
 from vsacli.spec.table import Table
+from vsacli.springs.decoupling_matrix import Springs
 from vsacli.springs.inversion import FirstGuess, inverse
 from vsacli.springs.law import SpringLaw
 from vsacli.springs.measured import MeasuredCurve, fit_curve
 from vsacli.springs.mirrored import Mirrored
 
 LEAST_ROWS = 6
-NODES = 200
-"""Points of the curve on either side between which the inverse begins."""
+NODES = 25
+"""Points of the curve on either side that the first guess of the inverse begins with."""
 
 SHAPE_TOLERANCE = 1e-3
 """Share of the torque range by which measurement noise may hide the shape: a point above its chord, say."""
@@ -90,6 +91,11 @@ class MeasuredSpring(SpringLaw):
         """Of the fitted curve, looked up once."""
         return self._curve(phi, 1, order + 1)
 
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+        """Of the fitted curve, looked up once."""
+        energy, *derivatives = self._curve(phi, 0, 4)
+        return energy, Springs(*derivatives)
+
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque of the fitted curve."""
         return self._curve(phi, 1, 1)[0]
@@ -112,6 +118,10 @@ class MeasuredSpring(SpringLaw):
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration within the measured range."""
+        return self.under(torque)[0]
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+        """Deflection and spring by one iteration."""
         low, high = (np.full_like(torque, end) for end in self.domain)
         carried = np.clip(torque, *self.torque_range)
         return inverse(self, carried, low, high, np.clip(self._first_guess(carried), low, high))

@@ -57,9 +57,14 @@ def branch_traced(
 
 
 @looking_up.register(TracedArray)
-def look_up_traced(index: TracedArray, constants: Any) -> TracedArray:
+def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArray, ...]:
     """`vsacli.loops.look_up`."""
-    table = Table(tuple(np.asarray(constants, dtype=np.float64).tolist()))
+    return tuple(
+        _taken(index, Table(tuple(np.asarray(table, dtype=np.float64).tolist()))) for table in tables
+    )
+
+
+def _taken(index: TracedArray, table: Table) -> TracedArray:
     return TracedArray(index.tape, each(lambda cell: index.tape.record("take", table, cell), index.cells))
 
 

@@ -5,10 +5,12 @@ Written for one joint with scalars or arrays of any one shape, and any kind of n
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from vsacli.arrays import FloatArray, IndexArray
-from vsacli.springs import SpringLaw
+
+if TYPE_CHECKING:
+    from vsacli.springs.law import SpringLaw
 
 
 class Springs(NamedTuple):
@@ -22,6 +24,19 @@ class Springs(NamedTuple):
     def of(self, members: IndexArray) -> Springs:
         """Some of the springs, which are on the last axis."""
         return Springs(*(values[..., members] for values in self))
+
+    def after(self, step: FloatArray) -> Springs:
+        """After a short step, by Taylor's formula as far as the derivatives are known."""
+        return Springs(
+            self.torque_after(step),
+            self.sigma + step * (self.zeta + step / 2 * self.eta),
+            self.zeta + step * self.eta,
+            self.eta,
+        )
+
+    def torque_after(self, step: FloatArray) -> FloatArray:
+        """Torque after a short step, to the third order."""
+        return self.tau + step * (self.sigma + step / 2 * (self.zeta + step / 3 * self.eta))
 
 
 def spring_state(law: SpringLaw, phi: FloatArray) -> Springs:
