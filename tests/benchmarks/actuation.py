@@ -14,6 +14,7 @@ from timing import medians
 from vsacli.actuation import Command, drive
 from vsacli.actuation.antagonistic import solve_deflections
 from vsacli.arrays import FloatArray
+from vsacli.engine.engines import SAMPLES_PER_PASS
 from vsacli.newton_euler import link_torques
 from vsacli.robot import Antagonistic, Joint, Motor
 from vsacli.springs import SpringLaw
@@ -24,6 +25,9 @@ SHARES = {"light": 0.1, "heavy": 0.99}
 
 STIFFNESS_LEVELS = np.linspace(1.2, 2.5, 50)
 """Stiffness demanded, as a multiple of the least without load."""
+
+LOAD_SWINGS, STIFFNESS_SWINGS = 37, 11
+"""In the batch: every stiffness meets every load."""
 
 
 class Actuation(NamedTuple):
@@ -52,7 +56,7 @@ def compare(samples: int, repeats: int) -> list[Actuation]:
         joint = _joint(robot.joints[0], springs)
         for load, share in SHARES.items():
             command = _command(joint.actuator, samples, share)
-            ways[f"{name}; {load}"] = lambda joint=joint, command=command: drive(joint, command)
+            ways[f"{name}; {load}"] = lambda joint=joint, command=command: _drive(joint, command)
     seconds: Mapping[str, float] = medians(ways, repeats)
     of_joint = seconds["recursion"] / JOINTS
     return [
@@ -67,15 +71,28 @@ def _joint(joint: Joint, springs: tuple[SpringLaw, SpringLaw]) -> Joint:
     return replace(joint, actuator=Antagonistic(motor=motors, spring=springs))
 
 
+def _drive(joint: Joint, command: Command) -> None:
+    """In passes, as the engine takes them."""
+    for start in range(0, len(command.tau_e), SAMPLES_PER_PASS):
+        part = slice(start, start + SAMPLES_PER_PASS)
+        drive(joint, Command(*(values[part] for values in command)))
+
+
 def _command(actuator: Antagonistic, samples: int, share: float) -> Command:
-    """Random demands that can be met: stiffness, and loads up to a share of the largest it can carry."""
-    random = np.random.default_rng(0)
-    still = np.zeros(samples)
+    """Demands that can be met: stiffness and load swing, the load to a share of the largest it can carry."""
+    time, still = np.linspace(0, 1, samples), np.zeros(samples)
     least = solve_deflections(actuator, np.zeros(1), np.ones(1)).lower[0]
     levels = max(least, 10.0) * STIFFNESS_LEVELS
-    level = random.integers(len(levels), size=samples)
-    tau_e = share * _largest_load(actuator, levels)[level] * random.uniform(-1, 1, samples)
+    level = np.rint((len(levels) - 1) * _swinging(time, STIFFNESS_SWINGS)).astype(int)
+    load = 2 * _swinging(time, LOAD_SWINGS) - 1
+    tau_e = share * _largest_load(actuator, levels)[level] * load
     return Command(still, still, still, levels[level], still, still, tau_e, still, still)
+
+
+def _swinging(time: FloatArray, swings: int) -> FloatArray:
+    """Between 0 and 1."""
+    swung: FloatArray = (1 - np.cos(2 * np.pi * swings * time)) / 2
+    return swung
 
 
 def _largest_load(actuator: Antagonistic, stiffness: FloatArray) -> FloatArray:
