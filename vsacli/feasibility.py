@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import operator
 from functools import reduce
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from vsacli.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.drivetrain import motors_and_springs
 from vsacli.errors import InputError
 from vsacli.flags import Flag
+from vsacli.records import NamedTuple
 from vsacli.robot import Joint
 from vsacli.springs import PairSolution
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from vsacli.arrays import FloatArray
+from vsacli.records import dataclass
 from vsacli.wrench import WRENCH_NAMES, Wrench
 
 

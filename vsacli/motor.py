@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from vsacli import units
 from vsacli.errors import FieldProblem
+from vsacli.records import dataclass
 from vsacli.spec.fields import NON_NEGATIVE, NON_ZERO, POSITIVE, POSITIVE_OR_INFINITE, check_fields, number
 
 _SIDE = "joint side of the gear unless gear_ratio is given"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy as np
 from vsacli.arrays import FloatArray, by_joint, over_time
 from vsacli.engine import Engine, choose
 from vsacli.errors import InputError
+from vsacli.records import dataclass
 from vsacli.recursion import JointState, LinkConstants, TipLoad, recursion
 from vsacli.robot import Joint, Pose, Robot
 from vsacli.vector import (

@@ -9,8 +9,8 @@ Every quantity of frame k is a derivative taken in the base frame, written in co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
+from vsacli.records import NamedTuple
 from vsacli.vector import ZERO, Rotation, Scalar, SymmetricTensor, Vector, add, cross, mul
 
 Z0 = Vector(0, 0, 1)

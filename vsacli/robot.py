@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
 import numpy as np
@@ -13,6 +13,7 @@ from vsacli import units
 from vsacli.arrays import FloatArray
 from vsacli.errors import FieldProblem
 from vsacli.motor import Motor
+from vsacli.records import dataclass
 from vsacli.spec.fields import (
     NON_NEGATIVE,
     POSITIVE,

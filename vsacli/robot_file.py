@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from dataclasses import dataclass
 
 from vsacli.errors import InputError
+from vsacli.records import dataclass
 from vsacli.robot import Robot
 from vsacli.spec.fields import choice, declared
 from vsacli.spec.reading import read_document

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
@@ -11,6 +9,7 @@ from vsacli.drivetrain import SIDES, motors_and_springs
 from vsacli.engine import NUMPY, Engine
 from vsacli.feasibility import has, margin
 from vsacli.flags import Flag
+from vsacli.records import NamedTuple
 from vsacli.robot import Robot
 from vsacli.steps import compute_block
 from vsacli.trajectory import Trajectory

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from vsacli.errors import InputError
 from vsacli.feasibility import NEAR_SINGULAR, LimitCheck, limit_checks
 from vsacli.motion import Motion
 from vsacli.newton_euler import MOTION_NAMES, LinkTorques, link_torques
+from vsacli.records import dataclass
 from vsacli.robot import Antagonistic, Robot
 from vsacli.trajectory import Trajectory
 from vsacli.variables import VARIABLES, Block

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
+
+from vsacli.records import NamedTuple
 
 Scalar = Any
 """Anything with + - * among its kind and with Python integers."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
+from vsacli.records import dataclass
 from vsacli.suggestions import did_you_mean
 
 WRENCH_AXES = ("fx", "fy", "fz", "mx", "my", "mz")

@@ -16,18 +16,20 @@ BOOLEANS = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false"})
 """Words that YAML 1.1 takes for booleans, in lower case."""
 
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_DECIMAL = re.compile(rf"[+-]?(?!0\d){_NUMBER}", re.ASCII)
 _TOKEN = re.compile(
     rf"(?P<space>[ \t]+)|(?P<number>{_NUMBER})|(?P<name>[^\W\d]\w*)|(?P<symbol>[-+*/()])", re.ASCII
 )
 _DEGREES = re.compile(rf"(?P<sign>[+-]?)\s*(?P<value>{_NUMBER}|\(.*\))\s*deg", re.ASCII)
 
-_REFUSED_FORMS = (
-    (re.compile(r"[+-]?\.?(nan|inf|infinity)", re.IGNORECASE), "only finite numbers can be used"),
-    (re.compile(r"[+-]?\d+(:\d+)+(\.\d*)?"), "base 60 is not read; write the number in decimal"),
-    (re.compile(r"[+-]?0[xob]\w*", re.IGNORECASE), "write the number in decimal"),
-    (re.compile(r"[+-]?\d+(_\d+)+(\.\d*)?"), "write the number without underscores"),
-    (re.compile(r"[+-]?\d+,\d+"), "write a decimal point, not a comma"),
-)
+_REFUSED_FORMS = {
+    r"[+-]?\.?(nan|inf|infinity)": "only finite numbers can be used",
+    r"[+-]?\d+(:\d+)+(\.\d*)?": "base 60 is not read; write the number in decimal",
+    r"[+-]?0[xob]\w*": "write the number in decimal",
+    r"[+-]?\d+(_\d+)+(\.\d*)?": "write the number without underscores",
+    r"[+-]?\d+,\d+": "write a decimal point, not a comma",
+}
+"""What to advise for forms that are no expressions."""
 
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -57,10 +59,13 @@ def evaluate(text: str, unit: str) -> float:
     text = text.strip()
     if text.lower() in BOOLEANS:
         raise ExpressionError("YAML takes this word for a boolean")
-    for form, advice in _REFUSED_FORMS:
-        if form.fullmatch(text):
-            raise ExpressionError(advice)
-    value = _degrees(text, unit) if text.endswith("deg") else _expression(text)
+    try:
+        value = _degrees(text, unit) if text.endswith("deg") else _expression(text)
+    except ExpressionError:
+        for form, advice in _REFUSED_FORMS.items():
+            if re.fullmatch(form, text, re.IGNORECASE):
+                raise ExpressionError(advice) from None
+        raise
     if not math.isfinite(value):
         raise ExpressionError("the value is too large for a floating-point number")
     return value
@@ -79,6 +84,8 @@ def _degrees(text: str, unit: str) -> float:
 
 
 def _expression(text: str) -> float:
+    if _DECIMAL.fullmatch(text):
+        return float(text)
     _check_tokens(text)
     try:
         return _value(ast.parse(text.strip(), mode="eval").body)

@@ -12,10 +12,10 @@ import dataclasses
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 from vsacli.errors import FieldProblem, InvalidRecordError
+from vsacli.records import NamedTuple, dataclass
 from vsacli.spec.tree import quoted
 from vsacli.suggestions import did_you_mean
 from vsacli.units import Quantity

@@ -167,14 +167,14 @@ def _line_of(path: tuple[str | int, ...], node: tree.Node, scope: Scope) -> int:
     return node.line
 
 
-@read_value.register
+@read_value.register(Record)
 def _read_record(kind: Record, node: tree.Node, label: str, scope: Scope) -> Any:
     if isinstance(node, tree.Mapping):
         return _read_record_of(kind.cls, node, label, scope)
     return unexpected(node, "a mapping", label, scope)
 
 
-@read_value.register
+@read_value.register(OneOf)
 def _read_one_of(kind: OneOf, node: tree.Node, label: str, scope: Scope) -> Any:
     if not isinstance(node, tree.Mapping):
         return unexpected(node, "a mapping with the key 'type'", label, scope)
@@ -191,7 +191,7 @@ def _read_one_of(kind: OneOf, node: tree.Node, label: str, scope: Scope) -> Any:
     return _read_record_of(kind.variants[selector.text], node, label, scope, beside=("type",))
 
 
-@read_value.register
+@read_value.register(Items)
 def _read_items(kind: Items, node: tree.Node, label: str, scope: Scope) -> Any:
     if not isinstance(node, tree.Sequence) or not node.items:
         return unexpected(node, "a list of one or more", label, scope)
@@ -215,7 +215,7 @@ def _scalar_entry(node: tree.Node, key: str) -> tree.Scalar | None:
     return entry if isinstance(entry, tree.Scalar) else None
 
 
-@read_value.register
+@read_value.register(Pair)
 def _read_pair(kind: Pair, node: tree.Node, label: str, scope: Scope) -> Any:
     if not isinstance(node, tree.Sequence):
         both = read_value(kind.item, node, label, scope)

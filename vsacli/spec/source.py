@@ -9,9 +9,9 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 from vsacli.errors import InputError
+from vsacli.records import NamedTuple
 from vsacli.suggestions import nearest
 
 MAX_DOCUMENT_BYTES = 1_000_000

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as AbstractMapping
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
+
+from vsacli.records import NamedTuple
 
 MAX_SHOWN = 40
 

@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterable, Mapping
 from functools import singledispatch
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from vsacli.errors import InputError
+from vsacli.records import NamedTuple
 from vsacli.spec import tree
 from vsacli.spec.expression import BOOLEANS, ExpressionError, evaluate
 from vsacli.spec.fields import (
@@ -73,7 +74,7 @@ def read_value(kind: Kind, node: tree.Node, label: str, scope: Scope) -> Any:
     raise NotImplementedError
 
 
-@read_value.register
+@read_value.register(Number)
 def _read_number(kind: Number, node: tree.Node, label: str, scope: Scope) -> Any:
     return _number(node, scope.unit(kind.unit), label, scope)
 
@@ -94,7 +95,7 @@ def unexpected(node: tree.Node, expected: str, label: str, scope: Scope, reason:
     return INVALID
 
 
-@read_value.register
+@read_value.register(Integer)
 def _read_integer(_: Integer, node: tree.Node, label: str, scope: Scope) -> Any:
     value = _number(node, str(DIMENSIONLESS), label, scope)
     if value is INVALID or value.is_integer():
@@ -102,7 +103,7 @@ def _read_integer(_: Integer, node: tree.Node, label: str, scope: Scope) -> Any:
     return unexpected(node, "a whole number", label, scope)
 
 
-@read_value.register
+@read_value.register(Text)
 def _read_text(_: Text, node: tree.Node, label: str, scope: Scope) -> Any:
     if not isinstance(node, tree.Scalar) or node.is_null:
         return unexpected(node, "a text", label, scope)
@@ -111,14 +112,14 @@ def _read_text(_: Text, node: tree.Node, label: str, scope: Scope) -> Any:
     return node.text
 
 
-@read_value.register
+@read_value.register(Choice)
 def _read_choice(kind: Choice, node: tree.Node, label: str, scope: Scope) -> Any:
     if isinstance(node, tree.Scalar) and not node.is_null:
         return node.text
     return unexpected(node, f"one of {', '.join(kind.options)}", label, scope)
 
 
-@read_value.register
+@read_value.register(Vector)
 def _read_vector(kind: Vector, node: tree.Node, label: str, scope: Scope) -> Any:
     if not isinstance(node, tree.Sequence):
         return unexpected(node, f"a list of {kind.length} numbers", label, scope)
@@ -126,7 +127,7 @@ def _read_vector(kind: Vector, node: tree.Node, label: str, scope: Scope) -> Any
     return all_valid(_number(item, unit, label, scope) for item in node.items)
 
 
-@read_value.register
+@read_value.register(Interval)
 def _read_interval(kind: Interval, node: tree.Node, label: str, scope: Scope) -> Any:
     unit = scope.unit(kind.unit)
     if isinstance(node, tree.Scalar):
@@ -137,7 +138,7 @@ def _read_interval(kind: Interval, node: tree.Node, label: str, scope: Scope) ->
     return unexpected(node, "[lower, upper] or one number", label, scope)
 
 
-@read_value.register
+@read_value.register(TableFile)
 def _read_table_file(kind: TableFile, node: tree.Node, label: str, scope: Scope) -> Any:
     name = _read_text(Text(), node, label, scope)
     if name is INVALID:
@@ -155,7 +156,7 @@ def _read_table_file(kind: TableFile, node: tree.Node, label: str, scope: Scope)
     return table
 
 
-@read_value.register
+@read_value.register(PerJoint)
 def _read_per_joint(kind: PerJoint, node: tree.Node, label: str, scope: Scope) -> Any:
     if scope.survey is not None:
         scope.survey.append((kind.unit, node))

@@ -7,10 +7,11 @@ by the rules of YAML 1.1 (`on`, `1:30`, `010`) and nothing is constructed. Plain
 from __future__ import annotations
 
 import re
-from typing import NamedTuple, NoReturn, TypeAlias
+from typing import NoReturn, TypeAlias
 
 import yaml
 
+from vsacli.records import NamedTuple
 from vsacli.spec.problems import Problems
 from vsacli.spec.tree import Mapping, Node, Scalar, Sequence
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +20,10 @@ _REASON = {
     errno.EROFS: "the file system is read-only",
     errno.ENAMETOOLONG: "the file name is too long",
 }
+
+
+SMALL = 2**24
+"""Bytes of a file that is sooner written than its disk is asked for room."""
 
 
 @contextlib.contextmanager
@@ -58,11 +61,15 @@ def check_target(path: str | Path, *, overwrite: bool) -> Path:
 
 
 def check_free_space(path: str | Path, size: int) -> None:
-    """Refuse a file of `size` bytes that its disk has no room for.
+    """Refuse a file of `size` bytes that its disk has no room for, unless it is `SMALL`.
 
     Raises:
         StorageError: with both sizes in MB.
     """
+    if size < SMALL:
+        return
+    import shutil
+
     with reporting_storage_errors(path):
         free = shutil.disk_usage(Path(os.path.realpath(path)).parent).free
     if size > free:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import platform
 from datetime import UTC, datetime
 
@@ -12,7 +13,7 @@ import numpy as np
 from vsacli import __version__
 from vsacli.robot import Robot
 from vsacli.store.inputs import write_robot, write_sources
-from vsacli.store.quickly import add_array, attach_scales, set_attributes
+from vsacli.store.quickly import add_array, add_empty, attach_scales, set_attributes
 from vsacli.store.schema import TEXT, chunk_rows, row_shape, storable, storage_type, variable_attributes
 from vsacli.trajectory import Trajectory
 from vsacli.variables import MOTORS, VARIABLES, Variable
@@ -21,7 +22,7 @@ from vsacli.wrench import WRENCH_AXES
 
 def row_bytes(variable: Variable, joints: int) -> int:
     """Size of one sample."""
-    return int(np.prod(row_shape(variable, joints), dtype=int)) * storage_type(variable).itemsize
+    return math.prod(row_shape(variable, joints)) * storage_type(variable).itemsize
 
 
 def create_layout(
@@ -98,15 +99,13 @@ def _create_labels(file: h5py.File, name: str, labels: tuple[str, ...], long_nam
 
 def _create_variable(file: h5py.File, variable: Variable, robot: Robot, samples: int) -> h5py.Dataset:
     joints = len(robot.joints)
-    shape = (samples, *row_shape(variable, joints))
-    dataset = file.create_dataset(
+    dataset = add_empty(
+        file,
         variable.name,
-        shape=shape,
-        maxshape=shape,
-        dtype=storage_type(variable),
-        chunks=(chunk_rows(samples, row_bytes(variable, joints)), *shape[1:]),
-        compression="gzip" if variable.name == "flags" else None,
-        track_order=True,
+        (samples, *row_shape(variable, joints)),
+        storage_type(variable),
+        chunk_rows(samples, row_bytes(variable, joints)),
+        compressed=variable.name == "flags",
     )
     set_attributes(dataset, variable_attributes(variable, robot.joint_types))
     return dataset

@@ -17,11 +17,15 @@ from vsacli.robot import Robot
 from vsacli.store.atomic import AtomicFile, check_free_space, reporting_storage_errors, storage_error
 from vsacli.store.interrupts import interrupts_deferred
 from vsacli.store.layout import create_layout, row_bytes
+from vsacli.store.quickly import write_rows
 from vsacli.store.schema import FORMAT, TEXT, storable
 from vsacli.store.sink import Sink
 from vsacli.trajectory import Trajectory
 from vsacli.variables import VARIABLES, Variable, select_variables
 from vsacli.wrench import WRENCH_NAMES
+
+CHUNKS_AT_HAND = 11
+"""Chunks of a variable that HDF5 finds in its cache: few, since samples are written in order."""
 
 
 class Samples(Protocol):
@@ -140,17 +144,22 @@ class ResultWriter:
             raw = self._file_to_be.temporary.open("r+b", buffering=0)
         self._sink = self._cleanup.enter_context(Sink(raw))
         with self._hdf5():
-            file = h5py.File(self._sink, "w", libver=("earliest", "v110"), track_order=True)
+            file = h5py.File(
+                self._sink,
+                "w",
+                libver=("earliest", "v110"),
+                track_order=True,
+                rdcc_nslots=CHUNKS_AT_HAND,
+            )
             self._file = self._cleanup.enter_context(file)
             self._stored = create_layout(
                 file, self._format, self._robot, self._trajectory, self._variables, self._command_line
             )
 
     def _append(self, block: Samples) -> None:
-        stop = self._written + len(block.time)
         for name, dataset in self._stored.items():
-            dataset[self._written : stop] = getattr(block, name)
-        self._written = stop
+            write_rows(dataset, self._written, getattr(block, name))
+        self._written += len(block.time)
 
     def _complete(self, report: Mapping[str, Any]) -> None:
         if self._written < self._trajectory.samples:
