@@ -30,7 +30,7 @@ from vsacli.control.poles import PolesFile
 from vsacli.examples import Example, examples, opening_comment
 from vsacli.flags import Flag
 from vsacli.robot_file import RobotFile
-from vsacli.simulation.variables import SIMULATION_VARIABLES
+from vsacli.simulation_variables import SIMULATION_VARIABLES
 from vsacli.springs import LAWS
 from vsacli.trajectory_file import TrajectoryFile
 from vsacli.variables import VARIABLES, Variable

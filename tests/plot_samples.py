@@ -15,6 +15,7 @@ STIFFNESS_K, STIFFNESS_KC, MOTOR_INERTIA = 400.0, 2000.0, 3.2
 class Result:
     """What the figures ask of a stored result; it holds the variables it is given."""
 
+    kind = "result"
     complete = True
     declared = VARIABLES
 

@@ -20,7 +20,7 @@ from robots import vsa_3r
 from vsacli.actuation import drive
 from vsacli.following import follow
 from vsacli.pipeline import inverse_dynamics
-from vsacli.plots import compare_results, plot_feasibility, plot_result
+from vsacli.plots import compare_files, plot_feasibility, plot_stored
 from vsacli.robot import Limits, Robot
 from vsacli.robot_file import load_robot
 from vsacli.suggest import StiffnessProfile, suggest, write_fixed
@@ -237,7 +237,7 @@ def titles(axes: object) -> list[str]:
 
 
 def test_no_stiffness_panel_for_a_rigid_joint_and_no_corridor_for_an_elastic_one() -> None:
-    for figure, first in ((plot_result(drawn())["motion"], 1), (plot_feasibility(drawn()), 0)):
+    for figure, first in ((plot_stored(drawn())["motion"], 1), (plot_feasibility(drawn()), 0)):
         shoulder, elbow = figure.axes[first:]
         assert titles([shoulder, elbow]) == ["shoulder", "elbow"]
         assert (len(shoulder.collections), len(elbow.collections)) == (0, 1)
@@ -245,22 +245,22 @@ def test_no_stiffness_panel_for_a_rigid_joint_and_no_corridor_for_an_elastic_one
 
 
 def test_motor_two_is_drawn_where_it_exists() -> None:
-    first, second = plot_result(drawn())["motor-torque"].axes
+    first, second = plot_stored(drawn())["motor-torque"].axes
     assert (len(first.lines), len(second.lines)) == (3, 1)
 
 
 def test_panels_without_a_motor_are_not_there() -> None:
     result = drawn(types="RRP")  # the antagonistic joint is the prismatic one
-    figure = plot_result(result)["motor-torque"]
+    figure = plot_stored(result)["motor-torque"]
     assert [len(axes.lines) for axes in figure.axes] == [2, 1, 1]
     result.actuators = ("elastic", "elastic", "rigid")
-    assert [len(axes.lines) for axes in plot_result(result)["motor-torque"].axes] == [2, 1]
+    assert [len(axes.lines) for axes in plot_stored(result)["motor-torque"].axes] == [2, 1]
 
 
 def test_a_rigid_robot_has_a_figure_of_its_motion() -> None:
     result = drawn()
     result.actuators = ("rigid",) * 3
-    [position] = plot_result(result)["motion"].axes
+    [position] = plot_stored(result)["motion"].axes
     assert len(position.lines) == 3
 
 
@@ -268,12 +268,12 @@ def test_a_comparison_shows_the_motors_that_any_of_the_results_has() -> None:
     antagonistic = rest_to_rest(101, trajectory="two motors")
     one_each = drawn(trajectory="one")
     one_each.actuators = ("rigid",) * 3
-    assert len(compare_results([one_each, antagonistic]).axes) == 6
+    assert len(compare_files([one_each, antagonistic]).axes) == 6
     mixed = drawn(trajectory="mixed")
     expected = ["base, motor 1", "shoulder, motor 1", "elbow, motor 1", "elbow, motor 2"]
-    assert titles(compare_results([one_each, mixed]).axes) == expected
+    assert titles(compare_files([one_each, mixed]).axes) == expected
     expected = [f"{joint}, motor 1" for joint in ("base", "shoulder", "elbow")]
-    assert titles(compare_results([one_each, one_each]).axes) == expected
+    assert titles(compare_files([one_each, one_each]).axes) == expected
 
 
 # Deflections by integration, and advice

@@ -53,7 +53,7 @@ def test_help_of_a_command_explains_each_option_and_shows_an_example(vsacli, com
         ([], "Usage: vsacli"),
         (["invdyn", str(ROBOT)], "Missing argument 'TRAJECTORY'"),
         (["invdin"], "No such command 'invdin'"),
-        (["plot"], "Missing argument 'RESULT...'"),
+        (["plot"], "Missing argument 'FILE...'"),
         (["export", "r.h5", "--rate", "fast"], "'fast' is not a valid float"),
         (["check-feasibility", "--jason"], "No such option"),
     ],
@@ -212,5 +212,5 @@ def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
 def test_a_csv_name_for_an_hdf5_file_is_refused(vsacli, tmp_path, command):
     done = vsacli(command, ROBOT, REST_TO_REST, "-o", "torques.csv")
     assert done.code == Exit.USAGE
-    assert "'torques.csv': the file is HDF5; `vsacli export` makes CSV of invdyn results" in done.err
+    assert "'torques.csv': the file is HDF5; `vsacli export` makes CSV of it" in done.err
     assert not list(tmp_path.iterdir())

@@ -72,9 +72,9 @@ def test_overwrite_replaces_figures_and_verbose_describes_the_result(vsacli, tmp
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "there is no such file; expected a result file, as invdyn writes it"),
-        (b"", "is empty; expected a result file, as invdyn writes it"),
-        (b"time,q1\n", "is not an HDF5 file; expected a result file, as invdyn writes it"),
+        (None, "there is no such file; expected a result file, as invdyn or simulate writes it"),
+        (b"", "is empty; expected a result file, as invdyn or simulate writes it"),
+        (b"time,q1\n", "is not an HDF5 file; expected a result file, as invdyn or simulate writes it"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "is damaged or truncated"),
     ],
     ids=["absent", "empty", "table", "truncated"],

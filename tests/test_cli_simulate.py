@@ -13,7 +13,7 @@ from cli_samples import REPOSITORY, ROBOT, contents, edited
 
 from vsacli.cli.exit_codes import Exit
 from vsacli.errors import InputError
-from vsacli.simulation.variables import SIMULATION_VARIABLES
+from vsacli.simulation_variables import SIMULATION_VARIABLES
 from vsacli.store.reader import open_result
 from vsacli.store.simulation import StoredSimulation
 

@@ -51,15 +51,16 @@ def test_via_points_are_passed_at_their_times_and_give_the_duration():
 def test_times_that_are_not_given_are_derived_and_reported():
     text = LASTING + "position: {type: via, degree: 9, points: [0, 0.1, 0.2]}\n" + SOFTENING
     trajectory = load(text)
-    assert "position: passes its via points at t = 0, 2, 4 s" in trajectory.warnings
-    assert "stiffness: passes its via points at t = 0, 2, 4 s" in trajectory.warnings
+    assert "position: passes its via points at t = 0, 2, 4 s" in trajectory.notes
+    assert "stiffness: passes its via points at t = 0, 2, 4 s" in trajectory.notes
+    assert trajectory.warnings == ()
     np.testing.assert_array_equal(trajectory.at(np.array([2.0])).stiffness, [[900, 8000]])
 
 
 def test_of_many_derived_times_the_first_and_last_are_reported():
     points = ", ".join(str(0.1 * k) for k in range(30))
-    [warning] = load(LASTING + f"position: {{type: via, degree: 7, points: [{points}]}}\n" + FIRM).warnings
-    assert re.fullmatch(r"position: passes .* at t = 0(, [\d.]+){5}, \.\.\.(, [\d.]+){5}, 4 s", warning)
+    [note] = load(LASTING + f"position: {{type: via, degree: 7, points: [{points}]}}\n" + FIRM).notes
+    assert re.fullmatch(r"position: passes .* at t = 0(, [\d.]+){5}, \.\.\.(, [\d.]+){5}, 4 s", note)
 
 
 def test_a_spline_that_goes_far_beyond_its_points_is_reported():

@@ -93,6 +93,7 @@ class Dip:
     bend: float = 60.0
     bottom: float = 1.3
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     components: int = 2
 
     @property

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from cli_samples import REPOSITORY, ROBOT
+from cli_samples import REPOSITORY, ROBOT, rest_to_rest
 
 from vsacli.errors import InputError
 from vsacli.info import bare, select
@@ -250,6 +250,24 @@ def test_result_on_the_command_line(vsacli: Any, feasible_result: Path) -> None:
         "meaning": torque["meaning"],
     }
     assert vsacli("info", feasible_result, "--field", "report.joints.elbow.steps.infeasible").out == "0\n"
+
+
+@pytest.mark.parametrize("end_stiffness", [1275, 790], ids=["feasible", "infeasible"])
+@pytest.mark.parametrize("options", ["", "--deflections integrate", "--stop-on-infeasible"])
+def test_a_result_ends_with_what_invdyn_printed(
+    vsacli: Any, tmp_path: Path, end_stiffness: float, options: str
+) -> None:
+    motion = rest_to_rest(tmp_path / "move.yaml", end_stiffness)
+    printed = vsacli("invdyn", ROBOT, motion, "-o", "r.h5", *options.split()).out
+    assert printed
+    assert vsacli("info", "r.h5").out.endswith(f"\n\n{printed}")
+
+
+def test_so_does_that_of_joints_of_every_kind(vsacli: Any) -> None:
+    files = [REPOSITORY / folder / "mixed_3r.yaml" for folder in ("robots", "trajectories")]
+    printed = vsacli("invdyn", *files, "-o", "r.h5").out
+    assert printed
+    assert vsacli("info", "r.h5").out.endswith(f"\n\n{printed}")
 
 
 def test_simulation_on_the_command_line(vsacli: Any, motion: Path) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plot_samples import Result, rest_to_rest
 
-from vsacli.plots import omitted_figures, plot_result
+from vsacli.plots import RESULT_DRAWINGS, omitted_figures, plot_stored
 
 WORK_1, WORK_2, ELASTIC = "work of motor 1 [J]", "work of motor 2 [J]", "elastic energy [J]"
 
@@ -24,7 +24,7 @@ def with_energy(types: str = "RRR", actuators: list[str] | None = None, **option
 
 def drawn(result: Result) -> dict[str, list[np.ndarray]]:
     """The curves of each panel by the label of its axis."""
-    figure = plot_result(result)["energy"]
+    figure = plot_stored(result)["energy"]
     return {axes.get_ylabel(): [line.get_ydata() for line in axes.get_lines()] for axes in figure.axes}
 
 
@@ -52,10 +52,10 @@ def test_what_the_actuators_do_not_have_is_not_drawn(actuators: list[str], label
 
 
 def test_infeasible_steps_are_shaded_in_every_panel():
-    figure = plot_result(with_energy(sigma=(850, 790)))["energy"]
+    figure = plot_stored(with_energy(sigma=(850, 790)))["energy"]
     assert all(axes.collections for axes in figure.axes)
 
 
 def test_a_result_without_the_energies_says_so():
-    reason = omitted_figures(rest_to_rest().variables)["energy"]
+    reason = omitted_figures(RESULT_DRAWINGS, rest_to_rest().variables)["energy"]
     assert reason.startswith("figure energy needs elastic_energy and motor_energy, which this result was")

@@ -14,12 +14,12 @@ from plot_samples import rest_to_rest
 from store_samples import random_block, write_result
 
 from vsacli.errors import StorageError
-from vsacli.plots import FORMATS, check_figures, compare_results, plot_result, save_figures
+from vsacli.plots import FORMATS, check_figures, compare_files, plot_stored, save_figures
 from vsacli.store.reader import open_result
 
 
 def motion() -> dict[str, Figure]:
-    return {"motion": plot_result(rest_to_rest())["motion"]}
+    return {"motion": plot_stored(rest_to_rest())["motion"]}
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
@@ -62,8 +62,8 @@ def test_a_folder_that_is_a_file_is_a_storage_error(tmp_path: Path) -> None:
 
 def test_a_stored_result_is_drawn(tmp_path: Path) -> None:
     with open_result(write_result(tmp_path / "run.h5", random_block(5000, 2))) as result:
-        figures = plot_result(result)
-        comparison = compare_results([result, result])
+        figures = plot_stored(result)
+        comparison = compare_files([result, result])
     assert list(figures) == ["motion", "motor-torque", "elastic-torque", "energy"]
     assert comparison.get_suptitle() == "two, motor torques"
 

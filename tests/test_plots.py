@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from plot_samples import rest_to_rest, without
 
 from vsacli.errors import InputError
-from vsacli.plots import compare_results, omitted_figures, plot_result, save_figures
+from vsacli.plots import RESULT_DRAWINGS, compare_files, omitted_figures, plot_stored, save_figures
 from vsacli.plots.corridor import visible_range
 from vsacli.plots.style import line_style, shortened
 
@@ -48,7 +48,7 @@ def test_infeasible_steps_get_grey_bands_in_the_panels_that_show_the_joint() -> 
     result = rest_to_rest(401)
     result.read("flags")[100:151, 1] = 1
     result.read("flags")[200, 2] = 3  # infeasible and singular
-    figures = plot_result(result)
+    figures = plot_stored(result)
     first, second = (0.995, 1.505), (1.995, 2.005)
     position, base, shoulder, elbow = panels(figures["motion"])
     assert bands(base) == []
@@ -65,7 +65,7 @@ def test_infeasible_steps_get_grey_bands_in_the_panels_that_show_the_joint() -> 
 def test_a_single_infeasible_step_of_a_million_is_visible() -> None:
     result = rest_to_rest(100_001)
     result.read("flags")[50_000, 0] = 1
-    figure = plot_result(result)["elastic-torque"]
+    figure = plot_stored(result)["elastic-torque"]
     middle = _column_of_pixels(figure)
     assert middle.min() < 0.85  # the band is at 0.8, the grid at 0.9
 
@@ -84,7 +84,7 @@ def _column_of_pixels(figure: Figure) -> np.ndarray:
 
 
 def test_the_first_three_joints_look_as_in_the_paper() -> None:
-    lines = curves(panels(plot_result(rest_to_rest())["motion"])[0])
+    lines = curves(panels(plot_stored(rest_to_rest())["motion"])[0])
     assert [(line.get_linestyle(), line.get_marker()) for line in lines] == [
         ("-", ""),
         ("--", ""),
@@ -104,14 +104,14 @@ def test_styles_stay_distinct_in_colour_and_stroke() -> None:
 
 
 def test_markers_are_sparse() -> None:
-    marked = curves(panels(plot_result(rest_to_rest(2001))["elastic-torque"])[0])[2]
+    marked = curves(panels(plot_stored(rest_to_rest(2001))["elastic-torque"])[0])[2]
     assert 5 <= len(marked.get_markevery()) <= 20
 
 
 def test_a_gap_breaks_the_line() -> None:
     result = rest_to_rest(401)
     result.read("tau_motor")[100:110, 0] = NAN
-    for axes in panels(plot_result(result)["motor-torque"]):
+    for axes in panels(plot_stored(result)["motor-torque"]):
         values = curves(axes)[0].get_ydata()
         np.testing.assert_array_equal(np.flatnonzero(np.isnan(values)), np.arange(100, 110))
 
@@ -120,7 +120,7 @@ def test_a_step_alone_between_gaps_is_a_dot() -> None:
     result = rest_to_rest(401)
     result.read("tau_motor")[100:110, 0] = NAN
     result.read("tau_motor")[105, 0] = 7.0
-    for axes in panels(plot_result(result)["motor-torque"]):
+    for axes in panels(plot_stored(result)["motor-torque"]):
         (dot,) = (line for line in axes.lines if line.get_marker() == ".")
         np.testing.assert_array_equal(dot.get_xydata(), [[1.05, 7.0]])
 
@@ -129,7 +129,7 @@ def test_a_run_of_one_step_can_be_drawn(tmp_path: Path) -> None:
     result = rest_to_rest(401)
     result.time = result.time[:1]
     result._values = {name: values[:1] for name, values in result._values.items()}
-    assert len(save_figures(plot_result(result), tmp_path, "one")) == 3
+    assert len(save_figures(plot_stored(result), tmp_path, "one")) == 3
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_a_run_of_one_step_can_be_drawn(tmp_path: Path) -> None:
     ],
 )
 def test_every_axis_has_a_unit(figure: str, labels: list[str]) -> None:
-    drawn = plot_result(rest_to_rest())[figure]
+    drawn = plot_stored(rest_to_rest())[figure]
     assert [axes.get_ylabel() for axes in panels(drawn)] == labels
     assert panels(drawn)[-1].get_xlabel() == "time [s]"
     assert panels(drawn)[0].get_xlabel() == "time [s]"
@@ -150,7 +150,7 @@ def test_every_axis_has_a_unit(figure: str, labels: list[str]) -> None:
 def test_title_and_legend_name_robot_trajectory_and_joints() -> None:
     result = rest_to_rest()
     result.read("flags")[7, 0] = 1
-    figures = plot_result(result)
+    figures = plot_stored(result)
     assert {figure.get_suptitle() for figure in figures.values()} == {"vsa-3r, rest-to-rest"}
     assert legend_labels(figures["elastic-torque"]) == ["base", "shoulder", "elbow", "infeasible"]
     assert legend_labels(figures["motion"]) == ["base", "shoulder", "elbow", "infeasible", "reachable"]
@@ -159,17 +159,17 @@ def test_title_and_legend_name_robot_trajectory_and_joints() -> None:
 def test_a_name_that_robot_and_trajectory_share_stands_once() -> None:
     result = rest_to_rest()
     result.trajectory_name = result.robot_name
-    assert plot_result(result)["motion"].get_suptitle() == "vsa-3r"
+    assert plot_stored(result)["motion"].get_suptitle() == "vsa-3r"
 
 
 def test_an_incomplete_run_says_where_it_stopped() -> None:
     result = rest_to_rest()
     result.complete = False
-    assert plot_result(result)["motion"].get_suptitle() == "vsa-3r, rest-to-rest (stopped at 4 s)"
+    assert plot_stored(result)["motion"].get_suptitle() == "vsa-3r, rest-to-rest (stopped at 4 s)"
 
 
 def test_revolute_and_prismatic_joints_get_axes_of_their_own() -> None:
-    figures = plot_result(rest_to_rest(types="RPRP"))
+    figures = plot_stored(rest_to_rest(types="RPRP"))
     revolute, prismatic = panels(figures["elastic-torque"])
     assert revolute.get_ylabel() == r"elastic torque $\tau_e$ [N m]"
     assert prismatic.get_ylabel() == r"elastic force $\tau_e$ [N]"
@@ -180,7 +180,7 @@ def test_revolute_and_prismatic_joints_get_axes_of_their_own() -> None:
 
 @pytest.mark.parametrize("joints", [1, 7, 20])
 def test_many_joints_stay_apart(joints: int, tmp_path: Path) -> None:
-    figures = plot_result(rest_to_rest(types="R" * joints))
+    figures = plot_stored(rest_to_rest(types="R" * joints))
     shown = [curves(axes) for axes in panels(figures["elastic-torque"])]
     assert sum(map(len, shown)) == joints
     assert max(map(len, shown)) <= 7
@@ -196,7 +196,7 @@ def test_names_are_taken_literally_and_cut(tmp_path: Path) -> None:
     result = rest_to_rest()
     result.trajectory_name = r"$\frac{$ " + 200 * "x"
     result.joint_names = ("_hidden", "$x$", 90 * "long_")
-    figures = plot_result(result)
+    figures = plot_stored(result)
     save_figures(figures, tmp_path, "odd")
     labels = legend_labels(figures["elastic-torque"])
     assert labels[:2] == ["_hidden", "$x$"]
@@ -210,7 +210,7 @@ def test_a_cut_name_keeps_both_ends() -> None:
 
 def test_stiffness_lies_in_its_shaded_corridor() -> None:
     result = rest_to_rest()
-    axes = panels(plot_result(result)["motion"])[2]
+    axes = panels(plot_stored(result)["motion"])[2]
     (area,) = (collection for collection in axes.collections if not collection.get_label().startswith("inf"))
     vertices = area.get_paths()[0].vertices
     lower, top = result.read("stiffness_lower")[:, 1], axes.get_ylim()[1]
@@ -225,7 +225,7 @@ def test_the_corridor_has_a_gap_where_the_load_cannot_be_carried() -> None:
     result = rest_to_rest(401)
     for bound in ("stiffness_lower", "stiffness_upper"):
         result.read(bound)[100:200, 0] = NAN
-    area = panels(plot_result(result)["motion"])[1].collections[0]
+    area = panels(plot_stored(result)["motion"])[1].collections[0]
     extents = [path.get_extents() for path in area.get_paths()]
     np.testing.assert_allclose([(extent.x0, extent.x1) for extent in extents], [(0, 0.99), (2, 4)])
 
@@ -255,28 +255,28 @@ def test_stiffness_axis_of_a_constant_or_unknown_command() -> None:
 
 def test_figures_without_their_variables_are_left_out_with_a_reason() -> None:
     result = without(rest_to_rest(), "q", "stiffness", "tau_e")
-    assert list(plot_result(result)) == ["motor-torque"]
-    reasons = omitted_figures(result.variables)
+    assert list(plot_stored(result)) == ["motor-torque"]
+    reasons = omitted_figures(RESULT_DRAWINGS, result.variables)
     assert list(reasons) == ["motion", "elastic-torque", "energy"]
     expected = "figure motion needs q and stiffness, which this result was written without (--variables)"
     assert reasons["motion"] == expected
 
 
 def test_corridor_and_bands_are_drawn_only_if_stored() -> None:
-    figure = plot_result(without(rest_to_rest(sigma=(850, 790)), "stiffness_upper", "flags"))["motion"]
+    figure = plot_stored(without(rest_to_rest(sigma=(850, 790)), "stiffness_upper", "flags"))["motion"]
     assert legend_labels(figure) == ["base", "shoulder", "elbow"]
     assert not any(axes.collections for axes in panels(figure))
 
 
 def test_nothing_to_draw_is_an_error() -> None:
     with pytest.raises(InputError, match=r"run.h5: nothing can be plotted: .*elastic-torque needs tau_e"):
-        plot_result(without(rest_to_rest(), "q", "tau_motor", "tau_e"))
+        plot_stored(without(rest_to_rest(), "q", "tau_motor", "tau_e"))
 
 
 def test_comparison_overlays_the_motor_torques_of_each_joint() -> None:
     soft = rest_to_rest(sigma=(850, 850), trajectory="soft")
     stiff = rest_to_rest(sigma=(1275, 1275), trajectory="stiff")
-    figure = compare_results([soft, stiff])
+    figure = compare_files([soft, stiff])
     titles = [axes.get_title(loc="left") for axes in panels(figure)]
     assert titles[:3] == ["base, motor 1", "base, motor 2", "shoulder, motor 1"]
     assert panels(figure)[3].get_ylabel() == r"$\tau_2$ [N m]"
@@ -291,7 +291,7 @@ def test_comparison_spans_the_longest_run_and_shows_bands() -> None:
     short = rest_to_rest(trajectory="short")
     short.time = short.time / 2
     short.read("flags")[300:401, 0] = 1
-    figure = compare_results([short, rest_to_rest()])
+    figure = compare_files([short, rest_to_rest()])
     assert panels(figure)[4].get_xlim() == (0, 4)
     np.testing.assert_allclose(bands(panels(figure)[0]), [(1.4975, 2.0)])
     assert bands(panels(figure)[2]) == []
@@ -306,16 +306,16 @@ def test_comparison_spans_the_longest_run_and_shows_bands() -> None:
     ],
 )
 def test_equal_trajectory_names_are_told_apart(paths: tuple[str, str], labels: list[str]) -> None:
-    assert legend_labels(compare_results([rest_to_rest(path=path) for path in paths])) == labels
+    assert legend_labels(compare_files([rest_to_rest(path=path) for path in paths])) == labels
 
 
 def test_results_of_different_joints_are_refused() -> None:
     with pytest.raises(
         InputError, match=r"b.h5: cannot be compared with a.h5: it has the joints joint_1 \(prismatic\)"
     ):
-        compare_results([rest_to_rest(types="R", path="a.h5"), rest_to_rest(types="P", path="b.h5")])
+        compare_files([rest_to_rest(types="R", path="a.h5"), rest_to_rest(types="P", path="b.h5")])
 
 
 def test_a_result_without_motor_torques_is_refused() -> None:
     with pytest.raises(InputError, match=r"b.h5: figure compare needs tau_motor, which .* without"):
-        compare_results([rest_to_rest(), without(rest_to_rest(path="b.h5"), "tau_motor")])
+        compare_files([rest_to_rest(), without(rest_to_rest(path="b.h5"), "tau_motor")])

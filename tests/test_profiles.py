@@ -103,7 +103,7 @@ def test_shape_is_orders_joints_samples_with_contiguous_samples(signal, orders):
         assert rows.shape == (orders, 3, 4)
         assert rows.flags.c_contiguous
         assert profile.components == 3
-        assert profile.warnings == ()
+        assert (profile.warnings, profile.notes) == ((), ())
         np.testing.assert_array_equal(profile.breakpoints, SPAN)
         np.testing.assert_array_equal(profile.samples(1, 3, time[1:3]), rows[:, :, 1:3])
 

@@ -190,8 +190,8 @@ def test_rate_resamples_the_fit(robot, rate):
     np.testing.assert_allclose(found.q, motion(0, found.time - 3), atol=1e-13)
     inside = (found.time > 3.01) & (found.time < 4.99)
     np.testing.assert_allclose(found.dq[inside], motion(1, found.time - 3)[inside], atol=1e-11)
-    assert "the given dq, ddq, d3q, d4q play no part, since the steps are resampled" in trajectory.warnings
-    assert any("333.5 per second, not 333.3" in w for w in trajectory.warnings) == (rate == 333.3)
+    assert "the given dq, ddq, d3q, d4q play no part, since the steps are resampled" in trajectory.notes
+    assert any("333.5 per second, not 333.3" in w for w in trajectory.notes) == (rate == 333.3)
     assert inverse_dynamics(robot, trajectory).report.self_check.passed
 
 

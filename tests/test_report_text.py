@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 
 import pytest
 
+from vsacli import report_text
 from vsacli.energy import JointEnergy
 from vsacli.report import COUNTED, JointReport, Report, Worst
-from vsacli.report_text import render, sentences
+from vsacli.report_text import sentences
 from vsacli.self_check import SelfCheck
 
 NAN = math.nan
@@ -32,6 +34,14 @@ QUIET = JointReport(
     other_preload=False,
     energy=JointEnergy(9.66, 20.4, 11.2, 61.2, 2.84),
 )
+
+
+def render(found: Report) -> str:
+    """The text of a report, and of what a file would make of it."""
+    text = report_text.render(found)
+    again = Report.from_json(json.loads(json.dumps(found.as_json(), allow_nan=False)))
+    assert report_text.render(again) == text
+    return text
 
 
 def report(*joints: JointReport, **changes: object) -> Report:
@@ -269,9 +279,9 @@ def test_start_at_a_singular_step_has_no_torque_step():
     assert "torque step" not in text
 
 
-def test_warnings_about_the_inputs_follow_the_table():
-    lines = render(report(warnings=("its mass is zero",))).splitlines()
-    assert lines[3] == "warning: its mass is zero"
+def test_remarks_about_the_inputs_follow_the_table():
+    lines = render(report(warnings=("its mass is zero",), notes=("the rate is 8 per second",))).splitlines()
+    assert lines[3:5] == ["warning: its mass is zero", "note: the rate is 8 per second"]
 
 
 def test_failed_self_check_warns_against_the_torques():

@@ -21,7 +21,7 @@ from vsacli.simulation.history import History
 from vsacli.simulation.measurement import RateFilter
 from vsacli.simulation.report_text import render
 from vsacli.simulation.state import Phase
-from vsacli.simulation.variables import SIMULATION_VARIABLES
+from vsacli.simulation_variables import SIMULATION_VARIABLES
 from vsacli.springs.quadratic import Quadratic
 
 GAINS = Gains.from_poles([-20] * 4, [-20] * 2)

@@ -310,8 +310,8 @@ def folder(path):
         (lambda path: path.write_bytes(b"format: x"), "is not an HDF5 file; expected a result file"),
         (foreign, "no result file: it has no attribute format = 'vsacli-result/1'"),
         (newer, "has the format vsacli-result/2, but this version reads vsacli-result/1; run invdyn again"),
-        (truncated, r"is damaged or truncated \(.*truncated file.*\); run invdyn again"),
-        (without_report, r"is damaged or truncated \(.*not found.*\); run invdyn again"),
+        (truncated, r"is damaged or truncated \(.*truncated file.*\); compute it again"),
+        (without_report, r"is damaged or truncated \(.*not found.*\); compute it again"),
     ],
 )
 def test_files_that_are_no_result(tmp_path, block, spoil, match):

@@ -34,15 +34,15 @@ def test_blocks_are_slices_of_the_whole(times):
 
 
 def test_rate_that_does_not_fit_is_noted():
-    assert UniformTimes(4.0, 1000.0).warnings == ()
-    assert UniformTimes(0.3, 1000.0).warnings == ()  # 0.3 * 1000 is a whole number but for rounding
-    assert UniformTimes(0.25, 10.0).warnings == ("the rate is 8 per second, not 10: whole steps in 0.25 s",)
+    assert UniformTimes(4.0, 1000.0).notes == ()
+    assert UniformTimes(0.3, 1000.0).notes == ()  # 0.3 * 1000 is a whole number but for rounding
+    assert UniformTimes(0.25, 10.0).notes == ("the rate is 8 per second, not 10: whole steps in 0.25 s",)
 
 
 def test_there_is_at_least_one_step():
     times = UniformTimes(0.01, 10.0)
     np.testing.assert_array_equal(times.block(0, 2), [0.0, 0.01])
-    assert times.warnings == ("the rate is 100 per second, not 10: whole steps in 0.01 s",)
+    assert times.notes == ("the rate is 100 per second, not 10: whole steps in 0.01 s",)
 
 
 @pytest.mark.parametrize(
@@ -60,4 +60,4 @@ def test_number_of_steps_is_limited():
 
 def test_recorded_times_span_from_first_to_last():
     times = RecordedTimes(np.array([0.5, 0.6, 2.0]))
-    assert (times.span, times.samples, times.warnings) == ((0.5, 2.0), 3, ())
+    assert (times.span, times.samples, times.notes) == ((0.5, 2.0), 3, ())

@@ -68,14 +68,17 @@ def test_block_is_the_function_at_the_steps():
     np.testing.assert_array_equal(block.stiffness[-1], [1200.0, 2400.0])
 
 
-def test_warnings_of_all_parts_and_sources_are_collected():
+def test_remarks_of_all_parts_and_sources_are_collected():
     times = UniformTimes(0.25, 10.0)
     still = Constant(signal=POSITION, span=times.span, value=(0.0,))
     firm = Constant(signal=STIFFNESS, span=times.span, value=(850.0,))
     source = Source("a.yaml", "0" * 64, "")
-    trajectory = Trajectory(times, still, firm, name="hold", warnings=["first"], sources=[source])
-    assert trajectory.warnings == ("first", *times.warnings)
-    assert len(times.warnings) == 1
+    trajectory = Trajectory(
+        times, still, firm, name="hold", warnings=["odd"], notes=["first"], sources=[source]
+    )
+    assert trajectory.warnings == ("odd",)
+    assert trajectory.notes == ("first", *times.notes)
+    assert len(times.notes) == 1
     assert trajectory.sources == (source,)
     assert trajectory.name == "hold"
 

@@ -97,7 +97,7 @@ def test_the_rate_is_1000_unless_given(load):
 def test_a_rate_that_does_not_fit_the_duration_is_noted(load):
     trajectory = load(TEXT.replace("rate: 100\n", "rate: 100.3\n"))
     assert trajectory.samples == 202  # round(2.0 * 100.3) = 201 steps
-    assert any("100.5" in warning and "100.3" in warning for warning in trajectory.warnings)
+    assert any("100.5" in note and "100.3" in note for note in trajectory.notes)
 
 
 def test_at_least_one_step(load):
@@ -131,7 +131,7 @@ def test_recorded_in_two_files_with_equal_times(load):
     assert (trajectory.block(0, 8).q == position[:, 0]).all()
     assert (trajectory.block(0, 8).stiffness == stiffness[:, 0]).all()
     assert [source.path for source in trajectory.sources] == ["move.yaml", "motion.csv", "stiffness.csv"]
-    assert "stiffness.csv: its columns of q are not used" in trajectory.warnings
+    assert "stiffness.csv: its columns of q are not used" in trajectory.notes
 
 
 def test_recorded_in_two_files_with_other_times(load):
@@ -263,7 +263,7 @@ def test_samples_that_are_missing(load):
 def test_the_shipped_trajectories_fit_their_robots(robot_name, trajectory_name, samples):
     robot = load_robot(ROOT / "robots" / f"{robot_name}.yaml")
     trajectory = load_trajectory(ROOT / "trajectories" / f"{trajectory_name}.yaml", robot)
-    assert (trajectory.samples, trajectory.warnings) == (samples, ())
+    assert (trajectory.samples, trajectory.warnings, trajectory.notes) == (samples, (), ())
 
 
 def test_the_motion_of_the_paper_as_we_choose_it():

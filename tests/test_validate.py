@@ -169,7 +169,7 @@ def test_hdf5_of_others(vsacli: Any, tmp_path: Path) -> None:
         "other.h5: is an HDF5 file, but its format is none of vsacli-result/1, vsacli-simulation/1"
         in done.out
     )
-    assert "text.h5: is not an HDF5 file; expected a result file, as invdyn writes it" in done.out
+    assert "text.h5: is not an HDF5 file; expected a result file, as invdyn or simulate writes it" in done.out
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
@@ -177,7 +177,8 @@ def test_a_pipe_is_not_waited_for(vsacli: Any) -> None:
     os.mkfifo("pipe.h5")
     assert vsacli("validate", "pipe.h5").out == "pipe.h5: is no regular file (a device, pipe or socket)\n"
     assert (
-        vsacli("export", "pipe.h5").err == "pipe.h5: is a pipe; expected a result file, as invdyn writes it\n"
+        vsacli("export", "pipe.h5").err
+        == "pipe.h5: is a pipe; expected a result file, as invdyn or simulate writes it\n"
     )
 
 

@@ -108,7 +108,7 @@ def test_columns_of_a_wrench_that_nobody_asked_for_are_noted(load) -> None:
     text = "format: vsacli-trajectory/1\nname: reach\nposition: {type: csv, file: all.csv}\n"
     trajectory = load(text + "stiffness: {type: constant, value: 900}\n")
     assert trajectory.wrench is None
-    assert "all.csv: its columns of wrench are not used" in trajectory.warnings
+    assert "all.csv: its columns of wrench are not used" in trajectory.notes
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.arrays import FloatArray, by_joint, over_time
 from vsacli.drivetrain import SIDES, motors_and_springs
+from vsacli.plain import Plain, number
+from vsacli.records import NamedTuple
 from vsacli.robot import Robot
 from vsacli.variables import Block
 
@@ -43,6 +44,11 @@ class JointEnergy(NamedTuple):
     def as_json(self) -> dict[str, float]:
         """Plain values under the published keys."""
         return {**self._asdict(), "co_contraction_share": self.co_contraction_share}
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> JointEnergy:
+        """From what `as_json` gave, with None for NaN."""
+        return cls(*(number(plain[name]) for name in cls._fields))
 
 
 class Flow(NamedTuple):

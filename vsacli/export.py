@@ -1,4 +1,4 @@
-"""Result file to CSV: torques to send to motor drives, or any other variable."""
+"""Result or simulation file to CSV: torques to send to motor drives, or any other variable."""
 
 from __future__ import annotations
 
@@ -18,11 +18,14 @@ from vsacli.store.atomic import AtomicFile, reporting_storage_errors
 from vsacli.store.reader import StoredResult
 from vsacli.variables import VARIABLES, Variable, column_names, existing, select_variables
 
-DEFAULT_VARIABLES = ("tau_motor",)
+DEFAULT_VARIABLES = {
+    "result": ("tau_motor",),
+    "simulation": ("q_actual", "stiffness_actual", "tau_motor_actual"),
+}
+"""What is exported of each kind of file: the torques to send, or what happened."""
+
 Side: TypeAlias = Literal["joint", "motor"]
 """Of the gear of a motor."""
-GEARED = {"theta": 1, "dtheta": 1, "ddtheta": 1, "tau_motor": -1}
-"""What the gear changes: the power of its ratio by which the value on the motor's shaft is larger."""
 CELLS = 2**18
 """Values of a variable held in memory at a time."""
 RATE_TOLERANCE = 1e-6
@@ -60,7 +63,7 @@ class UndefinedSamplesError(VsacliError):
 def export_csv(
     result: StoredResult,
     stream: TextIO,
-    variables: Iterable[str] = DEFAULT_VARIABLES,
+    variables: Iterable[str] | None = None,
     *,
     rate: float | None = None,
     allow_nan: bool = False,
@@ -71,9 +74,9 @@ def export_csv(
     What a joint does not have is left out: a second motor, or the stiffness of a rigid joint.
 
     Args:
-        result: an open result file.
+        result: an open result or simulation file.
         stream: where to write; a file should be open with newline="".
-        variables: names, exported in declared order.
+        variables: names, exported in declared order; by default those of `DEFAULT_VARIABLES`.
         rate: samples per second, the stored rate or a whole fraction of it; all samples by default.
         allow_nan: leave the cells of undefined samples empty instead of refusing.
         side: of the gear on which motion and torque of the motors are given. On the side "motor" they are in
@@ -83,9 +86,10 @@ def export_csv(
         InputError: a variable is not in the file, the rate is not possible, or a gear ratio is not known.
         UndefinedSamplesError: a sample is NaN and `allow_nan` is false.
     """
-    selected = select_variables(variables)
+    wanted = DEFAULT_VARIABLES[result.kind] if variables is None else variables
+    selected = select_variables(wanted, result.declared)
     stride = 1 if rate is None else _stride(result, rate)
-    shaft = {variable.name for variable in selected if side == "motor"} & GEARED.keys()
+    shaft = {variable.name for variable in selected if side == "motor" and variable.geared}
     if shaft:
         _check_geared(result)
     if not allow_nan:
@@ -98,7 +102,7 @@ def export_csv(
         for variable in selected:
             values = result.read(variable.name, start, stop)[::stride]
             if variable.name in shaft:
-                values = values * result.gear_ratio ** GEARED[variable.name]
+                values = values * result.gear_ratio**variable.geared
             columns += _cells(values, _existing(result, variable))
         writer.writerows(zip(*columns, strict=True))
 
@@ -106,7 +110,7 @@ def export_csv(
 def export_csv_file(
     result: StoredResult,
     path: str | Path,
-    variables: Iterable[str] = DEFAULT_VARIABLES,
+    variables: Iterable[str] | None = None,
     *,
     rate: float | None = None,
     allow_nan: bool = False,
@@ -140,7 +144,7 @@ def _check_geared(result: StoredResult) -> None:
         joints = ", ".join(compress(result.joint_names, unknown))
         message = (
             f"the robot file gives no gear_ratio at {joints}, so what happens on the motors' shafts is not "
-            "known; add it (1 without a gear) and run invdyn again, or export with --side joint"
+            f"known; add it (1 without a gear) and run {result.command} again, or export with --side joint"
         )
         raise InputError.one(message, result.path)
 

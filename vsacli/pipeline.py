@@ -111,6 +111,7 @@ class Run:
             duration=self.trajectory.duration,
             complete=self._samples == self.trajectory.samples,
             warnings=(*self.robot.warnings, *self.trajectory.warnings),
+            notes=self.trajectory.notes,
             self_check=self._self_check(),
             joints=tuple(map(JointTally.report, self._tallies, self._energy.report())),
             drifts=tuple(drift.report() for drift in self._drifts),

@@ -32,14 +32,14 @@ class Recording:
     Attributes:
         times: the column `time`.
         profiles: one for each signal that was asked for, in that order.
-        warnings: what of the file is not used.
+        notes: what of the file is not used.
         source: the file.
         lines: those of its rows.
     """
 
     times: RecordedTimes
     profiles: tuple[SampledProfile, ...]
-    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
     source: Source
     lines: Lines
 
@@ -91,13 +91,13 @@ def read_recording(
     problems = [*time_problems(time), *(problem for record in records for problem in value_problems(record))]
     if problems:
         raise InputError(_located(problem, table, layout) for problem in problems)
-    warnings = tuple(f"{file}: {clause}" for clause in _unused(layout, signals))
+    notes = tuple(f"{file}: {clause}" for clause in _unused(layout, signals))
     source, lines = table.source, table.lines
     del table  # as large as the records, which may be fitted now
     profiles = tuple(
         SampledProfile.of(record, wanted[record.signal], resampled=resampled) for record in records
     )
-    return Recording(RecordedTimes(time), profiles, warnings, source, lines)
+    return Recording(RecordedTimes(time), profiles, notes, source, lines)
 
 
 def _unused(layout: Layout, wanted: Sequence[Signal]) -> Iterator[str]:
@@ -161,6 +161,6 @@ def recorded_trajectory(
         position,
         stiffness,
         name=Path(path).stem,
-        warnings=recording.warnings,
+        notes=recording.notes,
         sources=[recording.source],
     )

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from vsacli.energy import JointEnergy
 from vsacli.flags import LIMITS, Flag
-from vsacli.self_check import LADDER_BOUND, SelfCheck
+from vsacli.plain import Plain, finite, number, pair
+from vsacli.records import NamedTuple
+from vsacli.self_check import DRIFT_BOUND, LADDER_BOUND, SPRING_BOUND, SelfCheck
 
 if TYPE_CHECKING:
-    from vsacli.energy import JointEnergy
     from vsacli.following import Stop
 
 FORMAT = "vsacli-report/1"
@@ -44,6 +46,12 @@ class Worst(NamedTuple):
         """Plain values; the kind is the key under which they stand."""
         entry = {"time": self.time, "value": self.value, "bound": self.bound, "unit": self.unit}
         return entry if self.motor is None else {**entry, "motor": self.motor}
+
+    @classmethod
+    def from_json(cls, kind: str, plain: Plain) -> Worst:
+        """From what `as_json` gave, `finite`."""
+        time, value, bound = (number(plain[name]) for name in ("time", "value", "bound"))
+        return cls(kind, time, value, bound, plain["unit"], plain.get("motor"))
 
 
 class JointReport(NamedTuple):
@@ -104,6 +112,28 @@ class JointReport(NamedTuple):
             "energy": self.energy.as_json(),
         }
 
+    @classmethod
+    def from_json(cls, plain: Plain) -> JointReport:
+        """From what `as_json` gave, `finite`: no end of a corridor is NaN alone, so the upper is infinite."""
+        margin = plain["margin"]
+        lower, upper = pair(margin["reachable"])
+        if math.isnan(upper) and not math.isnan(lower):
+            upper = math.inf
+        return cls(
+            **{name: plain[name] for name in ("name", "type", "actuator", "steps", "first_time")},
+            worst={kind: Worst.from_json(kind, worst) for kind, worst in plain["worst"].items()},
+            margin=number(margin["min"]),
+            margin_time=number(margin["time"]),
+            reachable=(lower, upper),
+            stiffness=pair(plain["stiffness"][end] for end in ("min", "max")),
+            peak_tau_e=number(plain["peak"]["tau_e"]),
+            peak_tau_motor=pair(plain["peak"]["tau_motor"]),
+            start_theta=pair(plain["start"]["theta"]),
+            torque_step=pair(plain["start"]["torque_step"]),
+            other_preload=plain["other_preload"],
+            energy=JointEnergy.from_json(plain["energy"]),
+        )
+
 
 class JointDrift(NamedTuple):
     """What became of the followed deflections of a joint.
@@ -132,6 +162,14 @@ class JointDrift(NamedTuple):
             "stopped": None if self.stop is None else {"time": self.stop.time, "reason": self.stop.reason},
         }
 
+    @classmethod
+    def from_json(cls, plain: Plain) -> JointDrift:
+        """From what `as_json` gave, `finite`."""
+        from vsacli.following import Stop
+
+        stop = None if plain["stopped"] is None else Stop(**plain["stopped"])
+        return cls(plain["joint"], number(plain["drift"]), number(plain["time"]), plain["unit"], stop)
+
 
 class Report(NamedTuple):
     """The verdict on a run.
@@ -142,7 +180,8 @@ class Report(NamedTuple):
         samples: steps computed, both ends included.
         duration: time from the first to the last step of the trajectory, s.
         complete: whether every step of the trajectory was computed.
-        warnings: what the user should know of the inputs.
+        warnings: why the inputs may not be what was meant.
+        notes: how they were understood, where that is not obvious.
         self_check: outcome of the self-check.
         joints: one report a joint.
         drifts: one a joint if the deflections were followed by integration, else none.
@@ -157,6 +196,7 @@ class Report(NamedTuple):
     self_check: SelfCheck
     joints: tuple[JointReport, ...]
     warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     drifts: tuple[JointDrift, ...] = ()
     fits: tuple[dict[str, Any], ...] = ()
 
@@ -181,6 +221,7 @@ class Report(NamedTuple):
                 "duration": self.duration,
                 "complete": self.complete,
                 "warnings": list(self.warnings),
+                "notes": list(self.notes),
                 "fits": list(self.fits),
                 "self_check": {
                     "passed": check.passed,
@@ -199,13 +240,24 @@ class Report(NamedTuple):
             return {"method": "root"}
         return {"method": "integrate", "joints": [drift.as_json() for drift in self.drifts]}
 
+    @classmethod
+    def from_json(cls, plain: Plain) -> Report:
+        """From what `as_json` gave, as a result file holds it.
 
-def finite(content: Any) -> Any:
-    """The same plain values, with None for numbers that are not finite, which JSON does not have."""
-    if isinstance(content, dict):
-        return {key: finite(entry) for key, entry in content.items()}
-    if isinstance(content, list):
-        return [finite(entry) for entry in content]
-    if isinstance(content, float) and not math.isfinite(content):
-        return None
-    return content
+        Raises:
+            LookupError, TypeError, AttributeError, ValueError: it is no such report.
+        """
+        check, drifts = plain["self_check"], plain["deflections"].get("joints", ())
+        return cls(
+            **{name: plain[name] for name in ("robot", "trajectory", "samples", "duration", "complete")},
+            warnings=tuple(plain["warnings"]),
+            notes=tuple(plain.get("notes", ())),
+            fits=tuple(plain["fits"]),
+            self_check=SelfCheck(
+                number(check["spring_residual"]),
+                number(check["ladder"]),
+                DRIFT_BOUND if drifts else SPRING_BOUND,
+            ),
+            joints=tuple(map(JointReport.from_json, plain["joints"])),
+            drifts=tuple(map(JointDrift.from_json, drifts)),
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from vsacli.energy import JointEnergy
 from vsacli.flags import Flag
@@ -36,7 +36,7 @@ def render(report: Report) -> str:
         [
             _headline(report),
             *_table(report),
-            *(f"warning: {warning}" for warning in report.warnings),
+            *remarks(report.warnings, report.notes),
             *(sentence for joint in report.joints for sentence in sentences(joint)),
             *_stops(report),
             *_start(report),
@@ -45,6 +45,12 @@ def render(report: Report) -> str:
             _self_check(report),
         ]
     )
+
+
+def remarks(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
+    """A line each, marked as what it is."""
+    yield from (f"warning: {warning}" for warning in warnings)
+    yield from (f"note: {note}" for note in notes)
 
 
 def sentences(joint: JointReport) -> Iterator[str]:

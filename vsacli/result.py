@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from vsacli.records import dataclass
 from vsacli.report import Report
 from vsacli.variables import Block
 

@@ -75,15 +75,11 @@ class Samples:
         return tuple(name for name, given in pairs if given is None)
 
     def doubts(self, fit: Fit, *, resampled: bool) -> Iterator[str]:
-        """Where numbers at the steps come from, and given derivatives that play no part or do not follow."""
+        """Which numbers at the steps are estimates, and which given derivatives do not follow."""
         value, *names = self.signal.names
         yield from fit_sentences(value, names if resampled else self.missing, self.labels, self.time, fit)
-        unused = [name for name in names if name not in self.missing]
         if not resampled:
             yield from mismatches(self.signal.names, self.labels, self.time, self.derivatives, fit)
-        elif unused:
-            verb = "plays" if len(unused) == 1 else "play"
-            yield f"the given {', '.join(unused)} {verb} no part, since the steps are resampled"
 
     def stretched(self, factor: float) -> Samples:
         """The same values further apart; what was given of derivatives becomes smaller."""
@@ -105,7 +101,7 @@ class SampledProfile:
         record: what was recorded.
         fit: of the values.
         resampled: whether the steps are not the recorded times; only the fit counts then.
-        warnings: where the numbers come from, and given derivatives that do not follow from the values.
+        warnings: which numbers are estimates, and given derivatives that do not follow from the values.
     """
 
     record: Samples
@@ -139,6 +135,16 @@ class SampledProfile:
     def components(self) -> int:
         """Number of components: one a joint, or six of a wrench."""
         return len(self.record.values)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The given derivatives, if they play no part."""
+        record = self.record
+        given = [name for name in record.signal.names[1:] if name not in record.missing]
+        if not self.resampled or not given:
+            return ()
+        verb = "plays" if len(given) == 1 else "play"
+        return (f"the given {', '.join(given)} {verb} no part, since the steps are resampled",)
 
     @property
     def fitted(self) -> bool:

@@ -7,8 +7,11 @@ from collections.abc import Iterable
 
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:
-    """The valid word that is most like this one, or None if none is close."""
-    return next(iter(difflib.get_close_matches(word, list(valid), n=1, cutoff=0.6)), None)
+    """The valid word that is most like this one or alone begins with it, or None if none is close."""
+    options = list(valid)
+    longer = [option for option in options if option.startswith(word)]
+    close = difflib.get_close_matches(word, options, n=1, cutoff=0.6) or (longer if word else [])
+    return close[0] if len(close) == 1 else None
 
 
 def did_you_mean(word: str, valid: Iterable[str]) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol, TypeVar
 
 import numpy as np
 
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
+from vsacli.records import dataclass
 
 _Time = TypeVar("_Time", float, FloatArray)
 
@@ -21,8 +22,8 @@ class Times(Protocol):
     """The times of the steps, both ends included."""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """What the user should know about the times."""
+    def notes(self) -> tuple[str, ...]:
+        """How the times were understood, where that is not obvious."""
 
     @property
     def span(self) -> tuple[float, float]:
@@ -68,7 +69,7 @@ class UniformTimes:
         return max(1, round(self.duration * self.rate))
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[str, ...]:
         """The rate, if the duration does not hold a whole number of steps at the rate asked for."""
         rate = self.steps / self.duration
         if math.isclose(rate, self.rate, rel_tol=1e-9):
@@ -105,11 +106,11 @@ class RecordedTimes:
 
     Attributes:
         time: (samples,) in s; see `time_problems` for what they must satisfy.
-        warnings: what the user should know about them.
+        notes: how they were understood, where that is not obvious.
     """
 
     time: FloatArray = field(repr=False)
-    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def span(self) -> tuple[float, float]:
@@ -140,7 +141,7 @@ def uniform_times_over(span: tuple[float, float], rate: float) -> RecordedTimes:
     uniform = UniformTimes(last - first, rate)
     time = first + uniform.block(0, uniform.samples)
     time[-1] = last
-    return RecordedTimes(time, uniform.warnings)
+    return RecordedTimes(time, uniform.notes)
 
 
 def stretch(time: _Time, first: float, factor: float) -> _Time:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -13,6 +13,7 @@ from vsacli.arrays import BoolArray, FloatArray, over_time
 from vsacli.errors import InputError, Problem
 from vsacli.motion import Motion
 from vsacli.profiles import POSITION, STIFFNESS, WRENCH, Constant, Signal
+from vsacli.records import dataclass
 from vsacli.spec.source import Source
 from vsacli.times import RecordedTimes, Times
 from vsacli.wrench import WRENCH_AXES, Wrench, check_frame
@@ -32,7 +33,11 @@ class Profile(Protocol):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know about where the values come from."""
+        """Why the values, or some of them, may not be what was meant."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How they were understood, where that is not obvious."""
 
     @property
     def breakpoints(self) -> FloatArray:
@@ -83,7 +88,8 @@ class Trajectory:
             chosen is NaN.
         wrench: what the environment exerts meanwhile; None if nothing.
         name: used in reports and for the name of the result file.
-        warnings: what the user should know about times and profiles.
+        warnings: why times and profiles may not be what was meant.
+        notes: how they were understood, where that is not obvious.
         sources: the files it was read from.
     """
 
@@ -96,6 +102,7 @@ class Trajectory:
         wrench: WrenchProfile | None = None,
         name: str,
         warnings: Iterable[str] = (),
+        notes: Iterable[str] = (),
         sources: Iterable[Source] = (),
     ) -> None:
         """Join profiles that have the same joints and the span of the times.
@@ -105,8 +112,9 @@ class Trajectory:
         """
         self.times, self.position, self.stiffness, self.wrench = times, position, stiffness, wrench
         self.name = name
-        doubts = (doubt for _, profile in self._profiles() for doubt in profile.warnings)
-        self.warnings = (*warnings, *times.warnings, *doubts)
+        profiles = [profile for _, profile in self._profiles()]
+        self.warnings = (*warnings, *(each for profile in profiles for each in profile.warnings))
+        self.notes = (*notes, *times.notes, *(each for profile in profiles for each in profile.notes))
         self.sources = tuple(sources)
         self._check()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from vsacli import profiles, units
 from vsacli.courses import POSITIONS, RIGID_POSITIONS, STIFFNESSES, WRENCHES, Course, WrenchCourse
 from vsacli.errors import FieldProblem, InputError, Problem
 from vsacli.profiles import Signal
+from vsacli.records import dataclass
 from vsacli.robot import Rigid, Robot
 from vsacli.spec.fields import POSITIVE, check_fields, number, text, value
 from vsacli.spec.reading import read_document
@@ -152,10 +152,8 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
         else _profile(document.stiffness, profiles.STIFFNESS, times, recorded),
         wrench=_wrench(document.wrench, times, recorded),
         name=document.name,
-        warnings=[
-            *(warning for recording in recordings for warning in recording.warnings),
-            *_remarks(document, times, members),
-        ],
+        warnings=_warnings(document, times, members),
+        notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, times)],
         sources=[source, *(recording.source for recording in recordings)],
     )
 
@@ -214,9 +212,14 @@ def _check_lasting(document: TrajectoryFile, times: Times, file: str, joint_name
         raise InputError(Problem(file, 0, problem.in_file(joint_names)) for problem in problems)
 
 
-def _remarks(document: TrajectoryFile, times: Times, joints: Mapping[str, str]) -> Iterator[str]:
+def _warnings(document: TrajectoryFile, times: Times, joints: Mapping[str, str]) -> Iterator[str]:
     for key, course in document.declared.items():
-        yield from (f"{key}: {remark}" for remark in course.remarks_over(times.span, joints))
+        yield from (f"{key}: {warning}" for warning in course.warnings_over(times.span, joints))
+
+
+def _notes(document: TrajectoryFile, times: Times) -> Iterator[str]:
+    for key, course in document.declared.items():
+        yield from (f"{key}: {note}" for note in course.notes_over(times.span))
 
 
 def _wrench(

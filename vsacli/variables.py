@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from vsacli import units
 from vsacli.arrays import AnyArray, FlagArray, FloatArray
 from vsacli.errors import InputError, Problem
+from vsacli.records import NamedTuple, dataclass
 from vsacli.suggestions import did_you_mean
 from vsacli.units import Quantity
 from vsacli.wrench import wrench_columns
@@ -33,6 +33,7 @@ class Variable(NamedTuple):
         long_name: a few words.
         equation: number in Buondonno & De Luca (2016), or where the value comes from.
         actuators: the types of actuator whose joints have it; at the others it is NaN.
+        geared: the power of a motor's gear ratio by which the value is larger on the motor's shaft.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Variable(NamedTuple):
     long_name: str
     equation: str
     actuators: tuple[str, ...] = EVERY_ACTUATOR
+    geared: int = 0
 
 
 def _variable(
@@ -50,6 +52,7 @@ def _variable(
     equation: str,
     default: Any = dataclasses.MISSING,
     actuators: tuple[str, ...] = EVERY_ACTUATOR,
+    geared: int = 0,
 ) -> Any:
     metadata = {
         "dims": dims,
@@ -57,6 +60,7 @@ def _variable(
         "long_name": long_name,
         "equation": equation,
         "actuators": actuators,
+        "geared": geared,
     }
     return dataclasses.field(default=default, kw_only=True, metadata=metadata)
 
@@ -67,8 +71,10 @@ def _of_joint(
     return _variable(("joint",), quantity, long_name, equation, actuators=actuators)
 
 
-def _of_motor(quantity: Quantity, long_name: str, equation: str, default: Any = dataclasses.MISSING) -> Any:
-    return _variable(("joint", "motor"), quantity, long_name, equation, default)
+def _of_motor(
+    quantity: Quantity, long_name: str, equation: str, default: Any = dataclasses.MISSING, geared: int = 0
+) -> Any:
+    return _variable(("joint", "motor"), quantity, long_name, equation, default, geared=geared)
 
 
 def _of_wrench(quantity: Quantity, long_name: str) -> Any:
@@ -112,13 +118,15 @@ class Block:
 
     phi: FloatArray = _of_motor(units.POSITION, "deflection theta - q of each transmission", "(61)")
     dphi: FloatArray = _of_motor(units.VELOCITY, "deflection rate", "(68)")
-    theta: FloatArray = _of_motor(units.POSITION, "motor position, joint side of the gear", "(69)")
-    dtheta: FloatArray = _of_motor(units.VELOCITY, "motor velocity, joint side of the gear", "(69)")
+    theta: FloatArray = _of_motor(units.POSITION, "motor position, joint side of the gear", "(69)", geared=1)
+    dtheta: FloatArray = _of_motor(units.VELOCITY, "motor velocity, joint side of the gear", "(69)", geared=1)
     ddtheta: FloatArray = _of_motor(
-        units.JOINT_ACCELERATION, "motor acceleration, joint side of the gear", "(72)"
+        units.JOINT_ACCELERATION, "motor acceleration, joint side of the gear", "(72)", geared=1
     )
     tau_spring: FloatArray = _of_motor(units.TORQUE, "torque of each transmission", "(62)")
-    tau_motor: FloatArray = _of_motor(units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)")
+    tau_motor: FloatArray = _of_motor(
+        units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)", geared=-1
+    )
 
     elastic_energy: FloatArray = _of_joint(
         units.ENERGY, "energy in the springs of the joint", "integral of (62)"

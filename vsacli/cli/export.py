@@ -20,9 +20,9 @@ from vsacli.errors import StorageError
     short_help="Write motor torques, or other variables, as CSV.",
     epilog=example("vsacli export result.h5 --rate 250 -o torques.csv"),
 )
-@click.argument("result")
+@click.argument("file")
 @click.option("-o", "--output", metavar="FILE", help="CSV file; by default standard output.")
-@variables_option("tau_motor")
+@variables_option("tau_motor, of a simulation q_actual, stiffness_actual, tau_motor_actual")
 @click.option(
     "--rate", metavar="HZ", type=float, help="Samples per second, a whole fraction of the stored rate."
 )
@@ -37,7 +37,7 @@ from vsacli.errors import StorageError
 @overwrite_option
 @talk_options
 def export(
-    result: str,
+    file: str,
     output: str | None,
     variables: tuple[str, ...] | None,
     rate: float | None,
@@ -46,7 +46,10 @@ def export(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Write variables of a RESULT as CSV: the motor torques to send, by default.
+    """Write variables of a result or a simulation as CSV.
+
+    By default these are the motor torques to send; of a simulation, motion, stiffness and motor torques as
+    they were.
 
     Refuses samples that have no value (infeasible or singular steps) with exit code 3 and writes nothing,
     unless --allow-nan.
@@ -54,21 +57,19 @@ def export(
     With --side motor, motion and torque of the motors are those of their shafts, in rad and N m at any joint;
     every motor needs a gear_ratio in the robot file. What is not of a motor stays as it is.
     """
-    from vsacli.export import DEFAULT_VARIABLES, UndefinedSamplesError, export_csv, export_csv_file
-    from vsacli.store.reader import open_result
+    from vsacli.export import UndefinedSamplesError, export_csv, export_csv_file
+    from vsacli.store.simulation import open_stored
 
     options: dict[str, Any] = {"rate": rate, "allow_nan": allow_nan, "side": side}
     try:
-        with open_result(result) as stored:
+        with open_stored(file) as stored:
             talk.detail(described(stored))
             if output is None:
-                export_csv(stored, _stdout(), variables or DEFAULT_VARIABLES, **options)
+                export_csv(stored, _stdout(), variables, **options)
                 sys.stdout.flush()
             else:
-                refuse_input_as_output(Path(output), [result])
-                export_csv_file(
-                    stored, output, variables or DEFAULT_VARIABLES, overwrite=overwrite, **options
-                )
+                refuse_input_as_output(Path(output), [file])
+                export_csv_file(stored, output, variables, overwrite=overwrite, **options)
                 talk.note(f"wrote {output}")
     except UndefinedSamplesError as error:
         tell(str(error))

@@ -26,10 +26,10 @@ def info(file: str, robot: str | None, as_json: bool, field: str | None) -> None
     """Show what a FILE holds: a robot, a trajectory, a result or a simulation.
 
     Of a robot, Denavit-Hartenberg rows, links, actuators, reach, static load and reachable stiffness; of a
-    trajectory, ranges and peaks; of a result, provenance, variables and report.
+    trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report.
     """
     from vsacli.info import bare, describe_file, render, select
-    from vsacli.report import finite
+    from vsacli.plain import finite
 
     description = describe_file(file, robot)
     if field is not None:

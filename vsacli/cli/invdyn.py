@@ -83,9 +83,9 @@ def invdyn(
     from vsacli.variables import VARIABLES
 
     if plot_folder is not None:
-        from vsacli.plots import check_figures, drawable_figures
+        from vsacli.plots import RESULT_DRAWINGS, check_figures, drawable_figures
 
-        drawn = drawable_figures(VARIABLES if variables is None else variables)
+        drawn = drawable_figures(RESULT_DRAWINGS, VARIABLES if variables is None else variables)
         check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)
     writer = ResultWriter(
         path, *inputs, variables, overwrite=overwrite, command_line=shlex.join(["vsacli", *sys.argv[1:]])
@@ -102,7 +102,7 @@ def invdyn(
     code = show_report(report, as_json)
     talk.note(f"wrote {path}")
     if plot_folder is not None:
-        from vsacli.cli.plot import draw_result
+        from vsacli.cli.plot import draw_file
 
-        draw_result(path, Path(plot_folder), "png", overwrite, talk)
+        draw_file(path, Path(plot_folder), "png", overwrite, talk)
     return code

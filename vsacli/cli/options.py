@@ -20,7 +20,7 @@ def _split(_context: click.Context, _parameter: click.Parameter, text: str | Non
 def hdf5_name(_context: click.Context, _parameter: click.Parameter, name: str | None) -> str | None:
     """A callback for the name of an HDF5 file to write: not one that promises CSV."""
     if name is not None and name.lower().endswith(".csv"):
-        raise click.BadParameter(f"{name!r}: the file is HDF5; `vsacli export` makes CSV of invdyn results")
+        raise click.BadParameter(f"{name!r}: the file is HDF5; `vsacli export` makes CSV of it")
     return name
 
 

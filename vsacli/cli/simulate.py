@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from vsacli.simulation import Setup
     from vsacli.simulation.report import SimulationReport
     from vsacli.spec.source import Source
-    from vsacli.store.simulation import SimulationWriter
+    from vsacli.store.simulation_writer import SimulationWriter
     from vsacli.trajectory import Trajectory
 
 PROGRESS_STEPS = 1000
@@ -100,7 +100,7 @@ def _numbers(_context: click.Context, _parameter: click.Parameter, written: str)
     help="Result; by default ROBOT-TRAJECTORY-simulation.h5 in this folder.",
 )
 @click.option(
-    "--plot", "plot_folder", metavar="FOLDER", help="Also draw figures of the errors there, as png."
+    "--plot", "plot_folder", metavar="FOLDER", help="Also draw the figures of `vsacli plot` there, as png."
 )
 @json_option
 @overwrite_option
@@ -127,19 +127,22 @@ def simulate(
     setup, sources = _setup(inputs[0], **choices)
     recorded = replace(inputs[0], sources=(*inputs[0].sources, *sources))
     refuse_input_as_output(path, (source.path for source in (*recorded.sources, *inputs[1].sources)))
-    from vsacli.store.simulation import SimulationWriter
+    from vsacli.store.simulation_writer import SimulationWriter
 
     if plot_folder is not None:
-        from vsacli.plots import SIMULATION_FIGURES, check_figures
+        from vsacli.plots import check_figures, simulation_drawings
 
-        check_figures(SIMULATION_FIGURES, plot_folder, path.stem, overwrite=overwrite)
+        drawn = simulation_drawings(joint.actuator_type for joint in inputs[0].joints)
+        check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)
     command_line = shlex.join(["vsacli", *sys.argv[1:]])
     writer = SimulationWriter(path, recorded, inputs[1], overwrite=overwrite, command_line=command_line)
     report = _run(*inputs, setup, writer, talk)
     code = _show(report, as_json)
     talk.note(f"wrote {path}")
     if plot_folder is not None:
-        _draw(path, Path(plot_folder), overwrite, talk)
+        from vsacli.cli.plot import draw_file
+
+        draw_file(path, Path(plot_folder), "png", overwrite, talk)
     return code
 
 
@@ -213,13 +216,3 @@ def _show(report: SimulationReport, as_json: bool) -> Exit:
 
     click.echo(json.dumps(report.as_json(), indent=1) if as_json else render(report))
     return Exit.OK if report.verdict == "ok" else Exit.VERDICT
-
-
-def _draw(path: Path, folder: Path, overwrite: bool, talk: Talk) -> None:
-    from vsacli.plots import plot_simulation, save_figures
-    from vsacli.store.simulation import StoredSimulation
-
-    with StoredSimulation.open(path) as simulation:
-        saved = save_figures(plot_simulation(simulation), folder, path.stem, overwrite=overwrite)
-    for figure in saved:
-        talk.note(f"wrote {figure}")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from vsacli import profiles, units
 from vsacli.courses.course import Course, Values, numbers
 from vsacli.courses.framed import Framed
 from vsacli.profiles import Constant
+from vsacli.records import dataclass
 from vsacli.spec.fields import POSITIVE, PerJoint, check_fields, value, vector
 
 

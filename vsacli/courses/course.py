@@ -43,13 +43,17 @@ class Course(ABC):
         except InputError as error:
             yield FieldProblem((), str(error))
 
-    def remarks_over(self, _span: tuple[float, float], _joints: Mapping[str, str], /) -> Iterator[str]:
-        """What the user should know about it over a span, in clauses.
+    def warnings_over(self, _span: tuple[float, float], _joints: Mapping[str, str], /) -> Iterator[str]:
+        """Why it may not be what was meant over a span, in clauses.
 
         Args:
             _span: in s.
             _joints: name and type of each.
         """
+        return iter(())
+
+    def notes_over(self, _span: tuple[float, float], /) -> Iterator[str]:
+        """What follows from it over a span, in s, that the user did not give, in clauses."""
         return iter(())
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from vsacli.records import dataclass
 from vsacli.spec.fields import choice
 from vsacli.wrench import WRENCH_FRAMES
 

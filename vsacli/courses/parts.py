@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -16,6 +15,7 @@ from vsacli.courses.sinusoids import PositionSinusoids
 from vsacli.courses.via_points import PositionVia
 from vsacli.errors import FieldProblem
 from vsacli.profiles import ClosedForm, Constant, RestToRest
+from vsacli.records import dataclass
 from vsacli.spec.fields import POSITIVE, PerJoint, check_fields, integer, number, value
 
 Position: TypeAlias = tuple[float, ...]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from vsacli import profiles, units
 from vsacli.courses import degrees
 from vsacli.courses.course import Course, Values, numbers
 from vsacli.courses.framed import Framed
 from vsacli.profiles import RestToRest
+from vsacli.records import dataclass
 from vsacli.spec.fields import POSITIVE, PerJoint, check_fields, integer, value, vector
 
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from vsacli.courses.framed import Framed
 from vsacli.fits import METHODS
+from vsacli.records import dataclass
 from vsacli.spec.fields import check_fields, choice, text
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
@@ -17,6 +16,7 @@ from vsacli.errors import FieldProblem, InvalidRecordError
 from vsacli.profiles import ClosedForm
 from vsacli.profiles.chain import Chain, Jump
 from vsacli.profiles.closed_form import LONGEST, SHORTEST
+from vsacli.records import dataclass
 from vsacli.spec.fields import Items, OneOf, check_fields, value
 
 
@@ -97,11 +97,17 @@ class PositionSequence(Course):
             here = tuple(profile.at(np.array(piece[1:]))[0, :, 0].tolist())
             yield part, profile
 
-    def remarks_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
+    def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
         """Those of the parts."""
         for part, profile in self._placed(span):
             if isinstance(part, Course):
-                yield from part.remarks_over(profile.span, joints)
+                yield from part.warnings_over(profile.span, joints)
+
+    def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
+        """Those of the parts."""
+        for part, profile in self._placed(span):
+            if isinstance(part, Course):
+                yield from part.notes_over(profile.span)
 
 
 def _elsewhere(jump: Jump, path: tuple[str | int, ...]) -> str:

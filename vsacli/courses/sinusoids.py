@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from vsacli import profiles, units
 from vsacli.courses.course import Course
 from vsacli.errors import FieldProblem
 from vsacli.profiles.sinusoids import Sinusoids
+from vsacli.records import dataclass
 from vsacli.spec.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, check_fields, number, value
 from vsacli.times import MAX_STEPS
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -13,6 +12,7 @@ from vsacli.courses.course import SAME_TIME, Course, Values, numbers
 from vsacli.courses.framed import Framed
 from vsacli.errors import FieldProblem
 from vsacli.profiles.chain import Chain, stepwise
+from vsacli.records import dataclass
 from vsacli.spec.fields import (
     NON_NEGATIVE,
     POSITIVE,

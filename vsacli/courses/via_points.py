@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
@@ -14,6 +13,7 @@ from vsacli.courses import degrees
 from vsacli.courses.course import Course, Values, numbers
 from vsacli.errors import FieldProblem
 from vsacli.profiles.via_points import ViaPoints, passing_shares
+from vsacli.records import dataclass
 from vsacli.spec.fields import NON_NEGATIVE, POSITIVE, Items, Number, PerJoint, check_fields, integer, value
 from vsacli.units import Quantity
 
@@ -96,11 +96,14 @@ class Via(Course):
             message = f"{fall}, but must stay positive; add a point there, or give other times"
             yield FieldProblem(("points",), message, joint)
 
-    def remarks_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
-        """Times that were derived, and where the spline goes far beyond its points."""
-        profile = self.over(span)
+    def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
+        """Times that were derived."""
         if self.times is None:
-            yield f"passes its via points at t = {_listed(profile.breakpoints.tolist())} s"
+            yield f"passes its via points at t = {_listed(self.over(span).breakpoints.tolist())} s"
+
+    def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
+        """Where the spline goes far beyond its points."""
+        profile = self.over(span)
         for name, joint_type, points, *extremes in zip(
             joints, joints.values(), np.transpose(profile.points), *profile.extremes(), strict=True
         ):

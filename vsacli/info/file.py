@@ -11,8 +11,7 @@ from vsacli.info.trajectory import describe_trajectory
 from vsacli.recognition import FileKind, recognise
 from vsacli.robot_file import load_robot
 from vsacli.stand_in import stand_in
-from vsacli.store.reader import open_result
-from vsacli.store.simulation import StoredSimulation
+from vsacli.store.simulation import open_stored
 from vsacli.trajectory_file import load_trajectory
 
 
@@ -31,12 +30,9 @@ def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
             return describe_robot(load_robot(path))
         case FileKind.TRAJECTORY | FileKind.TABLE:
             return _described_trajectory(path, robot_path)
-        case FileKind.RESULT as kind:
-            with open_result(path) as result:
-                return describe_result(result, kind.value)
-        case FileKind.SIMULATION as kind:
-            with StoredSimulation.open(path) as simulation:
-                return describe_result(simulation, kind.value)
+        case FileKind.RESULT | FileKind.SIMULATION:
+            with open_stored(path) as result:
+                return describe_result(result)
         case kind:
             expected = "a robot, a trajectory, a result or a simulation"
             raise InputError.one(f"is a file of the kind {kind.value}; expected {expected}", path)

@@ -8,18 +8,14 @@ from vsacli.store.reader import StoredResult
 from vsacli.units import Quantity
 
 
-def describe_result(result: StoredResult, kind: str) -> dict[str, Any]:
-    """A result as plain values: provenance, inputs with their SHA-256, variables, report.
-
-    Args:
-        result: an open file.
-        kind: "result" or "simulation".
+def describe_result(result: StoredResult) -> dict[str, Any]:
+    """A result or simulation as plain values: provenance, inputs with their SHA-256, variables, report.
 
     Raises:
         InputError: the file is damaged.
     """
     return {
-        "kind": kind,
+        "kind": result.kind,
         "robot": result.robot_name,
         "trajectory": result.trajectory_name,
         "verdict": result.verdict,

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from vsacli import report_text
+from vsacli.report import Report
 from vsacli.report_text import aligned
 from vsacli.units import POSITION, STIFFNESS, TORQUE
 
@@ -37,7 +39,7 @@ def _robot(robot: Description) -> Iterator[str]:
     yield "stiffness: reachable without load, and with the static load in either direction"
     if robot["held_at_zero"]:
         yield f"without position limits, and held at zero: {', '.join(robot['held_at_zero'])}"
-    yield from (f"warning: {warning}" for warning in robot["warnings"])
+    yield from report_text.remarks(robot["warnings"], ())
 
 
 def _geometry(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
@@ -88,7 +90,7 @@ def _trajectory(trajectory: Description) -> Iterator[str]:
     yield f"units: q {POSITION}, its k-th derivative per s^k; stiffness {STIFFNESS}"
     if "wrench" in trajectory:
         yield from _wrench(trajectory["wrench"])
-    yield from (f"warning: {warning}" for warning in trajectory["warnings"])
+    yield from report_text.remarks(trajectory["warnings"], trajectory["notes"])
 
 
 def _wrench(wrench: Description) -> Iterator[str]:
@@ -115,30 +117,20 @@ def _result(result: Description) -> Iterator[str]:
             for each in result["variables"]
         ]
     )
-    yield from ("", "report:", *_tree(result["report"], "  "))
+    yield from ("", _report(result["kind"], result["report"]))
 
 
-def _tree(content: Mapping[str, Any] | list[Any], indent: str) -> Iterator[str]:
-    """Nested values, one a line; lists of plain values on one line, entries of others by their names."""
-    for key, entry in content.items() if isinstance(content, Mapping) else _named(content):
-        if isinstance(entry, Mapping) or (isinstance(entry, list) and any(map(_nested, entry))):
-            yield f"{indent}{key}:"
-            yield from _tree(entry, indent + "  ")
-        else:
-            yield f"{indent}{key}: {_row(entry) if isinstance(entry, list) else _plain(entry)}"
+def _report(kind: str, report: Description) -> str:
+    """What the command that made the file printed."""
+    from vsacli.simulation import report_text as simulation_text
+    from vsacli.simulation.report import SimulationReport
 
-
-def _named(entries: list[Any]) -> Iterator[tuple[str, Any]]:
-    for number, entry in enumerate(entries, start=1):
-        match entry:
-            case {"name": str(name)}:
-                yield name, {key: value for key, value in entry.items() if key != "name"}
-            case _:
-                yield str(number), entry
-
-
-def _nested(entry: Any) -> bool:
-    return isinstance(entry, Mapping | list)
+    try:
+        if kind == "simulation":
+            return simulation_text.render(SimulationReport.from_json(report))
+        return report_text.render(Report.from_json(report))
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError):
+        return "its report has another form than this version writes; --json shows it"
 
 
 def _left(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
@@ -148,17 +140,8 @@ def _left(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
         yield "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
 
 
-def _row(values: Iterable[Any]) -> str:
-    return " ".join(map(_plain, values)) or "-"
-
-
-def _plain(value: Any) -> str:
-    match value:
-        case bool():
-            return "yes" if value else "no"
-        case float():
-            return _short(value)
-    return "-" if value is None else str(value)
+def _row(values: Iterable[float]) -> str:
+    return " ".join(map(_short, values))
 
 
 def _short(value: float) -> str:

@@ -37,6 +37,7 @@ def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> d
             for index, joint in enumerate(joint_names)
         ],
         "warnings": list(trajectory.warnings),
+        "notes": list(trajectory.notes),
     }
     if trajectory.wrench is not None:
         axes = {axis: _axis(ranges, index) for index, axis in enumerate(WRENCH_AXES)}

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from vsacli.plots.curves import Failures
-from vsacli.plots.figures import grouped_figure, motor_label
-from vsacli.plots.style import house_style
+from vsacli.plots.drawings import Drawing
+from vsacli.plots.grouped import MOTOR_LABELS, Label, grouped_figure
+from vsacli.store.reader import StoredResult
 from vsacli.store.simulation import StoredSimulation
 from vsacli.units import POSITION, STIFFNESS
-from vsacli.variables import MOTORS, existing
+from vsacli.variables import existing
 
 
-def plot_simulation(simulation: StoredSimulation) -> dict[str, Figure]:
-    """Draw the figures of a simulation by name, those of `SIMULATION_FIGURES`."""
-    with house_style():
-        failures = Failures.of(simulation)
-        return {
-            name: grouped_figure(simulation, failures, variable, labels)
-            for name, (variable, labels) in _FIGURES.items()
-            if np.any(existing(simulation.declared[variable], simulation.actuators))
-        }
+def simulation_drawings(actuators: Iterable[str]) -> dict[str, Drawing]:
+    """The figures of a simulation of joints with these types of actuators, by name."""
+    types = tuple(actuators)
+    return {
+        name: _drawing(variable, labels)
+        for name, (variable, labels) in _FIGURES.items()
+        if np.any(existing(StoredSimulation.declared[variable], types))
+    }
+
+
+def _drawing(variable: str, labels: Sequence[Label]) -> Drawing:
+    def draw(simulation: StoredResult, failures: Failures) -> Figure:
+        return grouped_figure(simulation, failures, variable, labels)
+
+    return Drawing((variable,), draw)
 
 
 def _position_error(joint_type: str) -> str:
@@ -35,11 +41,8 @@ def _stiffness_error(joint_type: str) -> str:
     return rf"stiffness error $\sigma - \sigma_d$ [{STIFFNESS.unit(joint_type)}]"
 
 
-_FIGURES: dict[str, tuple[str, list[Callable[[str], str]]]] = {
+_FIGURES: dict[str, tuple[str, Sequence[Label]]] = {
     "position-error": ("q_error", [_position_error]),
     "stiffness-error": ("stiffness_error", [_stiffness_error]),
-    "motor-torque": ("tau_motor_actual", [partial(motor_label, motor) for motor in MOTORS]),
+    "motor-torque": ("tau_motor_actual", MOTOR_LABELS),
 }
-
-SIMULATION_FIGURES = tuple(_FIGURES)
-"""Names of the figures of a simulation."""

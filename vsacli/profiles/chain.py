@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from vsacli.profiles.closed_form import ClosedForm
 from vsacli.profiles.constant import Constant
 from vsacli.profiles.rest_to_rest import RestToRest
 from vsacli.profiles.signals import Signal
+from vsacli.records import NamedTuple, dataclass
 from vsacli.times import stretch
 
 CONTINUOUS = 1e-9

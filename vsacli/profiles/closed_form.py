@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
 from vsacli.profiles.signals import Signal
+from vsacli.records import dataclass
 from vsacli.times import stretch
 
 SHORTEST, LONGEST = 1e-30, 1e30
@@ -38,6 +39,11 @@ class ClosedForm(ABC):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Nothing: a formula leaves no doubt."""
+        return ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Nothing: all that is given plays a part."""
         return ()
 
     @property

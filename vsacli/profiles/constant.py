@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vsacli.arrays import FloatArray
 from vsacli.profiles.closed_form import ClosedForm
+from vsacli.records import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
@@ -14,6 +13,7 @@ from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
 from vsacli.profiles.closed_form import ClosedForm
 from vsacli.profiles.degrees import DEGREES
+from vsacli.records import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)

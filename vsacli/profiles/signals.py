@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
+from vsacli.records import NamedTuple
 from vsacli.wrench import WRENCH_AXES, WRENCH_NAMES
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from vsacli.arrays import FloatArray
 from vsacli.errors import InputError
 from vsacli.profiles.chain import stepwise
 from vsacli.profiles.closed_form import ClosedForm
+from vsacli.records import dataclass
 
 RAMP_DEGREE = 9
 """Of the rise at both ends: its first four derivatives vanish there."""

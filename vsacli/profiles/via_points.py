@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +14,7 @@ from vsacli.errors import InputError
 from vsacli.profiles.closed_form import ClosedForm
 from vsacli.profiles.degrees import VIA_DEGREES
 from vsacli.profiles.taylor import taylor_series
+from vsacli.records import NamedTuple, dataclass
 
 SEAM = 1e-9
 """Largest jump between the expansions about two neighbouring points, relative to the peak of each derivative:

@@ -13,7 +13,7 @@ from vsacli.robot import Robot
 from vsacli.simulation.closed_loop import ClosedLoop
 from vsacli.simulation.ending import Ending
 from vsacli.simulation.integration import Course
-from vsacli.simulation.variables import COMMANDED, ERRORS, actual, error
+from vsacli.simulation_variables import COMMANDED, ERRORS, actual, error
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,10 +11,11 @@ from vsacli.arrays import FloatArray, by_joint
 from vsacli.energy import EnergyMeter, Flow, JointEnergy
 from vsacli.feasibility import excess, has, limit_checks
 from vsacli.flags import LIMITS, Flag
-from vsacli.report import VERDICTS, Worst, finite
+from vsacli.plain import Plain, finite, number, pair
+from vsacli.report import VERDICTS, Worst
 from vsacli.robot import Joint, Robot
 from vsacli.simulation.history import History
-from vsacli.simulation.variables import SIMULATION_VARIABLES, actual
+from vsacli.simulation_variables import SIMULATION_VARIABLES, actual
 
 FORMAT = "vsacli-simulation-report/1"
 
@@ -41,6 +42,11 @@ class Deviation:
         """Plain values."""
         return vars(self)
 
+    @classmethod
+    def from_json(cls, plain: Plain) -> Deviation:
+        """From what `as_json` gave, `finite`."""
+        return cls(*(number(plain[name]) for name in ("peak", "time", "final")))
+
 
 @dataclass(frozen=True)
 class JointTracking:
@@ -52,7 +58,6 @@ class JointTracking:
         q: deviation of the position, rad (m).
         stiffness: deviation of the stiffness, N m/rad (N/m).
         peak_tau_motor: largest |torque| that motors 1 and 2 gave, N m (N).
-        flags: every bit that a step has.
         steps_over_limit: how many steps have a limit exceeded.
         worst: the worst excess of each limit, by its name.
         energy: work of the motors, elastic energy, co-contraction.
@@ -63,7 +68,6 @@ class JointTracking:
     q: Deviation
     stiffness: Deviation
     peak_tau_motor: tuple[float, float]
-    flags: Flag
     steps_over_limit: int
     worst: dict[str, Worst]
     energy: JointEnergy
@@ -80,6 +84,20 @@ class JointTracking:
             "worst": {name: worst.as_json() for name, worst in self.worst.items()},
             "energy": self.energy.as_json(),
         }
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> JointTracking:
+        """From what `as_json` gave, `finite`."""
+        return cls(
+            name=plain["name"],
+            type=plain["type"],
+            q=Deviation.from_json(plain["q_error"]),
+            stiffness=Deviation.from_json(plain["stiffness_error"]),
+            peak_tau_motor=pair(plain["peak"]["tau_motor"]),
+            steps_over_limit=plain["steps"]["over_limit"],
+            worst={kind: Worst.from_json(kind, worst) for kind, worst in plain["worst"].items()},
+            energy=JointEnergy.from_json(plain["energy"]),
+        )
 
 
 def joint_trackings(robot: Robot, history: History) -> tuple[JointTracking, ...]:
@@ -113,7 +131,6 @@ def _tracking(joint: Joint, index: int, history: History, energy: JointEnergy) -
         q=Deviation.of(history.time, history.q_error[:, index]),
         stiffness=Deviation.of(history.time, history.stiffness_error[:, index]),
         peak_tau_motor=(first, second),
-        flags=Flag(int(np.bitwise_or.reduce(flags))),
         steps_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
         worst=_worst(joint, index, history),
         energy=energy,
@@ -140,6 +157,14 @@ def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
     return worst
 
 
+def verdict_on(history: History, *, complete: bool) -> str:
+    """The worst of `VERDICTS` that a flag of any step speaks for, or "diverged" if none explains the end."""
+    flags = Flag(int(np.bitwise_or.reduce(history.flags, axis=None)))
+    applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
+    worst = next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
+    return worst if complete or worst not in ("ok", "over_limit") else "diverged"
+
+
 @dataclass(frozen=True)
 class SimulationReport:
     """The verdict on a simulation.
@@ -150,9 +175,11 @@ class SimulationReport:
         controller: in words, as typed.
         samples: steps stored.
         duration: time from the first to the last step of the trajectory, s.
+        verdict: the worst of `VERDICTS` that applies, or "diverged"; see `verdict_on`.
         ending: why it ended early, as a sentence; None if it did not.
         evaluations: of the equations of motion.
-        warnings: what the user should know of the inputs.
+        warnings: why the inputs may not be what was meant.
+        notes: how they were understood, where that is not obvious.
         joints: one report a joint.
         with_full_state: deviation of q of each joint in the same run when the controller knows the full state
             at every instant; empty unless positions alone are measured.
@@ -163,26 +190,18 @@ class SimulationReport:
     controller: str
     samples: int
     duration: float
+    verdict: str
     ending: str | None
     evaluations: int
     joints: tuple[JointTracking, ...]
     warnings: tuple[str, ...]
+    notes: tuple[str, ...]
     with_full_state: tuple[Deviation, ...]
 
     @property
     def complete(self) -> bool:
         """Whether the run reached the end of the trajectory."""
         return self.ending is None
-
-    @property
-    def verdict(self) -> str:
-        """The worst of `VERDICTS` that applies, or "diverged"."""
-        flags = Flag(0)
-        for joint in self.joints:
-            flags |= joint.flags
-        applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
-        worst = next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
-        return worst if self.complete or worst not in ("ok", "over_limit") else "diverged"
 
     def as_json(self) -> dict[str, Any]:
         """Plain values for `json.dumps`; numbers that are not finite become None."""
@@ -199,8 +218,25 @@ class SimulationReport:
                 "ending": self.ending,
                 "evaluations": self.evaluations,
                 "warnings": list(self.warnings),
+                "notes": list(self.notes),
                 "joints": [joint.as_json() for joint in self.joints],
                 "with_full_state": [deviation.as_json() for deviation in self.with_full_state],
             }
         )
         return plain
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> SimulationReport:
+        """From what `as_json` gave, as a simulation file holds it.
+
+        Raises:
+            LookupError, TypeError, AttributeError, ValueError: it is no such report.
+        """
+        as_they_are = ("robot", "trajectory", "controller", "samples", "duration", "verdict", "ending")
+        return cls(
+            **{name: plain[name] for name in (*as_they_are, "evaluations")},
+            warnings=tuple(plain["warnings"]),
+            notes=tuple(plain.get("notes", ())),
+            joints=tuple(map(JointTracking.from_json, plain["joints"])),
+            with_full_state=tuple(map(Deviation.from_json, plain["with_full_state"])),
+        )

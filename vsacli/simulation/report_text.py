@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from vsacli.report import Worst
-from vsacli.report_text import QUANTITY_OF_LIMIT, WIDTH, aligned, energy_lines
+from vsacli.report_text import QUANTITY_OF_LIMIT, WIDTH, aligned, energy_lines, remarks
 from vsacli.simulation.report import JointTracking, SimulationReport
 from vsacli.units import POSITION, STIFFNESS, TORQUE, Quantity
 
@@ -19,7 +19,7 @@ def render(report: SimulationReport) -> str:
         [
             _headline(report),
             *aligned([HEADER, *map(_row, report.joints)]),
-            *(f"warning: {warning}" for warning in report.warnings),
+            *remarks(report.warnings, report.notes),
             *(_limit(joint, worst) for joint in report.joints for worst in joint.worst.values()),
             *([] if report.ending is None else [report.ending]),
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in report.joints]),

@@ -15,7 +15,7 @@ from vsacli.simulation.controllers import Feedforward, LinearizingFeedback
 from vsacli.simulation.history import History, history
 from vsacli.simulation.integration import Course, Integrator, Progress, Tolerances, continuous, sampled
 from vsacli.simulation.reference import Reference
-from vsacli.simulation.report import Deviation, SimulationReport, joint_trackings
+from vsacli.simulation.report import Deviation, SimulationReport, joint_trackings, verdict_on
 from vsacli.simulation.start import InitialError, start_state
 from vsacli.trajectory import Trajectory
 
@@ -87,9 +87,11 @@ def simulate(
         controller=setup.controller,
         samples=len(past.time),
         duration=trajectory.duration,
+        verdict=verdict_on(past, complete=course.ending is None),
         ending=None if course.ending is None else course.ending.described(robot.joint_names),
         evaluations=course.evaluations,
         warnings=(*robot.warnings, *trajectory.warnings),
+        notes=trajectory.notes,
         joints=joint_trackings(robot, past),
         with_full_state=_with_full_state(robot, trajectory, setup),
     )

@@ -50,7 +50,7 @@ def reporting_damage(path: str | Path) -> Iterator[None]:
         NotImplementedError,
     ) as error:
         reason = " ".join(str(error).split())[:200]
-        raise InputError.one(f"is damaged or truncated ({reason}); run invdyn again", path) from error
+        raise InputError.one(f"is damaged or truncated ({reason}); compute it again", path) from error
 
 
 def check_heaps(path: str | Path) -> None:

@@ -1,13 +1,13 @@
-"""Reading a result file."""
+"""Reading a result file, or a file of another format in the same layout."""
 
 from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import h5py
 import numpy as np
@@ -19,6 +19,7 @@ from vsacli.store.damage import bounded, check_heaps, own_dataset, reporting_dam
 from vsacli.store.schema import FORMAT, row_shape, storage_type
 from vsacli.variables import MOTORS, VARIABLES, Variable, select_variables
 
+EXPECTED = "expected a result file, as invdyn or simulate writes it"
 GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
 
 
@@ -26,6 +27,8 @@ class StoredResult:
     """An open result file; a context manager that closes it. A subclass reads another format.
 
     Attributes:
+        kind: what the file is called in sentences.
+        command: what writes such files.
         path: the file, as given.
         attributes: the root attributes, e.g. `created`, `command_line`, `versions`.
         robot_name, trajectory_name, verdict: as in the report.
@@ -40,7 +43,10 @@ class StoredResult:
     """
 
     format = FORMAT
+    kind = "result"
+    command = "invdyn"
     declared: Mapping[str, Variable] = VARIABLES
+    _to_get = "run invdyn again without --variables, or with {} among them"
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
@@ -50,17 +56,7 @@ class StoredResult:
             InputError: there is no such file, or it is not a complete file of the format this version reads.
             StorageError: the operating system refuses to read it, or another program is writing it.
         """
-        _check_signature(path)
-        with contextlib.ExitStack() as stack:
-            with reporting_damage(path):
-                check_heaps(path)
-                file = stack.enter_context(h5py.File(path, "r"))
-                found = file.attrs.get("format")
-            if found != cls.format:
-                raise InputError.one(_foreign(found, cls.format), path)
-            result = cls(path, file)
-            stack.pop_all()
-        return result
+        return open_one_of(path, cls)
 
     def __init__(self, path: str | Path, file: h5py.File) -> None:
         self.path = Path(path)
@@ -122,8 +118,7 @@ class StoredResult:
         """
         select_variables([name], self.declared)
         if name not in self._file:
-            message = f"holds no {name}; run invdyn again without --variables, or with {name} among them"
-            raise InputError.one(message, self.path)
+            raise InputError.one(f"holds no {name}; {self._to_get.format(name)}", self.path)
         with reporting_damage(self.path):
             values: FloatArray | FlagArray = self._file[name][start:stop]
         return values
@@ -155,6 +150,29 @@ class StoredResult:
         self.close()
 
 
+_Stored = TypeVar("_Stored", bound=StoredResult)
+
+
+def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
+    """Open a file of one of these kinds, whichever it is.
+
+    Raises:
+        InputError, StorageError: as `StoredResult.open`.
+    """
+    _check_signature(path)
+    with contextlib.ExitStack() as stack:
+        with reporting_damage(path):
+            check_heaps(path)
+            file = stack.enter_context(h5py.File(path, "r"))
+            found = _format(file)
+        kind = next((kind for kind in kinds if kind.format == found), None)
+        if kind is None:
+            raise InputError.one(_foreign(found, kinds), path)
+        stored = kind(path, file)
+        stack.pop_all()
+    return stored
+
+
 def open_result(path: str | Path) -> StoredResult:
     """Open a result file of `invdyn`; see `StoredResult.open`."""
     return StoredResult.open(path)
@@ -170,7 +188,11 @@ def stored_format(path: str | Path) -> str | None:
     with reporting_damage(path):
         check_heaps(path)
         with h5py.File(path, "r") as file:
-            found = file.attrs.get("format")
+            return _format(file)
+
+
+def _format(file: h5py.File) -> str | None:
+    found = file.attrs.get("format")
     return found if isinstance(found, str) else None
 
 
@@ -180,26 +202,27 @@ def _check_signature(path: str | Path) -> None:
         raise InputError.one("the path holds a NUL character", path)
     try:
         if Path(path).is_fifo():
-            raise InputError.one("is a pipe; expected a result file, as invdyn writes it", path)
+            raise InputError.one(f"is a pipe; {EXPECTED}", path)
         with Path(path).open("rb") as file:
             start = file.read(len(HDF5_SIGNATURE))
     except FileNotFoundError:
-        raise InputError.one(
-            "there is no such file; expected a result file, as invdyn writes it", path
-        ) from None
+        raise InputError.one(f"there is no such file; {EXPECTED}", path) from None
     except IsADirectoryError:
-        raise InputError.one("is a folder; expected a result file, as invdyn writes it", path) from None
+        raise InputError.one(f"is a folder; {EXPECTED}", path) from None
     except OSError as error:
         raise StorageError(path, f"cannot be read: {error.strerror}") from error
     if start != HDF5_SIGNATURE:
         kind = "is empty" if not start else "is not an HDF5 file"
-        raise InputError.one(f"{kind}; expected a result file, as invdyn writes it", path)
+        raise InputError.one(f"{kind}; {EXPECTED}", path)
 
 
-def _foreign(found: object, expected: str) -> str:
-    if not isinstance(found, str) or not found.startswith("vsacli-"):
-        return f"is an HDF5 file, but no result file: it has no attribute format = {expected!r}"
-    if found.partition("/")[0] != expected.partition("/")[0]:
-        kind, wanted = (name.partition("/")[0].removeprefix("vsacli-") for name in (found, expected))
-        return f"is a {kind} ({found}), expected a {wanted} ({expected})"
-    return f"has the format {found}, but this version reads {expected}; run invdyn again"
+def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:
+    if found is None or not found.startswith("vsacli-"):
+        expected = " or ".join(repr(kind.format) for kind in kinds)
+        return f"is an HDF5 file, but no result file: it has no attribute format = {expected}"
+    word = found.partition("/")[0].removeprefix("vsacli-")
+    for kind in kinds:
+        if word == kind.kind:
+            return f"has the format {found}, but this version reads {kind.format}; run {kind.command} again"
+    expected = " or ".join(f"a {kind.kind} ({kind.format})" for kind in kinds)
+    return f"is a {word} ({found}), expected {expected}"

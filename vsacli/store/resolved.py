@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from vsacli.motor import Motor
+from vsacli.records import NamedTuple
 from vsacli.robot import Robot
 from vsacli.spec.fields import (
     Choice,

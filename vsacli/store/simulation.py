@@ -1,30 +1,25 @@
-"""The simulation file: the layout of a result file, with the variables of a simulation."""
+"""Reading a simulation file, or whichever file a simulation or the inverse dynamics have left."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from pathlib import Path
 
-from vsacli.simulation.variables import SIMULATION_VARIABLES
-from vsacli.store.reader import StoredResult
-from vsacli.store.writer import ResultWriter
-from vsacli.trajectory import Trajectory
-from vsacli.variables import Variable, select_variables
+from vsacli.simulation_variables import SIMULATION_VARIABLES
+from vsacli.store.reader import StoredResult, open_one_of
 
 FORMAT = "vsacli-simulation/1"
-
-
-class SimulationWriter(ResultWriter):
-    """Writes a simulation file; the trajectory's samples are the most it can have."""
-
-    _format = FORMAT
-
-    @staticmethod
-    def _selected(names: Iterable[str] | None, _trajectory: Trajectory) -> tuple[Variable, ...]:
-        return select_variables(SIMULATION_VARIABLES if names is None else names, SIMULATION_VARIABLES)
 
 
 class StoredSimulation(StoredResult):
     """An open simulation file; a context manager that closes it."""
 
     format = FORMAT
+    kind = "simulation"
+    command = "simulate"
     declared = SIMULATION_VARIABLES
+    _to_get = "run simulate again"
+
+
+def open_stored(path: str | Path) -> StoredResult:
+    """Open a result or a simulation file, whichever it is; see `StoredResult.open`."""
+    return open_one_of(path, StoredResult, StoredSimulation)

@@ -14,8 +14,7 @@ from vsacli.spec.reading import read_document
 from vsacli.spec.table import read_table
 from vsacli.springs.table import MeasuredSpring
 from vsacli.stand_in import stand_in
-from vsacli.store.reader import StoredResult, open_result
-from vsacli.store.simulation import StoredSimulation
+from vsacli.store.simulation import open_stored
 from vsacli.trajectory import Trajectory
 from vsacli.trajectory_file import load_trajectory
 from vsacli.urdf.reading import read_urdf
@@ -74,7 +73,9 @@ def _trajectory(path: str, robots: Robots) -> Checked:
 
 def _described(path: str, trajectory: Trajectory, note: str) -> Checked:
     steps = f"{_count(trajectory.samples, 'step')} over {trajectory.duration:g} s"
-    return usable(path, f"trajectory {trajectory.name}, {steps}", trajectory.warnings, [note])
+    return usable(
+        path, f"trajectory {trajectory.name}, {steps}", trajectory.warnings, [*trajectory.notes, note]
+    )
 
 
 def _poles(path: str, robots: Robots) -> Checked:
@@ -133,24 +134,15 @@ def _urdf(path: str, _: Robots) -> Checked:
     return usable(path, f"URDF of {urdf.name}, {_count(len(urdf.joints), 'joint')}")
 
 
-def _result(path: str, _: Robots) -> Checked:
-    with open_result(path) as result:
-        return _read_through(path, "result", result)
-
-
-def _simulation(path: str, _: Robots) -> Checked:
-    with StoredSimulation.open(path) as simulation:
-        return _read_through(path, "simulation", simulation)
-
-
-def _read_through(path: str, word: str, result: StoredResult) -> Checked:
+def _stored(path: str, _: Robots) -> Checked:
     """Read every value once: damage inside the file shows only then."""
-    for name in result.variables:
-        for start in range(0, result.samples, BLOCK):
-            result.read(name, start, start + BLOCK)
-    result.provenance()
-    names = f"{result.robot_name}, {result.trajectory_name}"
-    return usable(path, f"{word} of {names}, {_count(result.samples, 'step')}, {result.verdict}")
+    with open_stored(path) as result:
+        for name in result.variables:
+            for start in range(0, result.samples, BLOCK):
+                result.read(name, start, start + BLOCK)
+        result.provenance()
+        names = f"{result.robot_name}, {result.trajectory_name}"
+        return usable(path, f"{result.kind} of {names}, {_count(result.samples, 'step')}, {result.verdict}")
 
 
 def _count(number: int, word: str) -> str:
@@ -163,6 +155,6 @@ _CHECKS: dict[FileKind, Callable[[str, Robots], Checked]] = {
     FileKind.POLES: _poles,
     FileKind.TABLE: _table,
     FileKind.URDF: _urdf,
-    FileKind.RESULT: _result,
-    FileKind.SIMULATION: _simulation,
+    FileKind.RESULT: _stored,
+    FileKind.SIMULATION: _stored,
 }

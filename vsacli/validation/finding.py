@@ -17,7 +17,7 @@ class Finding:
 
     Attributes:
         problem: what, and where.
-        severity: ERROR if the file cannot be used, WARNING if its content is doubtful, NOTE about the check.
+        severity: ERROR if the file cannot be used, WARNING if its content is doubtful, NOTE otherwise.
     """
 
     problem: Problem
