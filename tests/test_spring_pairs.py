@@ -20,7 +20,7 @@ from vsacli.actuation import solve_deflections
 from vsacli.arrays import FloatArray
 from vsacli.feasibility import TOUCHING, has, margin, reach_flags
 from vsacli.flags import Flag
-from vsacli.springs import SpringLaw, make_pair
+from vsacli.springs import SpringLaw, make_pair, search
 
 DRAWS = 400
 """Points on the two curves for each pair; about half of them lie on the branch."""
@@ -174,6 +174,19 @@ def test_demand_at_an_end_of_the_corridor_is_met_there(first: Spring, second: Sp
         sigma = law_1.stiffness(found.phi_1) + law_2.stiffness(found.phi_2)
         # At the end of a four-bar the rounding of the deflection shows, 1e-10.
         np.testing.assert_allclose(sigma, end[reachable], rtol=1e-9)
+
+
+@every_pair
+def test_demand_below_the_corridor_needs_no_bracketing(
+    monkeypatch: pytest.MonkeyPatch, first: Spring, second: Spring
+):
+    (law_1, curve_1), (law_2, curve_2) = first, second
+    tau_e = loads(np.random.default_rng(6), curve_1, curve_2)
+    monkeypatch.setattr(search, "_bracketed", None)  # what is called fails
+    found = make_pair(law_1, law_2).solve(tau_e, np.full_like(tau_e, 1e-9))
+    carried = found.lower > 1e-9
+    assert carried.any()
+    assert np.all(np.isfinite([found.phi_1[carried], found.phi_2[carried]]))
 
 
 @every_pair

@@ -21,7 +21,7 @@ from vsacli.springs.bracketing import bracketed_root
 from vsacli.springs.hardening import Hardening, sample_hardening
 from vsacli.springs.law import SpringLaw
 from vsacli.springs.mirrored import Mirrored
-from vsacli.springs.state import PairState
+from vsacli.springs.state import PairState, Sides
 
 RESOLVED = 1e-11
 """Relative change of tau_e between neighbouring points of a curve that rounding next to a peak does not make.
@@ -69,7 +69,8 @@ def _bows(
 ) -> Iterator[FloatArray]:
     """By the derivatives over tau_e along curves of equal hardening."""
     with np.errstate(all="ignore"):  # vertical at a birth, unknown without stiffness, and far away
-        slopes = along_equal_hardening(Balance(first, second).state(phi_1, phi_2))
+        state = Balance(first, second).state(phi_1, phi_2)
+        slopes = along_equal_hardening(state, state.rho)
         for phi, slope in zip((phi_1, phi_2), slopes[:2], strict=True):
             rise = phi[1] - phi[0]
             shares = slope * (tau_e[1] - tau_e[0])
@@ -77,10 +78,10 @@ def _bows(
             yield np.where(monotone, np.stack((shares[0] - rise, rise - shares[1])), 0.0)
 
 
-def along_equal_hardening(state: PairState) -> tuple[FloatArray, FloatArray, FloatArray]:
+def along_equal_hardening(state: PairState, rho: Sides) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Derivatives of phi_1 and phi_2 over tau_e where rho_1 - rho_2 is kept, and their common divisor."""
     one, two = state.one, state.two
-    rho_1, rho_2 = state.rho
+    rho_1, rho_2 = rho
     bend_1, bend_2 = one.eta / one.sigma - rho_1 * rho_1, two.eta / two.sigma - rho_2 * rho_2
     divisor = one.sigma * bend_2 + two.sigma * bend_1
     return bend_2 / divisor, bend_1 / divisor, divisor

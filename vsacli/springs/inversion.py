@@ -6,7 +6,7 @@ import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
 from vsacli.loops import Values, look_up, repeat
-from vsacli.springs.decoupling_matrix import Springs
+from vsacli.springs.decoupling_matrix import Springs, spring_state
 from vsacli.springs.law import SpringLaw
 
 MOST_STEPS = 200
@@ -35,7 +35,7 @@ def inverse(
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (phi, low, high, *_), (wanted,) = state, constants
-        spring = Springs(*law.derivatives(phi, 3))
+        spring = spring_state(law, phi)
         error = spring.tau - wanted
         low, high = np.where(error <= 0, phi, low), np.where(error >= 0, phi, high)
         with np.errstate(divide="ignore", invalid="ignore"):  # no stiffness at rest: halve the bracket
@@ -53,8 +53,8 @@ def inverse(
 
 def turned_to(torque: FloatArray, phi: FloatArray, spring: Springs) -> tuple[FloatArray, Springs]:
     """Of a law that is odd, from the size of its torque to the torque."""
-    tau, sigma, zeta, eta = spring
-    return np.copysign(phi, torque), Springs(np.copysign(tau, torque), sigma, np.copysign(zeta, torque), eta)
+    tau, zeta = np.copysign(spring.tau, torque), np.copysign(spring.zeta, torque)
+    return np.copysign(phi, torque), spring._replace(tau=tau, zeta=zeta)
 
 
 class FirstGuess:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from vsacli.arrays import FloatArray
 from vsacli.spec.fields import POSITIVE_OR_INFINITE, check_fields, number
 from vsacli.spec.source import Source
-from vsacli.springs.decoupling_matrix import Springs
+from vsacli.springs.decoupling_matrix import Springs, spring_state
 from vsacli.springs.pair import Pair
 from vsacli.units import POSITION
 
@@ -83,11 +83,11 @@ class SpringLaw(ABC):
     def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
         """Deflection under a torque and the spring there; for laws that find both in one."""
         phi = self.deflection(torque)
-        return phi, Springs(*self.derivatives(phi, 3))
+        return phi, spring_state(self, phi)
 
     def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
         """Energy and all derivatives; for laws in which they share work."""
-        return self.energy(phi), Springs(*self.derivatives(phi, 3))
+        return self.energy(phi), spring_state(self, phi)
 
     @abstractmethod
     def torque(self, phi: FloatArray) -> FloatArray:

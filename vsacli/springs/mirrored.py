@@ -43,13 +43,13 @@ class Mirrored(SpringLaw):
 
     def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
         """As the law under the opposite torque."""
-        phi, (tau, sigma, zeta, eta) = self.law.under(-torque)
-        return -phi, Springs(-tau, sigma, -zeta, eta)
+        phi, spring = self.law.under(-torque)
+        return -phi, _mirrored(spring)
 
     def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
         """Even and odd in turn."""
-        energy, (tau, sigma, zeta, eta) = self.law.loaded(-phi)
-        return energy, Springs(-tau, sigma, -zeta, eta)
+        energy, spring = self.law.loaded(-phi)
+        return energy, _mirrored(spring)
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Odd in the deflection."""
@@ -74,6 +74,10 @@ class Mirrored(SpringLaw):
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Odd in the torque."""
         return -self.law.deflection(-torque)
+
+
+def _mirrored(spring: Springs) -> Springs:
+    return spring._replace(tau=-spring.tau, zeta=-spring.zeta)
 
 
 def _turned(interval: tuple[float, float]) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from vsacli.springs.balance import Balance
 from vsacli.springs.bracketing import bracketed_root
 from vsacli.springs.decoupling_matrix import Springs
 from vsacli.springs.folds import Folds, along_equal_hardening
-from vsacli.springs.state import PairState
+from vsacli.springs.state import PairState, Sides
 
 CLOSE = 1e-5
 """Relative distance to a fold, in deflection and in stiffness, of which one step leaves rounding only.
@@ -36,10 +36,11 @@ def outermost_fold(balance: Balance, folds: Folds, tau_e: FloatArray) -> tuple[B
     (low, high), corners_1, corners_2, bows_1, bows_2 = (look_up(tuple(rows), cell) for rows in folds[1:])
     share = (tau_e - low) / (high - low)
     guess = balance.state(_along(share, *corners_1, *bows_1), _along(share, *corners_2, *bows_2))
-    steps = _step(guess, tau_e)
+    rho = guess.rho
+    steps = _step(guess, rho, tau_e)
     known = ~np.isnan(low)
     fold = where_needed(
-        known & ~_is_short(guess, *steps),
+        known & ~_is_short(guess, rho, steps),
         lambda *constants: _searched(balance, *constants),
         (tau_e, *_sorted(*corners_1), *_sorted(*corners_2)),
         guess.moved(*steps).values,
@@ -55,19 +56,18 @@ def _along(
     return start + share * (end - start + rest * (rest * first + share * last))
 
 
-def _step(state: PairState, tau_e: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
     """A Newton step on tau_1 + tau_2 = tau_e, rho_1 = rho_2, which keeps the first to the third order."""
     one, two = state.one, state.two
-    (rho_1, rho_2), (along_1, along_2, divisor) = state.rho, along_equal_hardening(state)
+    (rho_1, rho_2), (along_1, along_2, divisor) = rho, along_equal_hardening(state, rho)
     torque, apart = tau_e - state.torque, (rho_1 - rho_2) / divisor
     step_1, step_2 = torque * along_1 - apart * two.sigma, torque * along_2 + apart * one.sigma
     missed = state.torque_after(step_1, step_2) - tau_e
     return step_1 - missed * along_1, step_2 - missed * along_2
 
 
-def _is_short(state: PairState, step_1: FloatArray, step_2: FloatArray) -> BoolArray:
-    rho_1, rho_2 = state.rho
-    size_1, size_2 = np.abs(step_1), np.abs(step_2)
+def _is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
+    (rho_1, rho_2), (size_1, size_2) = rho, map(np.abs, steps)
     hardened = np.abs(rho_1) * size_1 + np.abs(rho_2) * size_2
     short: BoolArray = (hardened <= CLOSE) & (
         size_1 + size_2 <= CLOSE * (np.abs(state.phi_1) + np.abs(state.phi_2))
@@ -79,24 +79,18 @@ def _sorted(one: FloatArray, other: FloatArray) -> Values:
     return np.minimum(one, other), np.maximum(one, other)
 
 
-def _searched(
-    balance: Balance,
-    tau_e: FloatArray,
-    low_1: FloatArray,
-    high_1: FloatArray,
-    low_2: FloatArray,
-    high_2: FloatArray,
-) -> Values:
+def _searched(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> Values:
     """The fold within a box: by Newton's method from its middle, else by bracketing."""
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (phi_1, phi_2, _), (tau_e, low_1, high_1, low_2, high_2) = state, constants
-        step_1, step_2 = _step(balance.state(phi_1, phi_2), tau_e)
+        springs = balance.state(phi_1, phi_2)
+        step_1, step_2 = _step(springs, springs.rho, tau_e)
         change = (np.abs(step_1) + np.abs(step_2)) / (np.abs(phi_1) + np.abs(phi_2))
         moved = np.clip(phi_1 + step_1, low_1, high_1), np.clip(phi_2 + step_2, low_2, high_2)
         return (*moved, change), ~(change > LAST_STEP)
 
-    box = low_1, high_1, low_2, high_2
+    low_1, high_1, low_2, high_2 = box
     middle = (low_1 + high_1) / 2, (low_2 + high_2) / 2
     *found, change = repeat(step, (*middle, np.zeros_like(tau_e)), (tau_e, *box), MOST_STEPS)
     phi_1, phi_2 = where_needed(
@@ -105,15 +99,9 @@ def _searched(
     return balance.state(phi_1, phi_2).values
 
 
-def _bracketed(
-    balance: Balance,
-    tau_e: FloatArray,
-    low_1: FloatArray,
-    high_1: FloatArray,
-    low_2: FloatArray,
-    high_2: FloatArray,
-) -> Values:
+def _bracketed(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> Values:
     """The same by bracketing along the torque balance."""
+    low_1, high_1, low_2, high_2 = box
     first, second = balance.first.torque, balance.second.torque
     least = np.maximum(first(low_1), tau_e - second(high_2)) - tau_e / 2
     largest = np.minimum(first(high_1), tau_e - second(low_2)) - tau_e / 2

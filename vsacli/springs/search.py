@@ -111,19 +111,19 @@ def _towards_demand(balance: Balance, state: Values, constants: Values) -> tuple
     missing = demand - springs.stiffness
     step_1, step_2, error = _step(springs, tau_e, missing, sign)
     moved_1, moved_2 = phi_1 + step_1, phi_2 + step_2
-    met = demand == inner
     inside = (low_1 <= moved_1) & (moved_1 < high_1) & (low_2 < moved_2) & (moved_2 <= high_2)
     moved_1, moved_2, error = where_needed(
-        met | ~inside,
+        (demand == inner) | ~inside,
         _held_back,
-        (np.where(met, 0.0, 1.0), phi_1, phi_2, moved_1, moved_2, error, *ends),
+        (demand, inner, phi_1, phi_2, moved_1, moved_2, error, *ends),
         (moved_1, moved_2, error),
     )
     return (moved_1, moved_2, error), ~(error > NONE_LEFT)
 
 
 def _held_back(
-    going: FloatArray,
+    demand: FloatArray,
+    inner: FloatArray,
     phi_1: FloatArray,
     phi_2: FloatArray,
     moved_1: FloatArray,
@@ -138,8 +138,8 @@ def _held_back(
     """Where the step stays between the ends, or does not take place since the demand is met."""
     held_1 = _short_of(phi_1, _beyond(phi_1, moved_1, inner_1), outer_1, near > 0)
     held_2 = -_short_of(-phi_2, _beyond(-phi_2, -moved_2, -inner_2), -outer_2, near > 0)
-    met = going == 0
-    return np.where(met, phi_1, held_1), np.where(met, phi_2, held_2), going * error
+    met = demand == inner
+    return np.where(met, phi_1, held_1), np.where(met, phi_2, held_2), np.where(met, 0.0, error)
 
 
 def _size(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -10,6 +10,9 @@ from vsacli.arrays import FloatArray
 from vsacli.loops import Values
 from vsacli.springs.decoupling_matrix import Springs
 
+Sides = tuple[FloatArray, FloatArray]
+"""A quantity of side 1, and of side 2."""
+
 
 class PairState(NamedTuple):
     """Deflections of both sides and what their springs do there; arrays of one shape."""
@@ -42,7 +45,7 @@ class PairState(NamedTuple):
         return self.one.sigma + self.two.sigma
 
     @property
-    def rho(self) -> tuple[FloatArray, FloatArray]:
+    def rho(self) -> Sides:
         """Relative hardening of either spring."""
         return self.one.zeta / self.one.sigma, self.two.zeta / self.two.sigma
 
