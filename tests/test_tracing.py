@@ -52,7 +52,6 @@ ELEMENTWISE: dict[str, Callable[[Any, Any], Any]] = {
     "clip between values": lambda x, y: np.clip(x, y, 2 * y),
     "search": lambda x, _y: np.searchsorted(NODES, x, side="right"),
     "bits": lambda x, y: (x < y).astype(np.uint16) * np.uint16(4) | (y < 0).astype(np.uint16) * np.uint16(16),
-    "bits where": lambda x, y: np.where(x < y, np.uint16(8), np.uint16(0)),
     "any": lambda x, y: np.logical_or.reduce(np.stack([x < y, y < 0])),
     "hypot of NaN": lambda x, _y: np.hypot(x, np.nan),
     "sign of NaN": lambda x, _y: np.copysign(x, np.nan),

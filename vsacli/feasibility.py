@@ -132,7 +132,7 @@ def has(flags: FlagArray, bits: Flag) -> BoolArray:
 
 
 def _bit(flag: Flag, where: BoolArray) -> FlagArray:
-    return np.where(where, np.uint16(flag), np.uint16(0))
+    return where.astype(np.uint16) * np.uint16(flag)
 
 
 def _symmetric(bound: float) -> tuple[float, float]:

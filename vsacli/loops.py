@@ -2,7 +2,7 @@
 
 Everything else in the solvers is elementwise: NumPy functions, comparisons, `np.where`, and lookups in
 constant arrays with `np.searchsorted` and `look_up`. So one text computes blocks of samples, or is recorded
-as a program for a single one, for which the three functions here have another text.
+as a program for a single one, for which the functions here have another text.
 """
 
 from __future__ import annotations
@@ -45,12 +45,20 @@ def look_up(tables: Sequence[FloatArray], index: IndexArray) -> Values:
     return result
 
 
+def cell_of(position: FloatArray, count: int) -> IndexArray:
+    """Index of the cell in which a position lies, or of the nearest: of `count` of width 1 from zero on.
+
+    NaN lies in any.
+    """
+    result: IndexArray = finding_cell(position, count)
+    return result
+
+
 @singledispatch
 def repeating(_: Any, step: Step, state: Values, constants: Values, limit: int) -> Values:
     """`repeat` on NumPy arrays."""
-    shape = state[0].shape
-    state, constants = (tuple(values.ravel() for values in each) for each in (state, constants))
-    return tuple(values.reshape(shape) for values in _repeated(step, state, constants, limit))
+    found = _repeated(step, _flat(state), _flat(constants), limit)
+    return _shaped(found, state[0].shape)
 
 
 def _repeated(step: Step, state: Values, constants: Values, limit: int) -> Values:
@@ -78,11 +86,13 @@ def _kept(over: BoolArray, result: Values, latest: Values) -> Values:
 @singledispatch
 def branching(mask: Any, function: Function, arguments: Values, otherwise: Values) -> Values:
     """`where_needed` on NumPy arrays."""
-    if not mask.any():
+    samples = np.flatnonzero(mask)
+    if not samples.size:
         return otherwise
-    if mask.all():
+    if samples.size == mask.size:
         return function(*arguments)
-    return _put(otherwise, mask, function(*_taken(arguments, mask)))
+    found = _put(_flat(otherwise), samples, function(*_taken(_flat(arguments), samples)))
+    return _shaped(found, mask.shape)
 
 
 @singledispatch
@@ -91,11 +101,26 @@ def looking_up(index: Any, tables: Sequence[FloatArray]) -> Values:
     return tuple(table[index] for table in tables)
 
 
-def _taken(arrays: Values, samples: IndexArray | BoolArray) -> Values:
+@singledispatch
+def finding_cell(position: Any, count: int) -> IndexArray:
+    """`cell_of` on NumPy arrays."""
+    cell: IndexArray = np.fmin(np.fmax(position, 0), count - 1).astype(np.intp)
+    return cell
+
+
+def _flat(arrays: Values) -> Values:
+    return tuple(values.ravel() for values in arrays)
+
+
+def _shaped(arrays: Values, shape: tuple[int, ...]) -> Values:
+    return tuple(values.reshape(shape) for values in arrays)
+
+
+def _taken(arrays: Values, samples: IndexArray) -> Values:
     return tuple(values[samples] for values in arrays)
 
 
-def _put(arrays: Values, samples: IndexArray | BoolArray, latest: Values) -> Values:
+def _put(arrays: Values, samples: IndexArray, latest: Values) -> Values:
     result = tuple(np.array(values) for values in arrays)
     for values, each in zip(result, latest, strict=True):
         values[samples] = each

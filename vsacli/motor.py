@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 from vsacli import units
 from vsacli.errors import FieldProblem
@@ -61,7 +62,7 @@ class Motor:
             problems.append(FieldProblem(("gear_ratio",), reason))
         check_fields(self, *problems)
 
-    @property
+    @cached_property
     def at_joint(self) -> JointMotor:
         """What its joint has of it: inertia and damping times the ratio squared, torque times the ratio."""
         ratio = abs(self.gear_ratio or 1.0)

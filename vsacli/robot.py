@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import field
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -156,7 +157,7 @@ class Antagonistic:
             )
         check_fields(self, *problems)
 
-    @property
+    @cached_property
     def laws(self) -> tuple[SpringLaw, SpringLaw]:
         """The springs as they act on sides 1 and 2."""
         first, second = self.spring

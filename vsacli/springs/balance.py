@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
-from vsacli.springs.decoupling_matrix import spring_state
+from vsacli.springs.decoupling_matrix import Springs, spring_state
 from vsacli.springs.law import SpringLaw
 from vsacli.springs.state import PairState
 
@@ -22,6 +23,15 @@ class Balance:
 
     first: SpringLaw
     second: SpringLaw
+
+    @cached_property
+    def ends(self) -> tuple[tuple[Springs, ...], ...]:
+        """Each spring at the two ends of its domain; scalars, unknown where there is no end."""
+        with np.errstate(all="ignore"):
+            return tuple(
+                tuple(spring_state(law, np.array(phi)) for phi in law.domain)
+                for law in (self.first, self.second)
+            )
 
     def at(self, tau_e: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
         """phi_1 and phi_2 at a preload torque."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
 from vsacli.springs.balance import Balance
-from vsacli.springs.ends import LARGEST, SMALLEST, at_end, endless
+from vsacli.springs.ends import LARGEST, SMALLEST, at_end
 from vsacli.springs.folds import Folds
 from vsacli.springs.outermost import outermost_fold
 from vsacli.springs.state import PairState
@@ -56,11 +56,13 @@ def corridor(balance: Balance, folds: Folds, tau_e: FloatArray) -> Corridor:
     carried = least <= largest
     known, fold = outermost_fold(balance, folds, tau_e)
     critical = carried & known & ((tau_e != 0) | ((least < 0) & (largest > 0)))
-    springs = at_end(balance, SMALLEST, tau_e, carried & ~critical, fold)
-    outer = at_end(balance, LARGEST, tau_e, carried, endless(balance, tau_e))
+    springs = PairState.of(
+        at_end(balance, SMALLEST, tau_e, carried & ~critical, fold.values, lambda springs: springs.values)
+    )
+    outer = End(*at_end(balance, LARGEST, tau_e, carried, _endless(balance, tau_e), _end))
     return Corridor(
-        inner=_end(springs, carried),
-        outer=_end(outer, carried),
+        inner=_known(_end(springs), carried),
+        outer=_known(outer, carried),
         rising=outer.stiffness >= springs.stiffness,
         critical=critical,
         slack=balance.is_slack(tau_e, least),
@@ -68,5 +70,15 @@ def corridor(balance: Balance, folds: Folds, tau_e: FloatArray) -> Corridor:
     )
 
 
-def _end(springs: PairState, carried: BoolArray) -> End:
-    return End(springs.phi_1, springs.phi_2, np.where(carried, springs.stiffness, np.nan))
+def _end(springs: PairState) -> End:
+    return End(springs.phi_1, springs.phi_2, springs.stiffness)
+
+
+def _endless(balance: Balance, tau_e: FloatArray) -> End:
+    """What the springs come close to while the preload grows without end."""
+    phi_1, phi_2 = balance.first.domain[LARGEST], balance.second.domain[1 - LARGEST]
+    return End(*(np.full_like(tau_e, value) for value in (phi_1, phi_2, np.inf)))
+
+
+def _known(end: End, carried: BoolArray) -> End:
+    return end._replace(stiffness=np.where(carried, end.stiffness, np.nan))

@@ -28,15 +28,15 @@ class Springs(NamedTuple):
     def after(self, step: FloatArray) -> Springs:
         """After a short step, by Taylor's formula as far as the derivatives are known."""
         return Springs(
-            self.torque_after(step),
+            self.tau + step * self.sigma + self.bent(step),
             self.sigma + step * (self.zeta + step / 2 * self.eta),
             self.zeta + step * self.eta,
             self.eta,
         )
 
-    def torque_after(self, step: FloatArray) -> FloatArray:
-        """Torque after a short step, to the third order."""
-        return self.tau + step * (self.sigma + step / 2 * (self.zeta + step / 3 * self.eta))
+    def bent(self, step: FloatArray) -> FloatArray:
+        """By how much the torque leaves its tangent over a short step, to the third order."""
+        return step * step / 2 * (self.zeta + step / 3 * self.eta)
 
 
 def spring_state(law: SpringLaw, phi: FloatArray) -> Springs:

@@ -41,18 +41,17 @@ class Folds(NamedTuple):
         tau_e: torques at which the fold is at the corners, (2, cells); NaN where there is no fold.
         phi_1: deflections of side 1 there, (2, cells).
         phi_2: deflections of side 2 there, (2, cells).
-        bow_1: how the curve bows out of the straight line between the corners, (2, cells): the slope of
-            phi_1 over the share of the cell, at its first corner less that of the line, at its second the
-            line's less that; zero where a cubic with these slopes would turn around.
-        bow_2: the same of phi_2.
+        way_1: coefficients of the cubic, from the constant on, that phi_1 follows over the share of the cell,
+            (4, cells); a straight line where a cubic with the curve's slopes would turn around.
+        way_2: the same of phi_2.
     """
 
     edges: FloatArray
     tau_e: FloatArray
     phi_1: FloatArray
     phi_2: FloatArray
-    bow_1: FloatArray
-    bow_2: FloatArray
+    way_1: FloatArray
+    way_2: FloatArray
 
 
 def map_folds(first: SpringLaw, second: SpringLaw) -> Folds:
@@ -61,10 +60,10 @@ def map_folds(first: SpringLaw, second: SpringLaw) -> Folds:
     turned = _positive_folds(Mirrored(law=second), Mirrored(law=first))
     edges = np.concatenate((-turned[0][:0:-1], above[0]))
     tau_e, phi_1, phi_2 = np.concatenate((-turned[1][(0, 2, 1), ::-1, ::-1], above[1]), axis=-1)
-    return Folds(edges, tau_e, phi_1, phi_2, *_bows(first, second, tau_e, phi_1, phi_2))
+    return Folds(edges, tau_e, phi_1, phi_2, *_ways(first, second, tau_e, phi_1, phi_2))
 
 
-def _bows(
+def _ways(
     first: SpringLaw, second: SpringLaw, tau_e: FloatArray, phi_1: FloatArray, phi_2: FloatArray
 ) -> Iterator[FloatArray]:
     """By the derivatives over tau_e along curves of equal hardening."""
@@ -75,7 +74,8 @@ def _bows(
             rise = phi[1] - phi[0]
             shares = slope * (tau_e[1] - tau_e[0])
             monotone = np.all((shares / rise >= 0) & (shares / rise <= MONOTONE), axis=0)
-            yield np.where(monotone, np.stack((shares[0] - rise, rise - shares[1])), 0.0)
+            start, end = np.where(monotone, shares, rise)
+            yield np.stack((phi[0], start, 3 * rise - 2 * start - end, start + end - 2 * rise))
 
 
 def along_equal_hardening(state: PairState, rho: Sides) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -86,7 +86,7 @@ class FourBar(SpringLaw):
         """Deflection and spring by one iteration."""
         load = np.minimum(np.abs(torque), self.torque_range[1])
         low, high = np.zeros_like(load), np.full_like(load, self.domain[1])
-        start = np.clip(self._first_guess(load), low, high)
+        start = np.minimum(self._first_guess(load), high)
         return turned_to(torque, *inverse(self, load, low, high, start))
 
     @cached_property
@@ -121,8 +121,8 @@ class FourBar(SpringLaw):
             grown = 1 + 3 * squared
             beta.append(rate * beyond * grown)
         if order > 3:
-            rates = 2 * rate * rate
-            beta.append(beta[2] * (grown * (beyond + rates) + 3 * rates * (1 + squared)))
+            rates = 4 * rate * rate
+            beta.append(beta[2] * (grown * (beyond + rates) + rates))
         return beta
 
 

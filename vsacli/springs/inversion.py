@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
-from vsacli.loops import Values, look_up, repeat
+from vsacli.loops import Values, look_up, repeat, where_needed
 from vsacli.springs.decoupling_matrix import Springs, spring_state
 from vsacli.springs.law import SpringLaw
 
@@ -32,23 +32,49 @@ def inverse(
 
     The last step is so short that what was known before it tells what the spring is after it.
     """
+    with np.errstate(all="ignore"):  # without stiffness at rest, a step leads nowhere
+        phi, error, spring = _halley(law, torque, start)
+        met = _is_met(torque, error) & (phi >= low) & (phi <= high)
+        phi, *values = where_needed(
+            ~met,
+            lambda *known: _bracketed(law, *known),
+            (torque, low, high, start),
+            (phi, *spring.after(phi - start)),
+        )
+        return np.where(torque == 0, 0.0, phi), Springs(*values)
+
+
+def _halley(law: SpringLaw, torque: FloatArray, phi: FloatArray) -> tuple[FloatArray, FloatArray, Springs]:
+    """The deflection after a step, and the error of the torque and the spring before it."""
+    spring = spring_state(law, phi)
+    error = spring.tau - torque
+    newton = error / spring.sigma
+    bend = newton * spring.zeta / (2 * spring.sigma)
+    return phi - newton / np.minimum(np.maximum(1 - bend, 0.5), 2), error, spring
+
+
+def _is_met(torque: FloatArray, error: FloatArray) -> BoolArray:
+    met: BoolArray = np.abs(error) <= LAST_STEP * np.abs(torque)
+    return met
+
+
+def _bracketed(
+    law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
+) -> Values:
+    """The same from a start that is far away: by the same step where it stays in a shrinking bracket."""
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
-        (phi, low, high, *_), (wanted,) = state, constants
-        spring = spring_state(law, phi)
-        error = spring.tau - wanted
+        (phi, low, high, *_), (torque,) = state, constants
+        halley, error, spring = _halley(law, torque, phi)
         low, high = np.where(error <= 0, phi, low), np.where(error >= 0, phi, high)
-        with np.errstate(divide="ignore", invalid="ignore"):  # no stiffness at rest: halve the bracket
-            newton = error / spring.sigma
-            halley = phi - newton / np.clip(1 - newton * spring.zeta / (2 * spring.sigma), 0.5, 2)
         inside = (halley >= low) & (halley <= high)
-        met = inside & (np.abs(error) <= LAST_STEP * np.abs(wanted))
         following = np.where(inside, halley, (low + high) / 2)
+        met = inside & _is_met(torque, error)
         return (following, low, high, *spring.after(following - phi)), met | ~(low < high)
 
     low = np.where(np.isfinite(torque), low, np.nan)
     phi, _, _, *spring = repeat(step, (start, low, high, *[start] * 4), (torque,), MOST_STEPS)
-    return np.where(torque == 0, 0.0, phi), Springs(*spring)
+    return phi, *spring
 
 
 def turned_to(torque: FloatArray, phi: FloatArray, spring: Springs) -> tuple[FloatArray, Springs]:

@@ -24,12 +24,16 @@ class IteratedPair(Pair):
     second: SpringLaw
 
     @cached_property
+    def _balance(self) -> Balance:
+        return Balance(self.first, self.second)
+
+    @cached_property
     def _folds(self) -> Folds:
         return map_folds(self.first, self.second)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
         """Solve (14) for each sample; see `Pair.solve`."""
-        balance, folds = Balance(self.first, self.second), self._folds
+        balance, folds = self._balance, self._folds
         with np.errstate(all="ignore"):  # trial steps may lead anywhere, and are refused there
             ends = corridor(balance, folds, tau_e)
             lower = np.where(ends.rising, ends.inner.stiffness, ends.outer.stiffness)

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.arrays import FloatArray
-from vsacli.loops import Values, look_up
+from vsacli.arrays import FloatArray, IndexArray
+from vsacli.loops import Values, cell_of, look_up
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -39,24 +39,33 @@ class MeasuredCurve:
     """A curve made of a half on either side of zero, over the size of the deflection.
 
     Attributes:
-        edges: deflections between which the curve is one polynomial, (pieces + 1,), ascending.
+        domain: deflections at the ends.
+        pieces: how many polynomials there are below zero, and above; in either half equally wide.
         origins: sizes of deflection from which the polynomials count, (pieces,); zero next to zero, so that
             nothing cancels there.
         coefficients: of the energy, from the constant on, (powers, pieces).
         residual: the largest misfit in torque.
     """
 
-    edges: FloatArray
+    domain: tuple[float, float]
+    pieces: tuple[int, int]
     origins: FloatArray
     coefficients: FloatArray
     residual: float
 
     def __call__(self, phi: FloatArray, first: int, last: int) -> tuple[FloatArray, ...]:
         """Derivatives of the energy from one order, 0 or 1, to another, 4 at most."""
-        piece = np.searchsorted(self.edges[1:-1], phi, side="right")
-        origin, *coefficients = look_up(self._tables[first], piece)
+        origin, *coefficients = look_up(self._tables[first], self._piece(phi))
         sizes = _with_derivatives(coefficients, np.abs(phi) - origin, last - first)
         return tuple(np.copysign(size, phi) if order % 2 else size for order, size in enumerate(sizes, first))
+
+    def _piece(self, phi: FloatArray) -> IndexArray:
+        """The polynomial that holds; at an edge rounding may choose its neighbour, which is as good there."""
+        (low, high), (below, above) = self.domain, self.pieces
+        position = phi * (above / high)
+        if below:
+            position = below + np.where(phi < 0, phi * (-below / low), position)
+        return cell_of(position, below + above)
 
     @cached_property
     def _tables(self) -> tuple[Values, Values]:
@@ -108,15 +117,25 @@ def _knots(low: float, high: float, samples: int) -> FloatArray:
 
 
 def _curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> MeasuredCurve:
-    up = _energy(_above_zero(knots, weights), stiffness_at_rest)
-    down = _energy(_above_zero(-knots[::-1], weights[::-1]), stiffness_at_rest)
-    halves = [(up.x[:-1], up.c[::-1])]
-    edges = up.x
+    origins, coefficients = _half(knots, weights, stiffness_at_rest)
+    above = origins.size
     if knots[0] < 0:
-        halves.insert(0, (down.x[-2::-1], down.c[::-1, ::-1]))
-        edges = np.concatenate((-down.x[:0:-1], up.x))
-    origins, coefficients = zip(*halves, strict=True)
-    return MeasuredCurve(edges, np.concatenate(origins), np.hstack(coefficients), residual=math.nan)
+        down, turned = _half(-knots[::-1], weights[::-1], stiffness_at_rest)
+        origins = np.concatenate((down[::-1], origins))
+        coefficients = np.hstack((turned[:, ::-1], coefficients))
+    return MeasuredCurve(
+        domain=(float(knots[0]), float(knots[-1])),
+        pieces=(origins.size - above, above),
+        origins=origins,
+        coefficients=coefficients,
+        residual=math.nan,
+    )
+
+
+def _half(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> tuple[FloatArray, FloatArray]:
+    """Origins of the energy's polynomials above zero, and their coefficients from the constant on."""
+    energy = _energy(_above_zero(knots, weights), stiffness_at_rest)
+    return energy.x[:-1], energy.c[::-1]
 
 
 def _energy(spline: PPoly, stiffness_at_rest: float) -> PPoly:
@@ -127,12 +146,12 @@ def _energy(spline: PPoly, stiffness_at_rest: float) -> PPoly:
 
 
 def _above_zero(knots: FloatArray, weights: FloatArray) -> PPoly:
-    """The spline from its knot at zero on; from the last knot, if that is zero, it is never asked."""
+    """The spline from its knot at zero to the last; the other knots there enclose nothing."""
     from scipy.interpolate import PPoly
 
     whole = PPoly.from_spline((knots, weights, DEGREE))
-    first = min(int(np.searchsorted(whole.x, 0.0, side="right")) - 1, whole.c.shape[1] - 1)
-    return PPoly(whole.c[:, first:], whole.x[first:])
+    first = int(np.searchsorted(whole.x, 0.0, side="right")) - 1
+    return PPoly(whole.c[:, first:-DEGREE], whole.x[first:-DEGREE])
 
 
 def _times_deflection(curve: PPoly) -> PPoly:

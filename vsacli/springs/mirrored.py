@@ -36,10 +36,8 @@ class Mirrored(SpringLaw):
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Odd and even in turn."""
-        signs = (-1.0, 1.0, -1.0, 1.0)[: order + 1]
-        return tuple(
-            sign * value for sign, value in zip(signs, self.law.derivatives(-phi, order), strict=True)
-        )
+        values = self.law.derivatives(-phi, order)
+        return tuple(value if each % 2 else -value for each, value in enumerate(values))
 
     def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
         """As the law under the opposite torque."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.arrays import BoolArray, FloatArray
+from vsacli.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.loops import Values, look_up, repeat, where_needed
 from vsacli.springs.balance import Balance
 from vsacli.springs.bracketing import bracketed_root
@@ -32,28 +32,29 @@ def outermost_fold(balance: Balance, folds: Folds, tau_e: FloatArray) -> tuple[B
         nowhere = np.full_like(tau_e, np.nan)
         spring = Springs(*[nowhere] * len(Springs._fields))
         return np.zeros_like(tau_e, dtype=bool), PairState(nowhere, nowhere, spring, spring)
-    cell = np.searchsorted(folds.edges[1:-1], tau_e, side="right")
-    (low, high), corners_1, corners_2, bows_1, bows_2 = (look_up(tuple(rows), cell) for rows in folds[1:])
+    cell = _cell(folds, tau_e)
+    low, high, *ways = look_up((*folds.tau_e, *folds.way_1, *folds.way_2), cell)
     share = (tau_e - low) / (high - low)
-    guess = balance.state(_along(share, *corners_1, *bows_1), _along(share, *corners_2, *bows_2))
+    guess = balance.state(_cubic(share, *ways[:4]), _cubic(share, *ways[4:]))
     rho = guess.rho
     steps = _step(guess, rho, tau_e)
     known = ~np.isnan(low)
     fold = where_needed(
         known & ~_is_short(guess, rho, steps),
-        lambda *constants: _searched(balance, *constants),
-        (tau_e, *_sorted(*corners_1), *_sorted(*corners_2)),
+        lambda tau_e: _searched(balance, folds, tau_e),
+        (tau_e,),
         guess.moved(*steps).values,
     )
     return known, PairState.of(fold)
 
 
-def _along(
-    share: FloatArray, start: FloatArray, end: FloatArray, first: FloatArray, last: FloatArray
-) -> FloatArray:
-    """A cubic between two corners, with the bows that it has there."""
-    rest = 1 - share
-    return start + share * (end - start + rest * (rest * first + share * last))
+def _cell(folds: Folds, tau_e: FloatArray) -> IndexArray:
+    cell: IndexArray = np.searchsorted(folds.edges[1:-1], tau_e, side="right")
+    return cell
+
+
+def _cubic(x: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    return a + x * (b + x * (c + x * d))
 
 
 def _step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
@@ -62,8 +63,8 @@ def _step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
     (rho_1, rho_2), (along_1, along_2, divisor) = rho, along_equal_hardening(state, rho)
     torque, apart = tau_e - state.torque, (rho_1 - rho_2) / divisor
     step_1, step_2 = torque * along_1 - apart * two.sigma, torque * along_2 + apart * one.sigma
-    missed = state.torque_after(step_1, step_2) - tau_e
-    return step_1 - missed * along_1, step_2 - missed * along_2
+    bent = state.bent(step_1, step_2)
+    return step_1 - bent * along_1, step_2 - bent * along_2
 
 
 def _is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
@@ -75,12 +76,8 @@ def _is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
     return short
 
 
-def _sorted(one: FloatArray, other: FloatArray) -> Values:
-    return np.minimum(one, other), np.maximum(one, other)
-
-
-def _searched(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> Values:
-    """The fold within a box: by Newton's method from its middle, else by bracketing."""
+def _searched(balance: Balance, folds: Folds, tau_e: FloatArray) -> Values:
+    """The fold within the box of its cell: by Newton's method from its middle, else by bracketing."""
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (phi_1, phi_2, _), (tau_e, low_1, high_1, low_2, high_2) = state, constants
@@ -90,13 +87,18 @@ def _searched(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> Values:
         moved = np.clip(phi_1 + step_1, low_1, high_1), np.clip(phi_2 + step_2, low_2, high_2)
         return (*moved, change), ~(change > LAST_STEP)
 
-    low_1, high_1, low_2, high_2 = box
+    corners = look_up((*folds.phi_1, *folds.phi_2), _cell(folds, tau_e))
+    low_1, high_1, low_2, high_2 = box = (*_sorted(*corners[:2]), *_sorted(*corners[2:]))
     middle = (low_1 + high_1) / 2, (low_2 + high_2) / 2
     *found, change = repeat(step, (*middle, np.zeros_like(tau_e)), (tau_e, *box), MOST_STEPS)
     phi_1, phi_2 = where_needed(
         ~(change <= LAST_STEP), lambda *known: _bracketed(balance, *known), (tau_e, *box), tuple(found)
     )
     return balance.state(phi_1, phi_2).values
+
+
+def _sorted(one: FloatArray, other: FloatArray) -> Values:
+    return np.minimum(one, other), np.maximum(one, other)
 
 
 def _bracketed(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> Values:

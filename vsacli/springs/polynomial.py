@@ -38,21 +38,27 @@ class Polynomial(SpringLaw):
         """Whether all but the first coefficient vanish."""
         return len(self._coefficients) == 1
 
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Even power series, and odd ones in turn, which share the square."""
+        squared = phi * phi
+        even = [self._derivative(each, squared) for each in range(order + 1)]
+        return tuple(value if each % 2 else phi * value for each, value in enumerate(even))
+
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque c1 phi + c3 phi^3 + ..."""
-        return phi * self._derivative(0, phi)
+        return phi * self._derivative(0, phi * phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Stiffness, the first derivative."""
-        return self._derivative(1, phi)
+        return self._derivative(1, phi * phi)
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope, the second derivative."""
-        return phi * self._derivative(2, phi)
+        return phi * self._derivative(2, phi * phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Curvature, the third derivative."""
-        return self._derivative(3, phi)
+        return self._derivative(3, phi * phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Energy, the integral of the torque."""
@@ -74,15 +80,25 @@ class Polynomial(SpringLaw):
         high = reduce(np.minimum, bounds)
         return turned_to(torque, *inverse(self, load, np.zeros_like(load), high, start=high))
 
-    def _derivative(self, order: int, phi: FloatArray) -> FloatArray:
+    def _derivative(self, order: int, squared: FloatArray) -> FloatArray:
         """Derivative of the torque, without the factor phi that those of even order have."""
-        factors = [math.perm(2 * n + 1, order) * each for n, each in enumerate(self._coefficients)]
-        return _series(factors[order // 2 :], phi * phi)
+        return _series(self._factors[order], squared)
+
+    @cached_property
+    def _factors(self) -> list[list[float]]:
+        """Coefficients of each derivative."""
+        return [
+            [math.perm(2 * n + 1, order) * each for n, each in enumerate(self._coefficients)][order // 2 :]
+            for order in range(4)
+        ]
 
 
 def _series(coefficients: Sequence[float], x: FloatArray) -> FloatArray:
     """Power series from the constant on."""
-    result = np.zeros_like(x)
-    for coefficient in reversed(coefficients):
+    if not coefficients:
+        return np.zeros_like(x)
+    *lower, highest = coefficients
+    result = np.full_like(x, highest)
+    for coefficient in reversed(lower):
         result = result * x + coefficient
     return result

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from vsacli.arrays import BoolArray, FloatArray
@@ -34,14 +36,11 @@ def deflections_at(balance: Balance, piece: Corridor, tau_e: FloatArray, demand:
     """phi_1 and phi_2 where the piece has a stiffness, which lies within its ends; arrays (samples,)."""
     sign = np.where(piece.rising, 1.0, -1.0)
     inner, outer = piece.inner, piece.outer
-    scale = np.maximum(inner.stiffness, SMALL * demand)
-    excess = scale * _curved(sign * (demand - inner.stiffness) / scale)
     near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
-    start = _first_guess(piece, tau_e, sign, excess, near > 0)
     ends = inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near
     phi_1, phi_2, error = repeat(
         lambda state, constants: _towards_demand(balance, state, constants),
-        (*start, np.zeros_like(tau_e)),
+        (*_first_guess(piece, demand, sign, ends), np.zeros_like(tau_e)),
         (tau_e, demand, sign, inner.stiffness, *ends),
         MOST_STEPS,
     )
@@ -51,6 +50,19 @@ def deflections_at(balance: Balance, piece: Corridor, tau_e: FloatArray, demand:
         (tau_e, demand, inner.phi_1),
         (phi_1, phi_2),
     )
+
+
+def _first_guess(piece: Corridor, demand: FloatArray, sign: FloatArray, ends: Values) -> Values:
+    """From the inner end, as if the stiffness were quadratic along the curve of equal tau_e."""
+    springs, inner = piece.springs.kept_stiff(), piece.inner
+    scale = np.maximum(inner.stiffness, SMALL * demand)
+    excess = scale * _curved(sign * (demand - inner.stiffness) / scale)
+    course = _course(springs)
+    spread = np.where(excess > 0, 2 * sign * excess / course.steepness(sign * excess, sign), 0.0)
+    step_1, step_2 = course.share_1 * spread, -course.share_2 * spread
+    aside = _aside(springs, step_1, step_2, spread, demand)
+    held = inner.phi_1, inner.phi_2, inner.phi_1 + step_1 + aside, inner.phi_2 + step_2 + aside
+    return where_needed(~_inside(*held[2:], *ends), _held, (*held, *ends), held[2:])
 
 
 def _curved(excess: FloatArray) -> FloatArray:
@@ -65,81 +77,128 @@ def _curved(excess: FloatArray) -> FloatArray:
     return curved
 
 
-def _first_guess(
-    piece: Corridor, tau_e: FloatArray, sign: FloatArray, excess: FloatArray, near: BoolArray
-) -> Values:
-    """From the inner end, as if the stiffness were quadratic along the curve of equal tau_e."""
-    springs, outer = piece.springs.kept_stiff(), piece.outer
-    step_1, step_2, _ = _step(springs, tau_e, sign * excess, sign)
-    step_1, step_2 = (np.where(excess > 0, step, 0.0) for step in (step_1, step_2))
-    return (
-        _short_of(springs.phi_1, springs.phi_1 + step_1, outer.phi_1, near),
-        -_short_of(-springs.phi_2, -springs.phi_2 - step_2, -outer.phi_2, near),
+class _Course(NamedTuple):
+    """The stiffness along the curve of equal tau_e, over the spread phi_1 - phi_2; arrays (samples,).
+
+    Attributes:
+        share_1: of the spread, what side 1 moves up.
+        share_2: what side 2 moves down.
+        slope: first derivative of the stiffness.
+        bend: second derivative.
+    """
+
+    share_1: FloatArray
+    share_2: FloatArray
+    slope: FloatArray
+    bend: FloatArray
+
+    def steepness(self, missing: FloatArray, sign: FloatArray) -> FloatArray:
+        """Sum of the slopes before and after a growth of the stiffness."""
+        squared = self.slope * self.slope + 2 * self.bend * missing
+        return self.slope + sign * np.sqrt(np.maximum(squared, 0))
+
+
+def _course(springs: PairState) -> _Course:
+    one, two = springs.one, springs.two
+    total = springs.stiffness
+    share_1, share_2 = two.sigma / total, one.sigma / total
+    turn = (one.zeta + two.zeta) / total
+    return _Course(
+        share_1,
+        share_2,
+        slope=one.zeta * share_1 - two.zeta * share_2,
+        bend=(one.eta - turn * one.zeta) * share_1 * share_1
+        + (two.eta - turn * two.zeta) * share_2 * share_2,
     )
 
 
-def _step(
-    springs: PairState, tau_e: FloatArray, missing: FloatArray, sign: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Steps to tau_e and to a stiffness so much larger, of third order, and the relative error they leave."""
-    one, two = springs.one, springs.two
-    total, hardening = springs.stiffness, one.zeta + two.zeta
-    share_1, share_2 = two.sigma / total, one.sigma / total
-    slope = one.zeta * share_1 - two.zeta * share_2
-    turn = (two.zeta * share_2 + share_1 * slope) / total
-    bend = one.eta * share_1 * share_1 + two.eta * share_2 * share_2 - hardening * turn
-    shift = (tau_e - springs.torque) / total
-    lacking = missing - hardening * shift
-    steepness = slope + sign * np.sqrt(np.maximum(slope * slope + 2 * bend * lacking, 0))
-    spread = 2 * lacking / steepness
-    step_1, step_2 = shift + share_1 * spread, shift - share_2 * spread
-    demand, way = total + missing, np.abs(spread)
-    most = MOST_TURN * way
-    aside = np.clip((tau_e - springs.torque_after(step_1, step_2)) / demand, -most, most)
-    shifted = np.abs(shift)
-    change = np.abs(bend / steepness) * (way + shifted)
-    error = change * (change * np.abs(missing) / demand + shifted / _size(springs.phi_1, springs.phi_2))
-    return step_1 + aside, step_2 + aside, error
+def _aside(
+    springs: PairState, step_1: FloatArray, step_2: FloatArray, spread: FloatArray, stiffness: FloatArray
+) -> FloatArray:
+    """A further step of both sides to the curve of equal tau_e, which bends off its tangent."""
+    most = MOST_TURN * np.abs(spread)
+    return np.minimum(np.maximum(-springs.bent(step_1, step_2) / stiffness, -most), most)
 
 
 def _towards_demand(balance: Balance, state: Values, constants: Values) -> tuple[Values, BoolArray]:
     """A step of third order on (14)."""
     phi_1, phi_2, _ = state
     tau_e, demand, sign, inner, *ends = constants
-    low_1, high_1, high_2, low_2, _ = ends
     springs = balance.state(phi_1, phi_2)
-    missing = demand - springs.stiffness
-    step_1, step_2, error = _step(springs, tau_e, missing, sign)
-    moved_1, moved_2 = phi_1 + step_1, phi_2 + step_2
-    inside = (low_1 <= moved_1) & (moved_1 < high_1) & (low_2 < moved_2) & (moved_2 <= high_2)
+    step_1, step_2, error = _step(springs, tau_e, demand, sign)
+    moved = phi_1 + step_1, phi_2 + step_2
     moved_1, moved_2, error = where_needed(
-        (demand == inner) | ~inside,
+        (demand == inner) | ~_inside(*moved, *ends),
         _held_back,
-        (demand, inner, phi_1, phi_2, moved_1, moved_2, error, *ends),
-        (moved_1, moved_2, error),
+        (demand, inner, error, phi_1, phi_2, *moved, *ends),
+        (*moved, error),
     )
     return (moved_1, moved_2, error), ~(error > NONE_LEFT)
+
+
+def _step(
+    springs: PairState, tau_e: FloatArray, demand: FloatArray, sign: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Steps to tau_e and to the demand, and the relative error that they leave."""
+    course, total = _course(springs), springs.stiffness
+    missing = demand - total
+    shift = (tau_e - springs.torque) / total
+    lacking = missing - (springs.one.zeta + springs.two.zeta) * shift
+    steepness = course.steepness(lacking, sign)
+    spread = 2 * lacking / steepness
+    step_1, step_2 = shift + course.share_1 * spread, shift - course.share_2 * spread
+    aside = _aside(springs, step_1, step_2, spread, demand)
+    shifted, lacked = np.abs(shift), np.abs(missing) / demand
+    moved = shifted / _size(springs.phi_1, springs.phi_2)
+    change = np.abs(course.bend / steepness) * (np.abs(spread) + shifted) + lacked + moved
+    error = change * (change * lacked + moved)
+    return step_1 + aside, step_2 + aside, error
+
+
+def _inside(
+    phi_1: FloatArray,
+    phi_2: FloatArray,
+    inner_1: FloatArray,
+    outer_1: FloatArray,
+    inner_2: FloatArray,
+    outer_2: FloatArray,
+    _near: FloatArray,
+) -> BoolArray:
+    """Between the ends, and not at the outer one."""
+    inside: BoolArray = (inner_1 <= phi_1) & (phi_1 < outer_1) & (outer_2 < phi_2) & (phi_2 <= inner_2)
+    return inside
 
 
 def _held_back(
     demand: FloatArray,
     inner: FloatArray,
+    error: FloatArray,
+    phi_1: FloatArray,
+    phi_2: FloatArray,
+    *beyond: FloatArray,
+) -> Values:
+    """Where the step stays between the ends, or does not take place since the demand is met."""
+    held_1, held_2 = _held(phi_1, phi_2, *beyond)
+    met = demand == inner
+    return np.where(met, phi_1, held_1), np.where(met, phi_2, held_2), np.where(met, 0.0, error)
+
+
+def _held(
     phi_1: FloatArray,
     phi_2: FloatArray,
     moved_1: FloatArray,
     moved_2: FloatArray,
-    error: FloatArray,
     inner_1: FloatArray,
     outer_1: FloatArray,
     inner_2: FloatArray,
     outer_2: FloatArray,
     near: FloatArray,
 ) -> Values:
-    """Where the step stays between the ends, or does not take place since the demand is met."""
-    held_1 = _short_of(phi_1, _beyond(phi_1, moved_1, inner_1), outer_1, near > 0)
-    held_2 = -_short_of(-phi_2, _beyond(-phi_2, -moved_2, -inner_2), -outer_2, near > 0)
-    met = demand == inner
-    return np.where(met, phi_1, held_1), np.where(met, phi_2, held_2), np.where(met, 0.0, error)
+    """Where a step stays between the ends."""
+    return (
+        _short_of(phi_1, _beyond(phi_1, moved_1, inner_1), outer_1, near > 0),
+        -_short_of(-phi_2, _beyond(-phi_2, -moved_2, -inner_2), -outer_2, near > 0),
+    )
 
 
 def _size(one: FloatArray, other: FloatArray) -> FloatArray:

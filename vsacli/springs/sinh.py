@@ -26,18 +26,21 @@ class Sinh(SpringLaw):
         return SinhPair(self, other) if isinstance(other, Sinh) and other.a == self.a else None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Of the torque and the stiffness in turn."""
-        torque = self.torque(phi)
-        stiffness = self.stiffness(phi) if order > 0 else torque
+        """Of the torque and the stiffness in turn, from one exponential function."""
+        grown = np.expm1(np.abs(self.a * phi))
+        shrunk = 1 / (1 + grown)
+        half = self.k / 2 * grown
+        torque = np.copysign(half * (1 + shrunk), phi)
+        stiffness = self.a * (self.k + half * (1 - shrunk))
         return (torque, stiffness, self.a**2 * torque, self.a**2 * stiffness)[: order + 1]
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque k sinh(a phi)."""
-        return self.k * np.sinh(self.a * phi)
+        return self.derivatives(phi, 0)[0]
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Stiffness k a cosh(a phi)."""
-        return self.k * self.a * np.cosh(self.a * phi)
+        return self.derivatives(phi, 1)[1]
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Slope a^2 tau."""

@@ -57,9 +57,9 @@ class PairState(NamedTuple):
         )
         return self._replace(one=one, two=two)
 
-    def torque_after(self, step_1: FloatArray, step_2: FloatArray) -> FloatArray:
-        """Elastic torque after short steps, to the third order."""
-        return self.one.torque_after(step_1) + self.two.torque_after(step_2)
+    def bent(self, step_1: FloatArray, step_2: FloatArray) -> FloatArray:
+        """By how much the elastic torque leaves its tangent over short steps, to the third order."""
+        return self.one.bent(step_1) + self.two.bent(step_2)
 
     def moved(self, step_1: FloatArray, step_2: FloatArray) -> PairState:
         """After short steps, as `Springs.after`."""

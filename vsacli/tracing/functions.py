@@ -22,18 +22,15 @@ STRUCTURAL: frozenset[Callable[..., Any]] = frozenset(
 
 
 def _where(tape: Tape, truth: Any, a: Any, b: Any) -> Cells:
-    bits = all(np.asarray(argument).dtype.kind == "u" for argument in (a, b))
-    return each(lambda *entries: _choice(tape, *entries, bits=bits), truth, a, b)
+    if any(np.asarray(argument).dtype.kind == "u" for argument in (a, b)):
+        raise NotImplementedError("bits are recorded as set or not: truth.astype(numpy.uint16) * bits")
+    return each(lambda *entries: _choice(tape, *entries), truth, a, b)
 
 
-def _choice(tape: Tape, truth: Operand, a: Operand, b: Operand, *, bits: bool) -> Operand:
+def _choice(tape: Tape, truth: Operand, a: Operand, b: Operand) -> Operand:
     if not isinstance(truth, Symbol):
         return a if truth else b
-    if not bits:
-        return tape.record("where", truth, a, b)
-    if b != 0:
-        raise NotImplementedError("bits are recorded as set or not: numpy.where(truth, bits, 0)")
-    return tape.record("bits", truth, a)
+    return tape.record("where", truth, a, b)
 
 
 def _clip(tape: Tape, values: Any, low: Any, high: Any) -> Cells:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.loops import branching, looking_up, repeating
+from vsacli.loops import branching, finding_cell, looking_up, repeating
 from vsacli.tracing.array import TracedArray, cells_of
 from vsacli.tracing.operations import kind_of
 from vsacli.tracing.pruning import Listing
@@ -62,6 +62,12 @@ def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArr
     return tuple(
         _taken(index, Table(tuple(np.asarray(table, dtype=np.float64).tolist()))) for table in tables
     )
+
+
+@finding_cell.register(TracedArray)
+def find_cell_traced(position: Any, count: int) -> Any:
+    """`vsacli.loops.cell_of`: as many of the edges between the cells as the position is not below."""
+    return np.searchsorted(np.arange(1, count), position, side="right")
 
 
 def _taken(index: TracedArray, table: Table) -> TracedArray:

@@ -72,38 +72,47 @@ def pruned(inputs: Sequence[Symbol], operations: Sequence[Symbol], outputs: Sequ
 def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
     """A loop with the part of the state on which the wanted entries, and the end, depend."""
     (body, limit, numbers), *operands = symbol.operands
+    places = _places(numbers, wanted)
     live: set[int] = set()
-    while wanted - live:
-        live |= wanted
+    while places - live:
+        live |= places
         shorter = pruned(body.inputs, body.operations, [*_chosen(body.outputs, live), body.outputs[-1]])
-        wanted = {number for number in numbers if body.inputs[number].index in _used(shorter)}
+        places = {place for place in range(len(numbers)) if body.inputs[place].index in _used(shorter)}
     used = _used(shorter)
     inputs, given = [], []
-    for number, (inner, operand) in enumerate(zip(body.inputs, operands, strict=True)):
-        if number in live or (number >= len(numbers) and inner.index in used):
+    for place, (inner, operand) in enumerate(zip(body.inputs, operands, strict=True)):
+        if place in live or (place >= len(numbers) and inner.index in used):
             inputs.append(inner)
             given.append(operand)
-    loop = Loop(shorter._replace(inputs=tuple(inputs)), limit, tuple(sorted(live)))
+    loop = Loop(shorter._replace(inputs=tuple(inputs)), limit, tuple(_chosen(numbers, live)))
     return _like(symbol, [loop, *given])
 
 
 def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
     """A branch with the wanted outputs."""
     (body, numbers), truth, *operands = symbol.operands
-    shorter = pruned(body.inputs, body.operations, _chosen(body.outputs, wanted))
+    places = _places(numbers, wanted)
+    shorter = pruned(body.inputs, body.operations, _chosen(body.outputs, places))
     used = _used(shorter)
     arguments = [
         (inner, operand)
         for inner, operand in zip(body.inputs, operands[len(numbers) :], strict=True)
         if inner.index in used
     ]
-    branch = Branch(shorter._replace(inputs=tuple(inner for inner, _ in arguments)), tuple(sorted(wanted)))
+    branch = Branch(
+        shorter._replace(inputs=tuple(inner for inner, _ in arguments)), tuple(_chosen(numbers, places))
+    )
     given = [operand for _, operand in arguments]
-    return _like(symbol, [branch, truth, *_chosen(operands, wanted), *given])
+    return _like(symbol, [branch, truth, *_chosen(operands, places), *given])
 
 
-def _chosen(entries: Sequence[Any], numbers: Iterable[int]) -> list[Any]:
-    return [entries[number] for number in sorted(numbers)]
+def _places(numbers: Sequence[int], wanted: Iterable[int]) -> set[int]:
+    """Where results are among those that an earlier pruning has left, by their numbers."""
+    return {numbers.index(number) for number in wanted}
+
+
+def _chosen(entries: Sequence[Any], places: Iterable[int]) -> list[Any]:
+    return [entries[place] for place in sorted(places)]
 
 
 def _used(listing: Listing) -> set[int]:
