@@ -12,12 +12,14 @@ from drives import Stopped, lower_by_preload, motion, springs, with_joint, with_
 
 from robots import vsa_3r
 from vsacli import inverse_dynamics
+from vsacli.engine.engines import SAMPLES_PER_PASS
 from vsacli.feasibility import margin
 from vsacli.flags import LIMITS, Flag
 from vsacli.pipeline import Run
 from vsacli.report import Report
 from vsacli.robot import Antagonistic, Limits, Motor, Robot
 from vsacli.springs.cubic import Cubic
+from vsacli.steps import usual_block
 from vsacli.trajectory import Trajectory
 
 MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "det_A")
@@ -54,6 +56,12 @@ def test_results_do_not_depend_on_the_blocks():
             joined = np.concatenate([getattr(block, name) for block in blocks])
             np.testing.assert_array_equal(joined, getattr(whole, name), err_msg=name)
         assert run.report().as_json() == whole.report.as_json()
+
+
+def test_a_long_chain_is_taken_in_shorter_blocks():
+    assert usual_block(7) == usual_block(20) == SAMPLES_PER_PASS
+    assert 20 * SAMPLES_PER_PASS < 1000 * usual_block(1000) < 30 * SAMPLES_PER_PASS
+    assert usual_block(10**9) == 1
 
 
 def test_report_counts_and_dates_each_trouble():

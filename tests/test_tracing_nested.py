@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from listings import carry_out, recorded
 
-from vsacli.loops import look_up, repeat, where_needed
+from vsacli.loops import cell_of, look_up, repeat, where_needed
 from vsacli.tracing import Tape, TracedArray
 
 RNG = np.random.default_rng(3)
@@ -74,6 +74,26 @@ def nested(x: Any) -> Any:
     return list(where_needed(np.isfinite(x), function, (x,), (np.full_like(x, np.nan),)))
 
 
+def partly_used(x: Any) -> Any:
+    """Of the three results of a loop in a branch one is not looked at inside of it, and one not outside."""
+
+    def step(state: Any, constants: Any) -> Any:
+        (halved, idle, total), (x,) = state, constants
+        return (halved / 2, idle - x, total + halved), halved < 1
+
+    def function(y: Any) -> Any:
+        halved, _, total = repeat(step, (y, y, y + 1), (y,), 9)
+        return halved, total
+
+    _, total = where_needed(np.isfinite(x), function, (x,), (x, x))
+    return total
+
+
+def counted(x: Any) -> Any:
+    """Cells of one width."""
+    return look_up((TABLE,), cell_of(np.where(np.isnan(x), 0.0, x), len(TABLE)))
+
+
 def interpolated(x: Any) -> Any:
     """A table whose place is searched for, and clipped."""
     index = np.clip(np.searchsorted(NODES, x, side="right") - 1, 0, len(NODES) - 2)
@@ -82,7 +102,17 @@ def interpolated(x: Any) -> Any:
     return value + following * (x - node)
 
 
-FUNCTIONS = (square_root, swapped, handed_down, half_used, guarded, nested, interpolated)
+FUNCTIONS = (
+    square_root,
+    swapped,
+    handed_down,
+    half_used,
+    guarded,
+    nested,
+    partly_used,
+    counted,
+    interpolated,
+)
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
@@ -91,6 +121,11 @@ def test_a_program_does_for_each_sample_what_numpy_does_for_all(function: Any) -
         expected = function(X)
     found = carry_out(recorded(function, 1), [X])
     np.testing.assert_array_equal(np.array(found).reshape(-1, len(X)), np.array(expected).reshape(-1, len(X)))
+
+
+def test_a_position_lies_in_the_cell_that_begins_before_it() -> None:
+    positions = np.array([-np.inf, -0.1, 0.0, 0.9, 1.0, 3.5, 4.0, 7.0, np.inf])
+    np.testing.assert_array_equal(cell_of(positions, 5), [0, 0, 0, 0, 1, 3, 4, 4, 4])
 
 
 def test_the_loop_is_the_square_root() -> None:

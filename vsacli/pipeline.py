@@ -16,7 +16,7 @@ from vsacli.flags import Flag
 from vsacli.report import Report
 from vsacli.robot import Antagonistic, Robot
 from vsacli.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
-from vsacli.steps import InverseDynamics, check_fit, compute_block
+from vsacli.steps import InverseDynamics, check_fit, compute_block, usual_block
 from vsacli.tally import JointTally
 from vsacli.trajectory import Trajectory
 from vsacli.variables import Block
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from vsacli.drift import DriftTally
     from vsacli.following import Following
     from vsacli.result import Result
-
-BLOCK_SAMPLES = 8192
-"""Steps computed at a time: enough to hide the interpreter, few enough to bound the memory."""
 
 
 class Run:
@@ -39,7 +36,7 @@ class Run:
         stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does.
         near_singular: margin below which a step is near-singular.
         following: deflections to use, by `follow`, instead of the root of (14) at each step.
-        block_samples: steps in a block; results do not depend on it.
+        block_samples: steps in a block, as `usual_block` has it if None; results do not depend on it.
         engine: what computes, one of `vsacli.engine.NAMES`.
         threads: of compiled code; as many as there are processors if None.
 
@@ -59,7 +56,7 @@ class Run:
         stop_on_infeasible: bool = False,
         near_singular: float = NEAR_SINGULAR,
         following: Following | None = None,
-        block_samples: int = BLOCK_SAMPLES,
+        block_samples: int | None = None,
         engine: str = "numpy",
         threads: int | None = None,
     ) -> None:
@@ -69,7 +66,7 @@ class Run:
         self.trajectory = trajectory
         self._stop_on_infeasible = stop_on_infeasible
         self._near_singular = near_singular
-        self._block_samples = block_samples
+        self._block_samples = block_samples or usual_block(len(robot.joints))
         self._following = following
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
         kernel = InverseDynamics(robot, frame, near_singular, following is not None)

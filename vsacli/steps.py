@@ -12,7 +12,7 @@ import numpy as np
 from vsacli.actuation import Command, Drive, drive
 from vsacli.arrays import FloatArray, by_joint, over_time
 from vsacli.drivetrain import SIDES
-from vsacli.engine import NUMPY, Engine
+from vsacli.engine import NUMPY, Engine, samples_per_pass
 from vsacli.errors import InputError
 from vsacli.feasibility import NEAR_SINGULAR, LimitCheck, limit_checks
 from vsacli.motion import Motion
@@ -29,6 +29,11 @@ COMPUTED = (*TORQUES, *Drive._fields)
 """The variables that inverse dynamics computes."""
 
 STIFFNESS_NAMES = ("stiffness", "dstiffness", "ddstiffness")
+
+
+def usual_block(joints: int) -> int:
+    """Steps computed at a time: one pass of NumPy's, which hides the interpreter and bounds the memory."""
+    return samples_per_pass(joints * (len(MOTION_NAMES) + len(STIFFNESS_NAMES)))
 
 
 @dataclass(frozen=True)

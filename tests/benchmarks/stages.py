@@ -13,9 +13,9 @@ from timing import medians
 from vsacli import load_trajectory
 from vsacli.engine import choose
 from vsacli.newton_euler import LinkTorques, link_torques
-from vsacli.pipeline import BLOCK_SAMPLES, Run
+from vsacli.pipeline import Run
 from vsacli.robot import Robot
-from vsacli.steps import InverseDynamics, compute_block
+from vsacli.steps import InverseDynamics, compute_block, usual_block
 from vsacli.store.writer import ResultWriter
 from vsacli.times import UniformTimes
 from vsacli.trajectory import Trajectory
@@ -44,14 +44,15 @@ def trajectory_of(samples: int) -> Trajectory:
 def split(samples: int, repeats: int, engine: str) -> Stages:
     """Time what ends with each stage over the blocks of one run, in a single thread."""
     robot, trajectory = seven_joints(), trajectory_of(samples)
-    starts = range(0, trajectory.samples, BLOCK_SAMPLES)
-    motions = [trajectory.block(start, start + BLOCK_SAMPLES) for start in starts]
+    of_block = usual_block(len(robot.joints))
+    starts = range(0, trajectory.samples, of_block)
+    motions = [trajectory.block(start, start + of_block) for start in starts]
     blocks = list(Run(robot, trajectory))
     links = choose(engine, LinkTorques(robot), samples, threads=1).engine
     whole = choose(engine, InverseDynamics(robot), samples, threads=1).engine
 
     ways = {
-        "sample": lambda: [trajectory.block(start, start + BLOCK_SAMPLES) for start in starts],
+        "sample": lambda: [trajectory.block(start, start + of_block) for start in starts],
         "recur": lambda: [link_torques(robot, m.q, m.dq, m.ddq, m.d3q, m.d4q, engine=links) for m in motions],
         "compute": lambda: [compute_block(robot, m, engine=whole) for m in motions],
         "run": lambda: _run(Run(robot, trajectory, engine=engine, threads=1)),

@@ -12,9 +12,8 @@ from vsacli.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.feasibility import excess, has, limit_checks, limit_flags, margin
 from vsacli.flags import LIMITS, Flag
 from vsacli.motion import Motion
-from vsacli.pipeline import BLOCK_SAMPLES
 from vsacli.robot import Joint, Robot
-from vsacli.steps import command_of, compute_block, elastic_torques
+from vsacli.steps import command_of, compute_block, elastic_torques, usual_block
 from vsacli.suggest.wording import corridor_reason, limit_reason
 from vsacli.trajectory import Trajectory
 
@@ -33,8 +32,9 @@ class Acceptance:
 
     def refused_along(self, trajectory: Trajectory) -> Iterator[tuple[Motion, BoolArray]]:
         """All steps of a trajectory, block by block, and which of them are not accepted."""
-        for start in range(0, trajectory.samples, BLOCK_SAMPLES):
-            motion = trajectory.block(start, start + BLOCK_SAMPLES)
+        samples = usual_block(len(self.robot.joints))
+        for start in range(0, trajectory.samples, samples):
+            motion = trajectory.block(start, start + samples)
             yield motion, self.refused(motion)
 
     def refused_joints(self, trajectory: Trajectory) -> BoolArray:

@@ -12,8 +12,8 @@ from typing import TextIO
 import numpy as np
 
 from vsacli.errors import InputError
-from vsacli.pipeline import BLOCK_SAMPLES
 from vsacli.profiles import POSITION, STIFFNESS, WRENCH, Constant, RestToRest, Signal
+from vsacli.steps import usual_block
 from vsacli.store.atomic import AtomicFile, check_target, reporting_storage_errors
 from vsacli.trajectory import Profile, Trajectory
 from vsacli.trajectory_file import FORMAT
@@ -107,8 +107,9 @@ def _write_table(trajectory: Trajectory, joint_names: Sequence[str], stream: Tex
     headers = [np.array(_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *np.concatenate(headers).tolist()])
-    for start in range(0, trajectory.samples, BLOCK_SAMPLES):
-        motion = trajectory.block(start, start + BLOCK_SAMPLES)
+    samples = usual_block(len(joint_names))
+    for start in range(0, trajectory.samples, samples):
+        motion = trajectory.block(start, start + samples)
         variables = motion.variables()
         columns = [motion.time[:, None], *(variables[name][:, chosen.get(name, ...)] for name in names)]
         writer.writerows(np.concatenate(columns, axis=1).tolist())

@@ -11,10 +11,9 @@ import numpy.typing as npt
 from vsacli.actuation import Command
 from vsacli.arrays import FloatArray
 from vsacli.motion import Motion
-from vsacli.pipeline import BLOCK_SAMPLES
 from vsacli.profiles import STIFFNESS
 from vsacli.robot import Robot
-from vsacli.steps import command_of, elastic_torques
+from vsacli.steps import command_of, elastic_torques, usual_block
 from vsacli.trajectory import Trajectory
 
 IndexArray: TypeAlias = npt.NDArray[np.intp]
@@ -50,8 +49,9 @@ def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int]) -> list
     """
     instants = 2 * trajectory.samples - 1
     time, rows = np.empty(instants), np.empty((len(joints), len(Command._fields), instants))
-    for start in range(0, trajectory.samples, BLOCK_SAMPLES):
-        steps = trajectory.block(start, start + BLOCK_SAMPLES + 1)
+    samples = usual_block(len(robot.joints))
+    for start in range(0, trajectory.samples, samples):
+        steps = trajectory.block(start, start + samples + 1)
         middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
         for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
             _fill(robot, motion, joints, time[first:], rows[:, :, first:])
