@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -48,22 +48,22 @@ def pairs() -> dict[str, tuple[SpringLaw, SpringLaw]]:
     return found
 
 
-def compare(samples: int, repeats: int) -> list[Actuation]:
-    """Time the recursion and the actuation with each pair of springs, in turn."""
+def compare(samples: int, repeats: int) -> Iterator[Actuation]:
+    """Time the recursion and the actuation with a pair of springs in turn, pair by pair.
+
+    The recursion is timed anew for each pair: next to each other, both meet the same state of the machine.
+    """
     robot, moving = seven_joints(), motion(JOINTS, samples)
-    ways = {"recursion": lambda: link_torques(robot, *moving)}
     for name, springs in pairs().items():
         joint = _joint(robot.joints[0], springs)
+        ways: dict[str, Callable[[], object]] = {"recursion": lambda: link_torques(robot, *moving)}
         for load, share in SHARES.items():
             command = _command(joint.actuator, samples, share)
-            ways[f"{name}; {load}"] = lambda joint=joint, command=command: _drive(joint, command)
-    seconds: Mapping[str, float] = medians(ways, repeats)
-    of_joint = seconds["recursion"] / JOINTS
-    return [
-        Actuation(*name.split("; "), taken / samples, taken / of_joint)
-        for name, taken in seconds.items()
-        if name != "recursion"
-    ]
+            ways[load] = lambda joint=joint, command=command: _drive(joint, command)
+        seconds = medians(ways, repeats)
+        of_joint = seconds["recursion"] / JOINTS
+        for load in SHARES:
+            yield Actuation(name, load, seconds[load] / samples, seconds[load] / of_joint)
 
 
 def _joint(joint: Joint, springs: tuple[SpringLaw, SpringLaw]) -> Joint:

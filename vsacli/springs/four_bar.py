@@ -100,18 +100,18 @@ class FourBar(SpringLaw):
 
         With psi = asin(C sin(phi/2)) and beta = psi - phi/2, written by
         C cos(phi/2) - cos psi = (C^2 - 1)/(C cos(phi/2) + cos psi), so that nothing cancels. The higher
-        derivatives of beta are those of psi, with psi'' = (psi'^2 - 1/4) tan psi.
+        derivatives of beta are those of psi, with psi'' = (psi'^2 - 1/4) tan psi. Sines and cosines are
+        multiplied by 1 + tan^2(phi/4).
         """
-        tangent = np.tan(phi / 4)  # one function for the sine and cosine of phi/2
-        share = 1 / (1 + tangent * tangent)
-        sin, cos = 2 * tangent * share, (1 - tangent) * (1 + tangent) * share
-        sin_psi, ratio_cos = self.ratio * sin, self.ratio * cos
-        cos_psi = np.sqrt((1 - sin_psi) * (1 + sin_psi))
+        tangent = np.tan(phi / 4)
+        whole = 1 + tangent * tangent
+        sin_psi, ratio_cos = 2 * self.ratio * tangent, self.ratio * (2 - whole)
+        cos_psi = np.sqrt((whole - sin_psi) * (whole + sin_psi))
         gain = (self.ratio - 1) * (self.ratio + 1) / (ratio_cos + cos_psi)
-        beta = [np.arcsin(gain * sin)]
+        beta = [np.arcsin(2 * tangent * gain)]
         if order > 0:
             half_secant = 0.5 / cos_psi
-            beta.append(gain * half_secant)
+            beta.append(gain * whole * whole * half_secant)
         if order > 1:
             rate, tan_psi = ratio_cos * half_secant, sin_psi / cos_psi  # psi', tan psi
             beyond = beta[1] * (rate + 0.5)  # psi'^2 - 1/4
