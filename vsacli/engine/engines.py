@@ -21,7 +21,7 @@ SAMPLES_PER_PASS = 12288
 INPUTS_PER_PASS = 5 * 2**19
 """Bound on a kernel's inputs times samples at a time: the recursion keeps about 100 bytes for each."""
 
-KEPT_MEMORY = 2**24
+KEPT_MEMORY = 31 * 2**20
 """Bytes, more than the arrays of a pass take together."""
 
 

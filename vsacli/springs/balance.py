@@ -63,6 +63,8 @@ class Balance:
 
     def is_slack(self, tau_e: FloatArray, t: FloatArray) -> BoolArray:
         """Whether a side that only pulls carries no torque."""
+        if not (self.first.pulls_only or self.second.pulls_only):
+            return np.zeros_like(tau_e, dtype=bool)
         slack: BoolArray = (self.first.pulls_only & (tau_e / 2 + t == 0)) | (
             self.second.pulls_only & (tau_e / 2 - t == 0)
         )

@@ -36,9 +36,10 @@ class IteratedPair(Pair):
         balance, folds = self._balance, self._folds
         with np.errstate(all="ignore"):  # trial steps may lead anywhere, and are refused there
             ends = corridor(balance, folds, tau_e)
-            lower = np.where(ends.rising, ends.inner.stiffness, ends.outer.stiffness)
-            upper = np.where(ends.rising, ends.outer.stiffness, ends.inner.stiffness)
-            phi_1, phi_2 = deflections_at(balance, ends, tau_e, np.clip(stiffness, lower, upper))
+            lower = np.minimum(ends.inner.stiffness, ends.outer.stiffness)
+            upper = np.maximum(ends.inner.stiffness, ends.outer.stiffness)
+            demand = np.minimum(np.maximum(stiffness, lower), upper)
+            phi_1, phi_2 = deflections_at(balance, ends, tau_e, demand)
         return PairSolution(
             lower=lower,
             upper=upper,

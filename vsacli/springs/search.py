@@ -81,12 +81,16 @@ class _Course(NamedTuple):
     """The stiffness along the curve of equal tau_e, over the spread phi_1 - phi_2; arrays (samples,).
 
     Attributes:
+        stiffness: the stiffness itself.
+        turn: its relative slope where both sides move up alike.
         share_1: of the spread, what side 1 moves up.
         share_2: what side 2 moves down.
         slope: first derivative of the stiffness.
         bend: second derivative.
     """
 
+    stiffness: FloatArray
+    turn: FloatArray
     share_1: FloatArray
     share_2: FloatArray
     slope: FloatArray
@@ -104,6 +108,8 @@ def _course(springs: PairState) -> _Course:
     share_1, share_2 = two.sigma / total, one.sigma / total
     turn = (one.zeta + two.zeta) / total
     return _Course(
+        total,
+        turn,
         share_1,
         share_2,
         slope=one.zeta * share_1 - two.zeta * share_2,
@@ -140,10 +146,9 @@ def _step(
     springs: PairState, tau_e: FloatArray, demand: FloatArray, sign: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Steps to tau_e and to the demand, and the relative error that they leave."""
-    course, total = _course(springs), springs.stiffness
-    missing = demand - total
-    shift = (tau_e - springs.torque) / total
-    lacking = missing - (springs.one.zeta + springs.two.zeta) * shift
+    course = _course(springs)
+    missing, unbalanced = demand - course.stiffness, tau_e - springs.torque
+    shift, lacking = unbalanced / course.stiffness, missing - course.turn * unbalanced
     steepness = course.steepness(lacking, sign)
     spread = 2 * lacking / steepness
     step_1, step_2 = shift + course.share_1 * spread, shift - course.share_2 * spread
