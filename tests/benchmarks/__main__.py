@@ -46,7 +46,7 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     yield "costs", page.cost_table(compiled.costs())
     runs = (stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c"))
     yield "stages", page.stage_table(*runs)
-    yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, repeats))
+    yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats))
     yield "startup", page.startup_table(commands.startup(3 * repeats))
     memory = commands.peak_memory(LONG_RUN) / 1e6
     yield (

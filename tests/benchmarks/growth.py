@@ -38,10 +38,11 @@ def measure(repeats: int) -> Growth:
     """Time chains of each length at a fixed number of samples, and the 7R arm at each number of samples."""
     arm = seven_joints()
     chains = {
-        joints: _cpu_seconds(chain(joints), SAMPLES_OF_CHAIN, max(1, 200 // joints)) for joints in JOINTS
+        joints: _cpu_seconds(chain(joints), SAMPLES_OF_CHAIN, max(1, 100 // joints)) for joints in JOINTS
     }
     arms = {samples: _cpu_seconds(arm, samples, max(1, 2_000 // samples)) for samples in SAMPLES}
-    return Growth(_by_number(chains, repeats), _by_number(arms, repeats))
+    turns = 4 * repeats  # short ones, so that every length meets the machine's slow seconds
+    return Growth(_by_number(chains, turns), _by_number(arms, repeats))
 
 
 def _cpu_seconds(robot: Robot, samples: int, rounds: int) -> Callable[[], float]:

@@ -64,7 +64,8 @@ class MeasuredCurve:
         (low, high), (below, above) = self.domain, self.pieces
         position = phi * (above / high)
         if below:
-            position = below + np.where(phi < 0, phi * (-below / low), position)
+            steeper = below / -low > above / high
+            position = below + (np.minimum if steeper else np.maximum)(position, phi * (below / -low))
         return cell_of(position, below + above)
 
     @cached_property

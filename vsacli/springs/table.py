@@ -123,8 +123,10 @@ class MeasuredSpring(SpringLaw):
     def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
         """Deflection and spring by one iteration."""
         low, high = (np.full_like(torque, end) for end in self.domain)
-        carried = np.clip(torque, *self.torque_range)
-        return inverse(self, carried, low, high, np.clip(self._first_guess(carried), low, high))
+        least, largest = self.torque_range
+        carried = np.minimum(np.maximum(torque, least), largest)
+        start = np.minimum(np.maximum(self._first_guess(carried), low), high)
+        return inverse(self, carried, low, high, start)
 
     @cached_property
     def _first_guess(self) -> FirstGuess:
