@@ -22,7 +22,7 @@ INPUTS_PER_PASS = 5 * 2**19
 """Bound on a kernel's inputs times samples at a time: the recursion keeps about 100 bytes for each."""
 
 KEPT_MEMORY = 31 * 2**20
-"""Bytes, more than the arrays of a pass take together."""
+"""Bytes: glibc then keeps twice that, more than a pass takes in arrays; from 32 MiB on it learns nothing."""
 
 
 def samples_per_pass(inputs: int) -> int:
