@@ -91,7 +91,8 @@ def partly_used(x: Any) -> Any:
 
 def counted(x: Any) -> Any:
     """Cells of one width."""
-    return look_up((TABLE,), cell_of(np.where(np.isnan(x), 0.0, x), len(TABLE)))
+    (found,) = look_up((TABLE,), cell_of(np.where(np.isnan(x), 0.0, x), len(TABLE)))
+    return found
 
 
 def interpolated(x: Any) -> Any:
