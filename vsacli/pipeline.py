@@ -66,7 +66,7 @@ class Run:
         self.trajectory = trajectory
         self._stop_on_infeasible = stop_on_infeasible
         self._near_singular = near_singular
-        self._block_samples = block_samples or usual_block(len(robot.joints))
+        self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
         self._following = following
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
         kernel = InverseDynamics(robot, frame, near_singular, following is not None)

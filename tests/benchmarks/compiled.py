@@ -19,7 +19,7 @@ from timing import Seconds, medians
 from vsacli.arrays import FloatArray
 from vsacli.codegen.project import generate, prefix_of
 from vsacli.engine.compiler import FLAGS, system_compiler
-from vsacli.engine.engines import CompiledEngine, Engine, samples_per_pass
+from vsacli.engine.engines import CompiledEngine, Engine, passes
 from vsacli.engine.kernel import Kernel, record
 from vsacli.engine.lanes import batch_source
 from vsacli.newton_euler import LinkTorques
@@ -73,9 +73,8 @@ def _in_blocks(engine: Engine, kernel: Kernel, rows: Sequence[FloatArray]) -> Ca
     """As a run takes them."""
 
     def way() -> None:
-        samples = samples_per_pass(len(rows))
-        for start in range(0, len(rows[0]), samples):
-            engine.run(kernel, [row[start : start + samples] for row in rows])
+        for part in passes(rows):
+            engine.run(kernel, [row[part] for row in rows])
 
     return way
 

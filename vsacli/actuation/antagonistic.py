@@ -12,10 +12,7 @@ from vsacli.feasibility import Reach, reach
 from vsacli.records import NamedTuple
 from vsacli.robot import Antagonistic
 from vsacli.springs import PairSolution, make_pair
-from vsacli.springs.decoupling_matrix import beta, determinant, solve, spring_state
-
-Sides = tuple[FloatArray, FloatArray]
-"""A quantity of motor 1 or its spring, and of motor 2."""
+from vsacli.springs.decoupling_matrix import Sides, beta, determinant, solve, spring_state
 
 
 class Motors(NamedTuple):

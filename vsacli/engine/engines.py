@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Protocol
 
@@ -30,6 +30,13 @@ def samples_per_pass(inputs: int) -> int:
     return max(1, min(SAMPLES_PER_PASS, INPUTS_PER_PASS // inputs))
 
 
+def passes(rows: Sequence[FloatArray]) -> Iterator[slice]:
+    """The samples of each pass over a kernel's inputs."""
+    samples = samples_per_pass(len(rows))
+    for start in range(0, len(rows[0]), samples):
+        yield slice(start, start + samples)
+
+
 class Engine(Protocol):
     """What carries out kernels."""
 
@@ -43,11 +50,8 @@ class NumPyEngine:
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
         """As of `Engine`."""
         keep_freed_memory()
-        samples = len(rows[0])
-        outputs = np.empty((kernel.outputs, samples))
-        step = samples_per_pass(len(rows))
-        for start in range(0, samples, step):
-            part = slice(start, start + step)
+        outputs = np.empty((kernel.outputs, len(rows[0])))
+        for part in passes(rows):
             for output, row in zip(outputs, kernel([row[part] for row in rows]), strict=True):
                 output[part] = row
         return outputs

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from vsacli.arrays import FloatArray
-from vsacli.engine.engines import SAMPLES_PER_PASS, NumPyEngine
+from vsacli.engine.engines import NumPyEngine, passes, samples_per_pass
 from vsacli.engine.kernel import Kernel, record
 from vsacli.tracing.row_program import RowProgram, Scratch
 
@@ -31,10 +31,9 @@ class RecordedEngine:
         if program is None:
             return NumPyEngine().run(kernel, rows)
         if program not in self._scratch:
-            self._scratch[program] = program.scratch(SAMPLES_PER_PASS)
+            self._scratch[program] = program.scratch(samples_per_pass(len(rows)))
         outputs = np.empty((kernel.outputs, len(rows[0])))
-        for start in range(0, outputs.shape[1], SAMPLES_PER_PASS):
-            part = slice(start, start + SAMPLES_PER_PASS)
+        for part in passes(rows):
             program([row[part] for row in rows], outputs[:, part], self._scratch[program])
         return outputs
 

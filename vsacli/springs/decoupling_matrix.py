@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from vsacli.springs.law import SpringLaw
 
 
+Sides = tuple[FloatArray, FloatArray]
+"""A quantity of side 1, its motor or its spring, and of side 2."""
+
+
 class Springs(NamedTuple):
     """Torque, stiffness, slope and curvature of springs, (62)-(64), (66); arrays of one shape."""
 
@@ -49,9 +53,7 @@ def determinant(one: Springs, two: Springs) -> FloatArray:
     return one.sigma * two.zeta - two.sigma * one.zeta
 
 
-def solve(
-    one: Springs, two: Springs, divisor: FloatArray, upper: FloatArray, lower: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def solve(one: Springs, two: Springs, divisor: FloatArray, upper: FloatArray, lower: FloatArray) -> Sides:
     """A^-1 (upper, lower), as (68) and (72) need; the divisor is det A, or NaN where there is no solution."""
     return (
         (two.zeta * upper - two.sigma * lower) / divisor,
@@ -62,11 +64,11 @@ def solve(
 def beta(
     one: Springs,
     two: Springs,
-    dphi: tuple[FloatArray, FloatArray],
+    dphi: Sides,
     ddtau_e: FloatArray,
     ddstiffness: FloatArray,
     ddq: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
+) -> Sides:
     """Right-hand side of (72), with the sums (11) and (65)."""
     squared_1, squared_2 = dphi[0] * dphi[0], dphi[1] * dphi[1]
     return (

@@ -18,10 +18,11 @@ import numpy as np
 from vsacli.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.springs.balance import Balance
 from vsacli.springs.bracketing import bracketed_root
+from vsacli.springs.decoupling_matrix import Sides
 from vsacli.springs.hardening import Hardening, sample_hardening
 from vsacli.springs.law import SpringLaw
 from vsacli.springs.mirrored import Mirrored
-from vsacli.springs.state import PairState, Sides
+from vsacli.springs.state import PairState
 
 RESOLVED = 1e-11
 """Relative change of tau_e between neighbouring points of a curve that rounding next to a peak does not make.

@@ -8,9 +8,9 @@ from vsacli.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.loops import Values, look_up, repeat, where_needed
 from vsacli.springs.balance import Balance
 from vsacli.springs.bracketing import bracketed_root
-from vsacli.springs.decoupling_matrix import Springs
+from vsacli.springs.decoupling_matrix import Sides, Springs
 from vsacli.springs.folds import Folds, along_equal_hardening
-from vsacli.springs.state import PairState, Sides
+from vsacli.springs.state import PairState
 
 CLOSE = 1e-5
 """Relative distance to a fold, in deflection and in stiffness, of which one step leaves rounding only.

@@ -8,10 +8,7 @@ import numpy as np
 
 from vsacli.arrays import FloatArray
 from vsacli.loops import Values
-from vsacli.springs.decoupling_matrix import Springs
-
-Sides = tuple[FloatArray, FloatArray]
-"""A quantity of side 1, and of side 2."""
+from vsacli.springs.decoupling_matrix import Sides, Springs
 
 
 class PairState(NamedTuple):
