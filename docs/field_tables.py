@@ -1,4 +1,4 @@
-"""Tables of the fields declared with `vsacli.spec.fields`, in Markdown."""
+"""Tables of the fields declared with `vsacli.documents.fields`, in Markdown."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from vsacli.spec.fields import (
+from vsacli.base.units import DIMENSIONLESS, Quantity
+from vsacli.documents.fields import (
     FINITE,
     REQUIRED,
     Choice,
@@ -27,7 +28,6 @@ from vsacli.spec.fields import (
     Vector,
     declared,
 )
-from vsacli.units import DIMENSIONLESS, Quantity
 
 Variants = Mapping[str, type]
 

@@ -23,18 +23,18 @@ from field_tables import record_sections, table, variant_sections
 from noise_study import draw, table_rows
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
+from vsacli.actuators.laws import LAWS
+from vsacli.base.flags import Flag
+from vsacli.base.simulation_variables import SIMULATION_VARIABLES
+from vsacli.base.variables import VARIABLES, Variable
+from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.cli.exit_codes import Exit
 from vsacli.cli.main import vsacli
-from vsacli.columns import JOINT_SIGNALS
 from vsacli.control.poles import PolesFile
-from vsacli.examples import Example, examples, opening_comment
-from vsacli.flags import Flag
-from vsacli.robot_file import RobotFile
-from vsacli.simulation_variables import SIMULATION_VARIABLES
-from vsacli.springs import LAWS
-from vsacli.trajectory_file import TrajectoryFile
-from vsacli.variables import VARIABLES, Variable
-from vsacli.wrench import WRENCH_NAMES, wrench_columns
+from vsacli.files.examples import Example, examples, opening_comment
+from vsacli.robot.file import RobotFile
+from vsacli.trajectory.file import TrajectoryFile
+from vsacli.trajectory.recorded.columns import JOINT_SIGNALS
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from vsacli.arrays import FloatArray
-from vsacli.fits import INTERPOLATE, LEAST_SQUARES, Fit, fit_samples
-from vsacli.profiles import POSITION
+from vsacli.base.arrays import FloatArray
+from vsacli.trajectory.curves import POSITION
+from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, Fit, fit_samples
 
 FREQUENCIES = np.array([0.3, 0.7, 1.1, 1.9])[:, None]
 AMPLITUDES = np.array([0.8, 0.4, 0.2, 0.1])

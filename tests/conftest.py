@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from cli_samples import ROBOT, rest_to_rest
+from samples.command_line import ROBOT, rest_to_rest
 
 from vsacli.cli.main import run
 

@@ -19,14 +19,14 @@ from typing import Any, NamedTuple
 import click
 import h5py
 import pytest
-from cli_samples import installed
+from samples.command_line import installed
 
 import vsacli
+from vsacli.actuators.reach import NEAR_SINGULAR, TOUCHING
+from vsacli.analysis.self_check import LADDER_BOUND, SPRING_BOUND
 from vsacli.cli.main import vsacli as group
-from vsacli.feasibility import NEAR_SINGULAR, TOUCHING
-from vsacli.self_check import LADDER_BOUND, SPRING_BOUND
-from vsacli.spec.source import MAX_DOCUMENT_BYTES
-from vsacli.spec.yaml_tree import MAX_LEVELS, MAX_NODES
+from vsacli.documents.source import MAX_DOCUMENT_BYTES
+from vsacli.documents.yaml_tree import MAX_LEVELS, MAX_NODES
 
 REPOSITORY = Path(__file__).parents[1]
 README = REPOSITORY / "README.md"

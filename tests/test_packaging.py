@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from cli_samples import contents
+from samples.command_line import contents
 
 REPOSITORY = Path(__file__).parents[1]
 
@@ -32,7 +32,7 @@ def files_below(folder: Path, pattern: str) -> set[str]:
 
 
 def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> None:
-    modules = files_below(REPOSITORY / "vsacli", "*.py") | {"vsacli/engine/lanes.c"}
+    modules = files_below(REPOSITORY / "vsacli", "*.py") | {"vsacli/compute/engine/lanes.c"}
     examples = {
         f"vsacli/{name}"
         for folder in ("robots", "trajectories")

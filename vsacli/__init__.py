@@ -6,19 +6,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from vsacli.pipeline import inverse_dynamics
-    from vsacli.robot_file import load_robot
-    from vsacli.trajectory import Trajectory
-    from vsacli.trajectory_file import load_trajectory
+    from vsacli.analysis.run import inverse_dynamics
+    from vsacli.robot.file import load_robot
+    from vsacli.trajectory.file import load_trajectory
+    from vsacli.trajectory.trajectory import Trajectory
 
 __version__ = "0.1.0"
 __all__ = ["Trajectory", "__version__", "inverse_dynamics", "load_robot", "load_trajectory"]
 
 _HOME = {
-    "Trajectory": "vsacli.trajectory",
-    "inverse_dynamics": "vsacli.pipeline",
-    "load_robot": "vsacli.robot_file",
-    "load_trajectory": "vsacli.trajectory_file",
+    "Trajectory": "vsacli.trajectory.trajectory",
+    "inverse_dynamics": "vsacli.analysis.run",
+    "load_robot": "vsacli.robot.file",
+    "load_trajectory": "vsacli.trajectory.file",
 }
 
 

@@ -24,7 +24,7 @@ import stages
 from machine import description
 from subjects import ROOT
 
-from vsacli.engine.engines import SAMPLES_PER_PASS
+from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 
 PAGES = (ROOT / "docs" / "performance.md", ROOT / "docs" / "codegen.md")
 FIGURE = ROOT / "docs" / "images" / "performance-growth.png"

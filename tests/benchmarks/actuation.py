@@ -7,17 +7,19 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from spring_samples import SPRINGS
+from samples.springs import SPRINGS
 from subjects import motion, seven_joints
 from timing import medians
 
-from vsacli.actuation import Command, drive
-from vsacli.actuation.antagonistic import solve_deflections
-from vsacli.arrays import FloatArray
-from vsacli.engine.engines import SAMPLES_PER_PASS
-from vsacli.newton_euler import link_torques
-from vsacli.robot import Antagonistic, Joint, Motor
-from vsacli.springs import SpringLaw
+from vsacli.actuators.antagonistic import Antagonistic, solve_deflections
+from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import FloatArray
+from vsacli.compute.engine.engines import SAMPLES_PER_PASS
+from vsacli.dynamics.drive import drive
+from vsacli.dynamics.link_torques import link_torques
+from vsacli.robot.model import Joint
 
 JOINTS = 7
 SHARES = {"light": 0.1, "heavy": 0.99}

@@ -14,8 +14,8 @@ from pathlib import Path
 import casadi
 import numpy as np
 
-from vsacli.arrays import FloatArray
-from vsacli.robot import Joint, Robot
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.model import Joint, Robot
 
 ORDERS = 5
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")

@@ -16,15 +16,15 @@ from kernel import CASADI
 from subjects import chain, motion, seven_joints
 from timing import Seconds, medians
 
-from vsacli.arrays import FloatArray
-from vsacli.codegen.project import generate, prefix_of
-from vsacli.engine.compiler import FLAGS, system_compiler
-from vsacli.engine.engines import CompiledEngine, Engine, passes
-from vsacli.engine.kernel import Kernel, record
-from vsacli.engine.lanes import batch_source
-from vsacli.newton_euler import LinkTorques
-from vsacli.robot import Robot
-from vsacli.steps import InverseDynamics
+from vsacli.base.arrays import FloatArray
+from vsacli.compute.engine.compiler import FLAGS, system_compiler
+from vsacli.compute.engine.engines import CompiledEngine, Engine, passes
+from vsacli.compute.engine.kernel import Kernel, record
+from vsacli.compute.engine.lanes import batch_source
+from vsacli.control.codegen.project import generate, prefix_of
+from vsacli.dynamics.inverse import InverseDynamics
+from vsacli.dynamics.link_torques import LinkTorques
+from vsacli.robot.model import Robot
 
 LINKS, WHOLE = "link torques", "whole inverse dynamics"
 JOINTS = (1, 2, 3, 5, 7, 10, 15, 20)

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from subjects import chain, motion, seven_joints
 from timing import medians
 
-from vsacli.newton_euler import link_torques
-from vsacli.robot import Robot
+from vsacli.dynamics.link_torques import link_torques
+from vsacli.robot.model import Robot
 
 JOINTS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 SAMPLES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)

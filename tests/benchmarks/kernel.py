@@ -13,8 +13,8 @@ from pinocchio_peer import link_torques as pinocchio_torques
 from subjects import motion, seven_joints
 from timing import medians
 
-from vsacli.arrays import FloatArray
-from vsacli.newton_euler import link_torques
+from vsacli.base.arrays import FloatArray
+from vsacli.dynamics.link_torques import link_torques
 
 DURATION = 3.0
 OURS = "vsacli, NumPy"

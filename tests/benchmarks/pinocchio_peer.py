@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio
 from oracles.pinocchio import build
 
-from vsacli.arrays import FloatArray
-from vsacli.robot import Robot
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.model import Robot
 
 
 def link_torques(robot: Robot, motion: list[FloatArray], step: float) -> tuple[FloatArray, ...]:

@@ -16,10 +16,10 @@ from kernel import CASADI
 from subjects import motion, seven_joints
 from timing import medians
 
-import vsacli.tracing
-from vsacli.codegen.header import header_text
-from vsacli.codegen.robot_functions import link_torques_function
-from vsacli.codegen.scalar import source_text
+import vsacli.compute.tracing
+from vsacli.control.codegen.header import header_text
+from vsacli.control.codegen.robot_functions import link_torques_function
+from vsacli.control.codegen.scalar import source_text
 
 OURS = "vsacli, recorded, C"
 LOOP = """
@@ -76,7 +76,7 @@ def compare(samples: int, repeats: int) -> list[Recorder]:
         pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in (rows, torques)]
         ways = {OURS: lambda: run(*pointers, ctypes.c_long(samples)), CASADI: lambda: casadi(moving)[0]}
         seconds = medians(ways, repeats)
-        own = sum(path.stat().st_size for path in Path(vsacli.tracing.__path__[0]).glob("*.py"))
+        own = sum(path.stat().st_size for path in Path(vsacli.compute.tracing.__path__[0]).glob("*.py"))
         theirs = sum(Path(file.locate()).stat().st_size for file in files("casadi") or ())
         operations = {OURS: len(function.record().operations), CASADI: casadi.operations}
         sizes = {OURS: own, CASADI: theirs}

@@ -11,15 +11,15 @@ from subjects import SEVEN_JOINTS, seven_joints
 from timing import medians
 
 from vsacli import load_trajectory
-from vsacli.engine import choose
-from vsacli.newton_euler import LinkTorques, link_torques
-from vsacli.pipeline import Run
-from vsacli.robot import Robot
-from vsacli.steps import InverseDynamics, compute_block, usual_block
-from vsacli.store.writer import ResultWriter
-from vsacli.times import UniformTimes
-from vsacli.trajectory import Trajectory
-from vsacli.variables import Block
+from vsacli.analysis.run import Run
+from vsacli.base.variables import Block
+from vsacli.compute.engine import choose
+from vsacli.dynamics.inverse import InverseDynamics, compute_block, usual_block
+from vsacli.dynamics.link_torques import LinkTorques, link_torques
+from vsacli.results.store.writer import ResultWriter
+from vsacli.robot.model import Robot
+from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
 
 VARIABLES = ("tau_motor", "flags")
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from vsacli import load_robot
-from vsacli.arrays import FloatArray, over_time
-from vsacli.robot import Robot
+from vsacli.base.arrays import FloatArray, over_time
+from vsacli.robot.model import Robot
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS, TRAJECTORIES = ROOT / "robots", ROOT / "trajectories"

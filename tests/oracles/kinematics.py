@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.arrays import FloatArray
-from vsacli.robot import Joint, Pose, Robot
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.model import Joint, Pose, Robot
 
 STEP = 1e-30
 """A complex step has no cancellation, and the square of this one vanishes against 1."""

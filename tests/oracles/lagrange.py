@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from oracles.jets import Scalar, circle, leibniz, matrix_product
-from vsacli.robot import Robot
+from vsacli.robot.model import Robot
 
 Array = npt.NDArray[Any]
 Derivatives = list[Array]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from vsacli.arrays import FloatArray
+from vsacli.base.arrays import FloatArray
 
 
 class ModifiedJoint(NamedTuple):

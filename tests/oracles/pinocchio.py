@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from vsacli.arrays import FloatArray
-from vsacli.robot import DenavitHartenberg, Pose, Robot
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.model import DenavitHartenberg, Pose, Robot
 
 
 def build(robot: Robot) -> pin.Model:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from oracles.lagrange import Chain, Derivatives
-from vsacli.arrays import FloatArray
+from vsacli.base.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vsacli.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 
 STEP = 1e-200
 LARGEST_TORQUE = 1e5

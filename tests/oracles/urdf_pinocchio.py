@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from vsacli.arrays import FloatArray
+from vsacli.base.arrays import FloatArray
 
 
 class UrdfOracle:

@@ -20,20 +20,13 @@ from vsacli.cli.options import (
     stop_option,
     trajectory_argument,
 )
-from vsacli.cli.running import (
-    compute,
-    followed,
-    load_inputs,
-    refuse_input_as_output,
-    run_stem,
-    show_report,
-)
+from vsacli.cli.running import compute, followed, load_inputs, refuse_input_as_output, run_stem, show_report
 
 if TYPE_CHECKING:
-    from vsacli.pipeline import Run
-    from vsacli.report import Report
-    from vsacli.robot import Robot
-    from vsacli.suggest import Suggestions
+    from vsacli.analysis.report import Report
+    from vsacli.analysis.run import Run
+    from vsacli.robot.model import Robot
+    from vsacli.studies.remedies import Suggestions
 
 
 @click.command(
@@ -93,9 +86,9 @@ def check_feasibility(
     confirmed on all steps.
     """
     inputs = load_inputs(robot, trajectory, talk)
-    from vsacli.feasibility import NEAR_SINGULAR, check_near_singular
-    from vsacli.pipeline import Run
-    from vsacli.suggest import check_fixed_target, fixed_paths, suggest
+    from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular
+    from vsacli.analysis.run import Run
+    from vsacli.studies.remedies import check_fixed_target, fixed_paths, suggest
 
     margin = NEAR_SINGULAR if near_singular is None else near_singular
     check_near_singular(margin)
@@ -105,7 +98,7 @@ def check_feasibility(
             refuse_input_as_output(path, (source.path for part in inputs for source in part.sources))
     stem = run_stem(robot, trajectory)
     if plot_folder is not None:
-        from vsacli.plots import FEASIBILITY, check_drawable, check_figures
+        from vsacli.results.plots import FEASIBILITY, check_drawable, check_figures
 
         check_drawable([joint.actuator_type for joint in inputs[0].joints])
         check_figures([FEASIBILITY], plot_folder, stem, overwrite=overwrite)
@@ -129,9 +122,9 @@ def check_feasibility(
 
 def _compute_and_draw(run: Run, talk: Talk) -> tuple[Report, Mapping[str, Any]]:
     """Compute, and draw figures, by name, from a result file that exists no longer than it takes."""
-    from vsacli.plots import FEASIBILITY, FEASIBILITY_VARIABLES, plot_feasibility
-    from vsacli.store.reader import open_result
-    from vsacli.store.writer import ResultWriter
+    from vsacli.results.plots import FEASIBILITY, FEASIBILITY_VARIABLES, plot_feasibility
+    from vsacli.results.store.reader import open_result
+    from vsacli.results.store.writer import ResultWriter
 
     with TemporaryDirectory(prefix="vsacli-") as folder:
         path = Path(folder) / "result.h5"
@@ -141,7 +134,7 @@ def _compute_and_draw(run: Run, talk: Talk) -> tuple[Report, Mapping[str, Any]]:
 
 
 def _save(figures: Mapping[str, Any], folder: str, stem: str, overwrite: bool, talk: Talk) -> None:
-    from vsacli.plots import save_figures
+    from vsacli.results.plots import save_figures
 
     for path in save_figures(figures, folder, stem, overwrite=overwrite):
         talk.note(f"wrote {path}")
@@ -149,7 +142,7 @@ def _save(figures: Mapping[str, Any], folder: str, stem: str, overwrite: bool, t
 
 def _write_fixed(suggestions: Suggestions, robot: Robot, path: str, overwrite: bool, talk: Talk) -> None:
     """Write the suggested profile, if there is one, and say what was written."""
-    from vsacli.suggest import StiffnessProfile, write_fixed
+    from vsacli.studies.remedies import StiffnessProfile, write_fixed
 
     profile = suggestions.stiffness_profile
     if isinstance(profile, StiffnessProfile):

@@ -31,8 +31,8 @@ def codegen(robot: str, output: str, precision: str, overwrite: bool, talk: Talk
     C99 that needs nothing but math.h: no allocation, nothing kept between calls, a bounded number of
     operations. A test program with reference values, a Makefile and a README come along.
     """
-    from vsacli.codegen.project import generate, write
-    from vsacli.robot_file import load_robot
+    from vsacli.control.codegen.project import generate, write
+    from vsacli.robot.file import load_robot
 
     project = generate(load_robot(robot), precision)
     for path in write(project, output, overwrite=overwrite):

@@ -6,13 +6,13 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stdout, suppress
+from dataclasses import dataclass
 from functools import wraps
 from typing import Any, TextIO, cast
 
 import click
 
-from vsacli.errors import StorageError
-from vsacli.records import dataclass
+from vsacli.base.errors import StorageError
 
 PROGRESS_FROM = 100_000
 """Steps from which on a run is long enough for a progress bar."""

@@ -11,7 +11,7 @@ from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.options import example, overwrite_option
 
 if TYPE_CHECKING:
-    from vsacli.examples import Example
+    from vsacli.files.examples import Example
 
 
 @click.command(
@@ -30,8 +30,8 @@ def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: 
     without names, every file that comes along does. Nothing is copied if one of the files exists there,
     unless --overwrite.
     """
-    from vsacli.examples import copy_examples
-    from vsacli.examples import examples as shipped
+    from vsacli.files.examples import copy_examples
+    from vsacli.files.examples import examples as shipped
 
     if folder is None:
         click.echo("\n".join(line for each in shipped(names) for line in _lines(each)))

@@ -8,11 +8,11 @@ from typing import Any, TextIO
 
 import click
 
+from vsacli.base.errors import StorageError
 from vsacli.cli.console import Talk, talk_options, tell
 from vsacli.cli.exit_codes import Exit
 from vsacli.cli.options import example, overwrite_option, variables_option
 from vsacli.cli.running import described, refuse_input_as_output
-from vsacli.errors import StorageError
 
 
 @click.command(
@@ -57,8 +57,8 @@ def export(
     With --side motor, motion and torque of the motors are those of their shafts, in rad and N m at any joint;
     every motor needs a gear_ratio in the robot file. What is not of a motor stays as it is.
     """
-    from vsacli.export import UndefinedSamplesError, export_csv, export_csv_file
-    from vsacli.store.simulation import open_stored
+    from vsacli.results.csv_export import UndefinedSamplesError, export_csv, export_csv_file
+    from vsacli.results.store.simulation import open_stored
 
     options: dict[str, Any] = {"rate": rate, "allow_nan": allow_nan, "side": side}
     try:

@@ -90,8 +90,8 @@ def import_urdf(
     Prints the rows, what was left out or changed, and how far the kinematics stray from the URDF's. A URDF
     says nothing about motors and springs: these are placeholders, marked in the file.
     """
-    from vsacli.store.atomic import check_target
-    from vsacli.urdf import Placeholders, convert, render, write_robot
+    from vsacli.base.atomic_files import check_target
+    from vsacli.robot.urdf import Placeholders, convert, render, write_robot
 
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
     refuse_input_as_output(path, [urdf])

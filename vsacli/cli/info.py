@@ -28,8 +28,8 @@ def info(file: str, robot: str | None, as_json: bool, field: str | None) -> None
     Of a robot, Denavit-Hartenberg rows, links, actuators, reach, static load and reachable stiffness; of a
     trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report.
     """
-    from vsacli.info import bare, describe_file, render, select
-    from vsacli.plain import finite
+    from vsacli.base.json_values import finite
+    from vsacli.files.info import bare, describe_file, render, select
 
     description = describe_file(file, robot)
     if field is not None:

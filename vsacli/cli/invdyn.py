@@ -21,14 +21,7 @@ from vsacli.cli.options import (
     trajectory_argument,
     variables_option,
 )
-from vsacli.cli.running import (
-    compute,
-    followed,
-    load_inputs,
-    refuse_input_as_output,
-    run_stem,
-    show_report,
-)
+from vsacli.cli.running import compute, followed, load_inputs, refuse_input_as_output, run_stem, show_report
 
 
 @click.command(
@@ -77,13 +70,13 @@ def invdyn(
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
     refuse_input_as_output(path, (source.path for part in inputs for source in part.sources))
-    from vsacli.pipeline import Run
-    from vsacli.store.atomic import check_target
-    from vsacli.store.writer import ResultWriter
-    from vsacli.variables import VARIABLES
+    from vsacli.analysis.run import Run
+    from vsacli.base.atomic_files import check_target
+    from vsacli.base.variables import VARIABLES
+    from vsacli.results.store.writer import ResultWriter
 
     if plot_folder is not None:
-        from vsacli.plots import RESULT_DRAWINGS, check_figures, drawable_figures
+        from vsacli.results.plots import RESULT_DRAWINGS, check_figures, drawable_figures
 
         drawn = drawable_figures(RESULT_DRAWINGS, VARIABLES if variables is None else variables)
         check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)

@@ -12,12 +12,12 @@ from typing import NoReturn, cast
 import click
 
 from vsacli import __version__
+from vsacli.base.errors import InputError, StorageError
+from vsacli.base.lazy import OnDemand
 from vsacli.cli.console import OutputClosedError, reporting_stdout_errors, tell
 from vsacli.cli.exit_codes import Exit
 from vsacli.cli.options import example
 from vsacli.cli.sections import SectionedGroup
-from vsacli.errors import InputError, StorageError
-from vsacli.on_demand import OnDemand
 
 _EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --plot figures")
 _EPILOG += "\n\n\b\nExit codes:\n" + "\n".join(f"  {code.value:<3}  {code.meaning}" for code in Exit)

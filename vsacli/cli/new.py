@@ -47,7 +47,7 @@ def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk:
 
     It can be computed with as it is. Each key has a comment; what is optional stands commented out.
     """
-    from vsacli.templates import robot_template
+    from vsacli.files.templates import robot_template
 
     _write(robot_template(joints, actuator), output, overwrite, talk)
 
@@ -67,8 +67,8 @@ def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk
     Its numbers suit the joints, limits and springs of the robot; without one, those of a new robot with
     revolute joints.
     """
-    from vsacli.robot_file import load_robot
-    from vsacli.templates import trajectory_template
+    from vsacli.files.templates import trajectory_template
+    from vsacli.robot.file import load_robot
 
     _write(
         trajectory_template(None if robot_path is None else load_robot(robot_path)), output, overwrite, talk
@@ -79,7 +79,7 @@ def _write(text: str, output: str | None, overwrite: bool, talk: Talk) -> None:
     if output is None:
         click.echo(text, nl=False)
         return
-    from vsacli.store.atomic import write_text
+    from vsacli.base.atomic_files import write_text
 
     write_text(output, text, overwrite=overwrite)
     talk.note(f"wrote {output}")

@@ -47,7 +47,7 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
 
 def draw_file(path: Path, folder: Path, file_format: str, overwrite: bool, talk: Talk) -> None:
     """Draw the figures of one file and say where they are."""
-    from vsacli.plots import (
+    from vsacli.results.plots import (
         check_figures,
         drawable_figures,
         drawings_of,
@@ -55,7 +55,7 @@ def draw_file(path: Path, folder: Path, file_format: str, overwrite: bool, talk:
         plot_stored,
         save_figures,
     )
-    from vsacli.store.simulation import open_stored
+    from vsacli.results.store.simulation import open_stored
 
     with open_stored(path) as stored:
         talk.detail(described(stored))
@@ -70,8 +70,8 @@ def draw_file(path: Path, folder: Path, file_format: str, overwrite: bool, talk:
 
 
 def _draw_comparison(paths: list[Path], folder: Path, file_format: str, overwrite: bool, talk: Talk) -> None:
-    from vsacli.plots import COMPARISON, check_figures, compare_files, save_figures
-    from vsacli.store.simulation import open_stored
+    from vsacli.results.plots import COMPARISON, check_figures, compare_files, save_figures
+    from vsacli.results.store.simulation import open_stored
 
     stem = "-".join(path.stem for path in paths)
     check_figures([COMPARISON], folder, stem, file_format, overwrite=overwrite)

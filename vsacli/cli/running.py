@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.errors import InputError
 from vsacli.cli.console import Talk
 from vsacli.cli.exit_codes import OF_VERDICT, Exit
-from vsacli.errors import InputError
 
 if TYPE_CHECKING:
-    from vsacli.following import Following
-    from vsacli.pipeline import Run
-    from vsacli.report import Report
-    from vsacli.robot import Robot
-    from vsacli.store.reader import StoredResult
-    from vsacli.store.writer import ResultWriter
-    from vsacli.suggest import Suggestions
-    from vsacli.trajectory import Trajectory
+    from vsacli.analysis.report import Report
+    from vsacli.analysis.run import Run
+    from vsacli.dynamics.integrated_deflections import Following
+    from vsacli.results.store.reader import StoredResult
+    from vsacli.results.store.writer import ResultWriter
+    from vsacli.robot.model import Robot
+    from vsacli.studies.remedies import Suggestions
+    from vsacli.trajectory.trajectory import Trajectory
 
 
 def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> tuple[Robot, Trajectory]:
@@ -32,8 +32,8 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> tuple[Robo
     Raises:
         InputError: every problem of the robot, or else of the trajectory.
     """
-    from vsacli.robot_file import load_robot
-    from vsacli.trajectory_file import load_trajectory
+    from vsacli.robot.file import load_robot
+    from vsacli.trajectory.file import load_trajectory
 
     robot = load_robot(robot_path)
     trajectory = load_trajectory(trajectory_path, robot)
@@ -48,7 +48,7 @@ def followed(deflections: str, robot: Robot, trajectory: Trajectory) -> Followin
     """The deflections that a run uses, as `--deflections` says; None if it solves for them at each step."""
     if deflections == "root":
         return None
-    from vsacli.following import follow
+    from vsacli.dynamics.integrated_deflections import follow
 
     return follow(robot, trajectory)
 
@@ -92,7 +92,7 @@ def described(result: StoredResult) -> str:
 
 def show_report(report: Report, as_json: bool, suggestions: Suggestions | None = None) -> Exit:
     """Print the report, and suggestions if there are; the exit code says what the report says."""
-    from vsacli.report_text import render
+    from vsacli.analysis.report_text import render
 
     if as_json:
         extra = {} if suggestions is None else {"suggestions": suggestions.as_json()}

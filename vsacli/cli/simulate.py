@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from vsacli.base.errors import InputError
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.exit_codes import Exit
 from vsacli.cli.options import (
@@ -22,16 +23,15 @@ from vsacli.cli.options import (
     trajectory_argument,
 )
 from vsacli.cli.running import load_inputs, refuse_input_as_output
-from vsacli.errors import InputError
 
 if TYPE_CHECKING:
     from vsacli.control.gains import Gains
-    from vsacli.robot import Robot
-    from vsacli.simulation import Setup
-    from vsacli.simulation.report import SimulationReport
-    from vsacli.spec.source import Source
-    from vsacli.store.simulation_writer import SimulationWriter
-    from vsacli.trajectory import Trajectory
+    from vsacli.control.simulation import Setup
+    from vsacli.control.simulation.simulation_report import SimulationReport
+    from vsacli.documents.source import Source
+    from vsacli.results.store.simulation_writer import SimulationWriter
+    from vsacli.robot.model import Robot
+    from vsacli.trajectory.trajectory import Trajectory
 
 PROGRESS_STEPS = 1000
 FEEDBACK = "feedback-linearization"
@@ -127,10 +127,10 @@ def simulate(
     setup, sources = _setup(inputs[0], **choices)
     recorded = replace(inputs[0], sources=(*inputs[0].sources, *sources))
     refuse_input_as_output(path, (source.path for source in (*recorded.sources, *inputs[1].sources)))
-    from vsacli.store.simulation_writer import SimulationWriter
+    from vsacli.results.store.simulation_writer import SimulationWriter
 
     if plot_folder is not None:
-        from vsacli.plots import check_figures, simulation_drawings
+        from vsacli.results.plots import check_figures, simulation_drawings
 
         drawn = simulation_drawings(joint.actuator_type for joint in inputs[0].joints)
         check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)
@@ -162,7 +162,7 @@ def _setup(
     atol: float,
 ) -> tuple[Setup, list[Source]]:
     """The conditions that the options describe, and the files read for them."""
-    from vsacli.simulation import InitialError, Setup, Tolerances, perturbed
+    from vsacli.control.simulation import InitialError, Setup, Tolerances, perturbed
 
     gains: Gains | None = None
     sources: list[Source] = []
@@ -197,7 +197,7 @@ def _run(
     robot: Robot, trajectory: Trajectory, setup: Setup, writer: SimulationWriter, talk: Talk
 ) -> SimulationReport:
     """Simulate, and write what happened."""
-    from vsacli.simulation import simulate
+    from vsacli.control.simulation import simulate
 
     first, last = trajectory.times.span
     with writer, talk.progress(PROGRESS_STEPS, shown_from=0) as bar:
@@ -212,7 +212,7 @@ def _run(
 
 
 def _show(report: SimulationReport, as_json: bool) -> Exit:
-    from vsacli.simulation.report_text import render
+    from vsacli.control.simulation.simulation_text import render
 
     click.echo(json.dumps(report.as_json(), indent=1) if as_json else render(report))
     return Exit.OK if report.verdict == "ok" else Exit.VERDICT

@@ -14,7 +14,7 @@ from vsacli.cli.options import example
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from vsacli.validation import Checked
+    from vsacli.files.validation import Checked
 
 
 @click.command(
@@ -32,7 +32,7 @@ def validate(files: tuple[str, ...], as_json: bool, talk: Talk) -> int:
     or a file of poles, must fit one of the robots among the files; without any, joint names, units and limits
     are not checked. Warnings and notes are no problems; with --quiet, only problems are printed.
     """
-    from vsacli.validation import check_files
+    from vsacli.files.validation import check_files
 
     checked = check_files(list(dict.fromkeys(files)))
     if as_json:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from vsacli.arrays import FloatArray
+from vsacli.base.arrays import FloatArray
 from vsacli.control.gains import Gains
-from vsacli.control.linear import Integral, linear_control
-from vsacli.forward_dynamics import Plant
-from vsacli.motion import Motion
+from vsacli.control.linear_control import Integral, linear_control
+from vsacli.dynamics.forward import Plant
+from vsacli.trajectory.motion import Motion
 
 
 class ComputedTorque:

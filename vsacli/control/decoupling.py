@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.arrays import FloatArray
+from vsacli.actuators.pairs.decoupling_matrix import Springs, beta, determinant, solve
+from vsacli.base.arrays import FloatArray
+from vsacli.base.wrench import Wrench
 from vsacli.control.gains import Gains
-from vsacli.control.linear import Integral, linear_control
-from vsacli.forward_dynamics import Plant
-from vsacli.motion import Motion
-from vsacli.springs.decoupling_matrix import Springs, beta, determinant, solve
-from vsacli.wrench import Wrench
+from vsacli.control.linear_control import Integral, linear_control
+from vsacli.dynamics.forward import Plant
+from vsacli.trajectory.motion import Motion
 
 
 class LinkMotion(NamedTuple):

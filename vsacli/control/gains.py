@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.arrays import FloatArray
-from vsacli.errors import InputError
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
 
 POSITION_ORDER = 4
 """Degree of (33a): q is decoupled at its fourth derivative."""

@@ -7,14 +7,14 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from vsacli.actuators.drivetrain import Drivetrain
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import FieldProblem, InputError
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, STIFFNESS_ORDER, Gains, check_stable
-from vsacli.drivetrain import Drivetrain
-from vsacli.errors import FieldProblem, InputError
-from vsacli.robot import Robot
-from vsacli.spec.fields import Items, Record, check_fields, text, value
-from vsacli.spec.reading import read_document
-from vsacli.spec.source import Source
-from vsacli.suggestions import did_you_mean
+from vsacli.documents.fields import Items, Record, check_fields, text, value
+from vsacli.documents.reading import read_document
+from vsacli.documents.source import Source
+from vsacli.robot.model import Robot
 
 FORMAT = "vsacli-poles/1"
 DEFAULT = "-20"
@@ -99,7 +99,7 @@ def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) ->
 
 
 def _gains(robot: Robot, position: Sequence[Poles], stiffness: Sequence[Poles], integral: bool) -> Gains:
-    order = POSITION_ORDER if Drivetrain(robot).sprung.any() else RIGID_ORDER
+    order = POSITION_ORDER if Drivetrain(robot.actuators).sprung.any() else RIGID_ORDER
     return Gains.from_poles(
         [_counted("position", poles, order, integral) for poles in position],
         [_counted("stiffness", poles, STIFFNESS_ORDER, integral) for poles in stiffness],

@@ -1,0 +1,113 @@
+"""The map of folds of a pair: pieces of hardening, boxes that hold the outermost fold, and nothing missed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from samples.springs import SPRINGS, measured, on_side_2
+from test_branch import stiffness_under
+
+from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.laws.four_bar import FourBar
+from vsacli.actuators.laws.mirrored import Mirrored
+from vsacli.actuators.laws.polynomial import Polynomial
+from vsacli.actuators.pairs.folds import map_folds
+from vsacli.actuators.pairs.hardening import sample_hardening
+
+EPS = float(np.finfo(float).eps)
+
+LAWS: dict[str, SpringLaw] = {
+    **{f"{name} {number}": side[0] for name, both in SPRINGS.items() for number, side in enumerate(both)},
+    **{f"ratio {ratio}": FourBar(k=1, ratio=ratio) for ratio in (1.0001, 1.03, 1.1, 2, 10, 1000)},
+    "one term": Polynomial(c1=1e-3, c9=9e5),
+    "two humps": Polynomial(c1=1, c3=100, c9=1e4),
+    "linear": Polynomial(c1=7),
+}
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_hardening_is_monotone_between_its_peaks(law: SpringLaw):
+    hardening = sample_hardening(law)
+    assert hardening is not None
+    np.testing.assert_array_equal(hardening.rho, law.hardening(hardening.phi))
+    for piece in hardening.pieces():
+        low, high = hardening.phi[piece][[0, -1]]
+        # All features of these laws lie below.
+        phi = np.linspace(low, min(high, 10), 5000)
+        rho = law.hardening(phi)
+        rising = 1 if hardening.rises(piece) else -1
+        # Rounding of three derivatives; a measured curve's are sums over its knots.
+        slack = 1e-11 * np.abs(rho[1:])
+        assert np.all(rising * np.diff(rho) >= -slack)
+
+
+@pytest.mark.parametrize(("k", "k_c"), [(400, 2000), (1e-3, 1e9), (1e6, 1e-3)])
+def test_hardening_of_a_cubic_spring_peaks_where_its_formula_does(k: float, k_c: float):
+    hardening = sample_hardening(Cubic(k=k, k_c=k_c))
+    assert hardening is not None
+    # d/dphi of 6 Kc phi/(K + 3 Kc phi^2) is zero there; a slope below 1e-13 counts as none.
+    assert hardening.phi[hardening.peaks] == pytest.approx([math.sqrt(k / (3 * k_c))], rel=1e-12)
+
+
+def test_two_humps_have_three_turns():
+    hardening = sample_hardening(LAWS["two humps"])
+    assert hardening is not None
+    assert len(hardening.peaks) == 3
+
+
+@pytest.mark.parametrize("low", [-1e-6, -1e-7])
+def test_a_measured_curve_that_rounds_at_its_end_has_no_peak_there(low: float):
+    deflection = np.linspace(low, 0.5, 30)
+    law = Mirrored(law=measured(deflection, 100 * deflection**3))
+    hardening = sample_hardening(law)
+    assert hardening is not None
+    assert np.all((hardening.peaks > 0) & (hardening.peaks < len(hardening.phi) - 1))
+    assert np.all(np.diff(map_folds(law.law, law.law).edges) > 0)
+
+
+def test_a_tendon_that_pulls_the_other_way_has_no_positive_torque():
+    law, _ = on_side_2(SPRINGS["quadratic"][0])
+    assert sample_hardening(law) is None
+
+
+@pytest.mark.parametrize("name", SPRINGS)
+def test_corners_of_the_boxes_are_folds(name: str):
+    (first, _), (second, _) = SPRINGS[name][0], on_side_2(SPRINGS[name][1])
+    folds = map_folds(first, second)
+    assert np.all(np.diff(folds.edges) > 0)
+    assert (folds.edges[0], folds.edges[-1]) == (-math.inf, math.inf)
+    for tau_e, phi_1, phi_2 in zip(folds.tau_e, folds.phi_1, folds.phi_2, strict=True):
+        known = np.isfinite(tau_e) & (np.abs(tau_e) < 1e3) & (np.abs(tau_e) > 1e-6)
+        tau_e, phi_1, phi_2 = tau_e[known], phi_1[known], phi_2[known]
+        np.testing.assert_allclose(first.torque(phi_1) + second.torque(phi_2), tau_e, rtol=4 * EPS)
+        rho_1, rho_2 = first.hardening(phi_1), second.hardening(phi_2)
+        # One of the two deflections is a root for the hardening of the other.
+        np.testing.assert_allclose(rho_1, rho_2, rtol=1e-10)
+
+
+def test_tendons_against_each_other_have_no_fold():
+    (first, _), (second, _) = SPRINGS["exponential"][0], on_side_2(SPRINGS["exponential"][1])
+    assert np.all(np.isnan(map_folds(first, second).tau_e))
+
+
+def folds_of(springs: tuple[Cubic, Cubic], tau_e: float) -> int:
+    """How often the stiffness turns around over the torque of side 1, by a dense scan."""
+    share = np.linspace(0, 1, 20_001)
+    torques = zip(springs, (share * tau_e, (1 - share) * tau_e), strict=True)
+    stiffness = sum((stiffness_under(spring, torque) for spring, torque in torques), start=np.zeros(20_001))
+    return int(np.count_nonzero(np.diff(np.sign(np.diff(stiffness)))))
+
+
+def test_two_folds_are_born_where_the_outermost_fold_jumps():
+    springs = Cubic(k=400, k_c=2000), Cubic(k=440, k_c=2000)
+    folds = map_folds(*springs)
+    # Neighbouring boxes touch, except where the outermost fold jumps.
+    jump = np.abs(folds.phi_1[0, 1:] - folds.phi_1[1, :-1]) > 1e-3 * np.abs(folds.phi_1[1, :-1])
+    jumps = folds.edges[1:-1][jump]
+    (birth,) = jumps[np.abs(jumps) < 1e6]
+    # Right after the birth they are apart by the root of the relative distance, and so seen by the scan.
+    assert folds_of(springs, birth * (1 - 1e-4)) == 1
+    assert folds_of(springs, birth * (1 + 1e-4)) == 3

@@ -1,0 +1,216 @@
+"""Usage errors, output that cannot be written, and standard output that is full or closed."""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import subprocess
+
+import click
+import pytest
+from samples.command_line import COMMAND, REST_TO_REST, ROBOT, contents, edited, installed
+
+from vsacli import __version__
+from vsacli.cli.exit_codes import Exit
+from vsacli.cli.main import vsacli as group
+
+
+def test_version(tmp_path):
+    done = installed("--version", folder=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"vsacli {__version__}\n", "")
+
+
+def test_help_names_every_command_and_exit_code(vsacli):
+    short, long = vsacli("-h"), vsacli("--help")
+    assert short == long
+    assert (short.code, short.err) == (0, "")
+    for command in group.commands:
+        assert re.search(rf"^  {command} +\w.*\.$", short.out, re.MULTILINE)  # a whole sentence, not cut off
+    for code in Exit:
+        assert f"{code.value:<3}  {code.meaning}" in short.out
+
+
+def test_help_lists_commands_by_use(vsacli):
+    listing = vsacli("--help").out.partition("\nComputing:\n")[2].partition("Example:")[0]
+    assert re.findall(r"^  ([\w-]+) ", listing, re.MULTILINE) == list(group.commands)
+    assert re.findall(r"^(\w+):$", listing, re.MULTILINE) == ["Results", "Files"]
+
+
+@pytest.mark.parametrize("command", group.commands)
+def test_help_of_a_command_explains_each_option_and_shows_an_example(vsacli, command):
+    done = vsacli(command, "-h")
+    assert (done.code, done.err) == (0, "")
+    assert f"Example:\n    vsacli {command} " in done.out
+    options = [each for each in group.commands[command].params if isinstance(each, click.Option)]
+    assert all(each.help and each.help.endswith(".") for each in options)
+    assert len(max(done.out.splitlines(), key=len)) <= 100
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "Usage: vsacli"),
+        (["invdyn", str(ROBOT)], "Missing argument 'TRAJECTORY'"),
+        (["invdin"], "No such command 'invdin'"),
+        (["plot"], "Missing argument 'FILE...'"),
+        (["export", "r.h5", "--rate", "fast"], "'fast' is not a valid float"),
+        (["check-feasibility", "--jason"], "No such option"),
+    ],
+    ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
+)
+def test_usage_error(vsacli, tmp_path, arguments, message):
+    done = vsacli(*arguments)
+    assert (done.code, done.out) == (2, "")
+    assert message in done.err
+    assert contents(tmp_path) == {}
+
+
+@pytest.mark.parametrize(
+    ("output", "message"),
+    [
+        ("absent/r.h5", "there is no folder"),
+        (".", "is a folder; give the name of a file"),
+        ("move.yaml/r.h5", "there is no folder|Not a directory"),
+        ("", "is a folder; give the name of a file"),
+        ("/dev/null", "is not a regular file and cannot be replaced"),
+        (f"{'r' * 300}.h5", "the file name is too long"),
+    ],
+    ids=["no folder", "a folder", "below a file", "nameless", "a device", "long name"],
+)
+def test_result_that_cannot_be_written(vsacli, tmp_path, motion, output, message):
+    done = vsacli("invdyn", ROBOT, motion, "-o", output)
+    assert (done.code, done.out) == (4, "")
+    assert re.search(message, done.err)
+    assert done.err.count("\n") == 1
+    assert contents(tmp_path).keys() == {"move.yaml"}
+
+
+@pytest.mark.parametrize("command", ["invdyn", "export", "plot"])
+def test_folder_without_permission(vsacli, tmp_path, motion, feasible_result, command):
+    (tmp_path / "locked").mkdir(mode=0o555)
+    if os.access(tmp_path / "locked", os.W_OK):
+        pytest.skip("this user may write everywhere")
+    arguments = {
+        "invdyn": (ROBOT, motion, "-o", "locked/r.h5"),
+        "export": (feasible_result, "-o", "locked/t.csv"),
+        "plot": (feasible_result, "-o", "locked"),
+    }
+    done = vsacli(command, *arguments[command])
+    assert done.code == 4
+    assert "no permission to write into this folder" in done.err
+
+
+def limit_file_size():
+    """In a child process: no file grows beyond 50 kB, as if the disk were full."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+
+
+@pytest.mark.parametrize("command", ["invdyn", "export", "plot"])
+def test_full_disk_leaves_the_old_file(tmp_path, motion, feasible_result, command):
+    (tmp_path / "r.h5").write_bytes(b"old result")
+    (tmp_path / "t.csv").write_bytes(b"old torques")
+    (tmp_path / "result-motion.png").write_bytes(b"old figure")
+    arguments = {
+        "invdyn": (ROBOT, motion, "-o", "r.h5"),
+        "export": (feasible_result, "--variables", "theta,tau_motor,tau_e", "-o", "t.csv"),
+        "plot": (feasible_result,),
+    }
+    before = contents(tmp_path)
+    done = installed(command, *arguments[command], "--overwrite", folder=tmp_path, preexec_fn=limit_file_size)
+    assert (done.returncode, done.stdout) == (4, "")
+    assert re.fullmatch(
+        r"\S+: cannot be written: the file would exceed the largest file size allowed here; .*\n", done.stderr
+    )
+    assert contents(tmp_path) == before
+
+
+TO_STDOUT = {
+    "help": ("--help",),
+    "help of a command": ("invdyn", "--help"),
+    "version": ("--version",),
+    "report": ("check-feasibility", ROBOT, "move.yaml"),
+    "table": ("export", "result.h5"),
+}
+
+
+@pytest.fixture(params=["", "1"], ids=["buffered", "unbuffered"])
+def printing(request, tmp_path, motion, feasible_result, monkeypatch):
+    """A folder in which each of `TO_STDOUT` prints something, at once or when the buffer is full."""
+    monkeypatch.setenv("PYTHONUNBUFFERED", request.param)
+    (tmp_path / "result.h5").symlink_to(feasible_result)
+    assert motion.parent == tmp_path
+    return tmp_path
+
+
+@pytest.mark.parametrize("arguments", TO_STDOUT.values(), ids=TO_STDOUT)
+def test_full_stdout_is_told(printing, arguments):
+    with open("/dev/full", "w") as full:
+        done = installed(*arguments, folder=printing, stdout=full)
+    assert done.returncode == 4
+    assert done.stderr == "standard output: cannot be written: No space left on device\n"
+
+
+@pytest.mark.parametrize("arguments", TO_STDOUT.values(), ids=TO_STDOUT)
+def test_reader_that_went_away_is_no_trouble_to_talk_about(printing, arguments):
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        done = installed(*arguments, folder=printing, stdout=writing)
+    finally:
+        os.close(writing)
+    assert (done.returncode, done.stderr) == (4, "")
+
+
+def shell(command, folder):
+    """Run a shell command that needs a redirection or a pipe."""
+    return subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_head_of_a_table(printing):
+    done = shell(f"{COMMAND} export result.h5 --variables q,dq,ddq,tau_motor,theta | head -1", printing)
+    assert (done.returncode, done.stderr) == (0, "")  # the exit code is that of `head`
+    assert done.stdout.startswith("time,base.q,shoulder.q,")
+    assert done.stdout.count("\n") == 1
+
+
+def test_result_is_computed_without_a_standard_output(tmp_path, motion):
+    done = shell(f"{COMMAND} invdyn {ROBOT} {motion} -o r.h5 >&-", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "wrote r.h5\n")
+
+
+def test_table_needs_a_standard_output(tmp_path, feasible_result):
+    done = shell(f"{COMMAND} export {feasible_result} >&-", tmp_path)
+    assert done.returncode == 4
+    assert done.stderr == "standard output: is closed; name a file with -o\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [
+        (("invdyn", ROBOT, "move.yaml", "-o", "r.h5"), 0),
+        (("invdyn", "absent.yaml", "move.yaml"), 2),
+        (("x",), 2),
+    ],
+    ids=["note", "error", "usage"],
+)
+def test_full_stderr_does_not_change_the_exit_code(tmp_path, motion, arguments, code):
+    assert motion == tmp_path / "move.yaml"
+    with open("/dev/full", "w") as full:
+        assert installed(*arguments, folder=tmp_path, stderr=full).returncode == code
+
+
+def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
+    edited(ROBOT, tmp_path / "r.yaml", ("name: vsa-3r", "name: φ-arm"))
+    environment = {**os.environ, "PYTHONIOENCODING": "latin-1"}
+    done = installed("check-feasibility", "r.yaml", motion, folder=tmp_path, env=environment)
+    assert done.returncode == 0
+    assert done.stdout.startswith("\\u03c6-arm, rest-to-rest: 401 steps")
+
+
+@pytest.mark.parametrize("command", ["invdyn", "simulate"])
+def test_a_csv_name_for_an_hdf5_file_is_refused(vsacli, tmp_path, command):
+    done = vsacli(command, ROBOT, REST_TO_REST, "-o", "torques.csv")
+    assert done.code == Exit.USAGE
+    assert "'torques.csv': the file is HDF5; `vsacli export` makes CSV of it" in done.err
+    assert not list(tmp_path.iterdir())

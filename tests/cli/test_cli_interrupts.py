@@ -1,0 +1,91 @@
+"""A run that is ended from outside leaves the old complete file, or none."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import time
+
+import h5py
+import pytest
+from samples.command_line import COMMAND, ROBOT, SEVEN_JOINTS, contents, installed, seven_joint_motion
+
+PATIENCE = 60
+"""Seconds until a run that should have started writing counts as broken."""
+
+
+def allow_interrupts():
+    """In a child process: undo that a parent may ignore Ctrl-C, as shells do for background jobs."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@pytest.fixture
+def writing(tmp_path):
+    """A run of a million samples that writes r.h5, and is in the middle of it."""
+    seven_joint_motion(tmp_path / "long.yaml", rate=333_333)
+    arguments = [SEVEN_JOINTS, "long.yaml", "-o", "r.h5", "--variables", "tau_motor,flags", "--overwrite"]
+    process = subprocess.Popen(
+        [COMMAND, "invdyn", *arguments],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=allow_interrupts,
+    )
+    with process:
+        deadline = time.monotonic() + PATIENCE
+        while sum(path.stat().st_size for path in temporaries(tmp_path)) < 5_000_000:  # bytes, of 130 MB
+            assert time.monotonic() < deadline, "nothing is written"
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.02)
+        yield process
+        process.kill()
+
+
+def temporaries(folder):
+    return list(folder.glob(".vsacli-*.tmp"))
+
+
+@pytest.fixture(params=[b"old and complete", None], ids=["overwriting", "new"])
+def target(request, tmp_path):
+    """What stands at r.h5 before: a file or nothing."""
+    if request.param is not None:
+        (tmp_path / "r.h5").write_bytes(request.param)
+    return {} if request.param is None else {"r.h5": request.param}
+
+
+def test_interrupt_leaves_the_target_and_nothing_else(tmp_path, target, writing):
+    writing.send_signal(signal.SIGINT)
+    out, err = writing.communicate(timeout=PATIENCE)
+    assert (writing.returncode, out, err.strip()) == (130, "", "interrupted")
+    left = contents(tmp_path)
+    del left["long.yaml"]
+    assert left == target
+
+
+def test_killed_run_leaves_the_target_and_does_not_disturb_the_next(tmp_path, target, writing, motion):
+    writing.kill()
+    out, err = writing.communicate(timeout=PATIENCE)
+    assert (writing.returncode, out, err) == (-signal.SIGKILL, "", "")
+    left = contents(tmp_path)
+    assert {name: left[name] for name in left if not name.startswith(".") and name.endswith(".h5")} == target
+    assert installed("invdyn", ROBOT, motion, "-o", "r.h5", "--overwrite", folder=tmp_path).returncode == 0
+    with h5py.File(tmp_path / "r.h5") as file:
+        assert file.attrs["complete"] == 1
+
+
+def test_interrupt_without_a_file(tmp_path):
+    seven_joint_motion(tmp_path / "long.yaml", rate=3_333_333)
+    process = subprocess.Popen(
+        [COMMAND, "check-feasibility", SEVEN_JOINTS, "long.yaml", "-v"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=allow_interrupts,
+    )
+    with process:
+        assert process.stderr.readline().startswith("lwr-7r-vsa: 7 joints;")  # the inputs are read
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out, err.strip()) == (130, "", "interrupted")

@@ -1,0 +1,174 @@
+"""`vsacli simulate`: files, report, exit codes, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from samples.command_line import REPOSITORY, ROBOT, contents, edited
+
+from vsacli.base.errors import InputError
+from vsacli.base.simulation_variables import SIMULATION_VARIABLES
+from vsacli.cli.exit_codes import Exit
+from vsacli.results.store.reader import open_result
+from vsacli.results.store.simulation import StoredSimulation
+
+FEEDBACK = ("--controller", "feedback-linearization")
+
+
+@pytest.fixture
+def quick(motion):
+    """The rest-to-rest motion of the 3R arm in one second, 26 steps."""
+    return edited(
+        motion,
+        motion.with_name("quick.yaml"),
+        ("rate: 100 ", "rate: 25 "),
+        ("duration: 4.0", "duration: 1.0"),
+    )
+
+
+def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
+    done = vsacli("simulate", ROBOT, quick)
+    assert done.code == Exit.OK
+    assert done.out.splitlines()[0].startswith("vsa-3r, rest-to-rest: feedforward, 1 s")
+    assert done.err == "wrote vsa_3r-quick-simulation.h5\n"
+    with StoredSimulation.open(tmp_path / "vsa_3r-quick-simulation.h5") as stored:
+        assert stored.attributes["format"] == "vsacli-simulation/1"
+        assert (stored.verdict, stored.complete, stored.samples) == ("ok", True, 26)
+        assert list(stored.variables) == [name for name in SIMULATION_VARIABLES if name != "time"]
+        q, actual, error = (stored.read(name) for name in ("q", "q_actual", "q_error"))
+        assert np.array_equal(actual - q, error)
+        assert np.abs(error).max() < 1e-8  # the integrator's tolerance, as elsewhere
+        assert stored.report["format"] == "vsacli-simulation-report/1"
+
+
+def test_a_simulation_opens_in_xarray(vsacli, quick, tmp_path):
+    vsacli("simulate", ROBOT, quick, "-o", "s.h5")
+    with xarray.open_dataset(tmp_path / "s.h5", engine="h5netcdf") as data:
+        assert data.q_actual.dims == ("time", "joint")
+        assert data.tau_motor_actual.dims == ("time", "joint", "motor")
+        assert data.q_actual.attrs["units"] == "rad"
+        assert "as it was" in data.q_actual.attrs["long_name"]
+
+
+def test_feedback_from_a_poles_file(vsacli, quick, tmp_path):
+    poles = tmp_path / "poles.yaml"
+    rows = "".join(f"  - name: {name}\n    position: -25\n" for name in ("base", "shoulder", "elbow"))
+    poles.write_text(f"format: vsacli-poles/1\njoints:\n{rows}")
+    done = vsacli(
+        "simulate", ROBOT, quick, *FEEDBACK, "--poles", poles, "--initial-error", "0.01,0,-0.01",
+        "--initial-stiffness-error", "10", "-o", "s.h5", "--json", "--plot", "figures",
+    )  # fmt: skip
+    assert done.code == Exit.OK
+    report = json.loads(done.out)
+    assert [joint["q_error"]["peak"] for joint in report["joints"]] == pytest.approx(
+        [0.01, 0, 0.01], abs=1e-9
+    )
+    assert all(abs(joint["q_error"]["final"]) < 1e-8 for joint in report["joints"])  # 1 s at 25/s
+    names = ("position-error", "stiffness-error", "motor-torque")
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {f"s-{name}.png" for name in names}
+    with h5py.File(tmp_path / "s.h5") as file:
+        read = [group.attrs["path"] for name, group in file["inputs"].items() if name.startswith("file_")]
+    assert set(read) == {str(ROBOT), str(quick), str(poles)}
+
+
+def test_a_run_that_ends_early_is_written_with_exit_code_3(vsacli, too_soft, tmp_path):
+    done = vsacli("simulate", ROBOT, too_soft, "-o", "s.h5")
+    assert done.code == Exit.VERDICT
+    assert "INFEASIBLE" in done.out
+    assert "there are no torques to apply; ended at t = " in done.out
+    with StoredSimulation.open(tmp_path / "s.h5") as stored:
+        assert (stored.verdict, stored.complete) == ("infeasible", False)
+        assert 0 < stored.samples < 401
+
+
+def test_perturbed_runs_are_repeatable(vsacli, quick):
+    arguments = ("simulate", ROBOT, quick, "--perturb", "0.02", "--json", "--overwrite", "-o", "s.h5")
+    first, second, other = vsacli(*arguments), vsacli(*arguments), vsacli(*arguments, "--seed", "1")
+    assert first.out == second.out != other.out
+
+
+def test_measured_positions_are_reported(vsacli, quick):
+    fine = edited(
+        quick, quick.with_name("fine.yaml"), ("rate: 25 ", "rate: 250 "), ("duration: 1.0", "duration: 0.8")
+    )
+    done = vsacli("simulate", ROBOT, fine, *FEEDBACK, "--measure", "positions", "--initial-error", "0.01")
+    assert done.code == Exit.OK
+    assert "base: with the full state the q error is 0.01 rad at its peak" in done.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((*FEEDBACK, "--poles", "-1,-2,-3,1"), "the pole 1 of the position error is unstable"),
+        ((*FEEDBACK, "--poles", "-1,-2"), "this robot has 4 poles without integral action, not 2"),
+        ((*FEEDBACK, "--integral", "--poles", "-1,-2,-3,-4"), "has 5 poles with integral action, not 4"),
+        ((*FEEDBACK, "--stiffness-poles", "5"), "the pole 5 of the stiffness error is unstable"),
+        ((*FEEDBACK, "--poles", "fast"), "expected poles such as -20,-21"),
+        ((*FEEDBACK, "--poles", "none.yaml"), "none.yaml: no such file"),
+        (("--poles", "-20"), "poles and integral action need --controller feedback-linearization"),
+        (("--measure", "positions"), "measured positions need the controller feedback-linearization"),
+        (("--initial-error", "0.1,0.2"), "one for each of the 3 joints"),
+        (("--initial-error", "much"), "expected a number, or one for each joint"),
+        (("--rtol", "0"), "the tolerances must be positive"),
+        (("--perturb", "2"), "the relative error of the model must lie between 0 and 1"),
+        (("--initial-stiffness-error", "-100"), "no state at the start has this position and stiffness"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)  # fmt: skip
+def test_what_cannot_be_simulated_is_refused(vsacli, quick, tmp_path, arguments, message):
+    before = contents(tmp_path)
+    done = vsacli("simulate", ROBOT, quick, *arguments)
+    assert done.code == Exit.USAGE
+    assert message in done.err
+    assert "Traceback" not in done.err
+    assert contents(tmp_path) == before
+
+
+def test_a_rigid_joint_among_others_is_refused_by_name(vsacli, tmp_path):
+    done = vsacli(
+        "simulate", REPOSITORY / "robots/mixed_3r.yaml", REPOSITORY / "trajectories/mixed_3r.yaml", *FEEDBACK
+    )
+    assert done.code == Exit.USAGE
+    assert "feedback linearization needs springs at all joints or at none: base is rigid" in done.err
+    assert contents(tmp_path) == {}
+
+
+@pytest.mark.parametrize(
+    ("wrench", "message"),
+    [
+        ("{frame: base, type: constant, value: [1, 2, 3, 4, 5]}", "expected 6 numbers, found 5"),
+        (
+            "{frame: base, type: polynomial, degree: 1, start: [0, 0, 0, 0, 0, 0], end: [1, 0, 0, 0, 0, 0]}",
+            "the wrench must be twice differentiable",
+        ),
+    ],
+    ids=["too short", "not smooth"],
+)
+def test_a_wrench_that_cannot_act_is_refused(vsacli, quick, tmp_path, wrench, message):
+    quick.write_text(f"{quick.read_text()}\nwrench: {wrench}\n")
+    done = vsacli("simulate", ROBOT, quick)
+    assert done.code == Exit.USAGE
+    assert re.match(r"\S*quick.yaml:\d+: ", done.err)
+    assert message in done.err
+    assert not list(tmp_path.glob("*.h5"))
+
+
+def test_files_that_exist_are_kept(vsacli, quick, tmp_path):
+    (tmp_path / "s.h5").write_text("mine")
+    done = vsacli("simulate", ROBOT, quick, "-o", "s.h5")
+    assert done.code == Exit.STORAGE
+    assert (tmp_path / "s.h5").read_text() == "mine"
+    assert vsacli("simulate", ROBOT, quick, "-o", quick, "--overwrite").code == Exit.USAGE
+
+
+def test_a_simulation_is_no_result_of_invdyn(vsacli, quick, tmp_path):
+    vsacli("simulate", ROBOT, quick, "-o", "s.h5")
+    with pytest.raises(
+        InputError, match=r"is a simulation \(vsacli-simulation/1\), expected a result \(vsacli-result/1\)"
+    ):
+        open_result(tmp_path / "s.h5")

@@ -1,0 +1,98 @@
+"""Every operation written as C, for single samples and for lanes of them, against NumPy."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from samples.generated_code import COMPILERS, Compiled, compile_c
+from test_tracing import ELEMENTWISE, samples
+from test_tracing_control_flow import FUNCTIONS as NESTED
+
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.engine.kernel import record
+from vsacli.compute.engine.lanes import batch_source
+from vsacli.compute.engine.library import Library
+from vsacli.control.codegen.interface import Array, Function, Structure
+from vsacli.control.codegen.scalar import source_text
+
+pytestmark = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+
+UNITS = 4
+"""In the last place: what libm, its vector functions and NumPy's vector functions promise."""
+
+EXACT = ("operators", "add", "subtract", "multiply", "divide", "sqrt", "small powers", "negative", "absolute")
+"""Rounded as the norm of floating-point arithmetic says."""
+
+PROCESSORS = ("native", "x86-64", "x86-64-v3") if platform.machine() == "x86_64" else ("native",)
+"""Registers of different widths, and a processor for which there are no vector functions."""
+
+
+def as_number(name: str, x: Any, y: Any) -> Any:
+    """An operation, truth values as 1 and 0."""
+    value, of_ones = (ELEMENTWISE[name](*rows) for rows in ((x, y), (np.ones(1), np.ones(1))))
+    return np.where(value, 1.0, 0.0) if of_ones.dtype == np.bool_ else value
+
+
+@dataclass(frozen=True)
+class Everything:
+    """All operations of two values, and all loops, branches and tables, as one kernel."""
+
+    inputs = 2
+    outputs = len(ELEMENTWISE) + sum(len(np.atleast_2d(function(np.ones(1)))) for function in NESTED)
+
+    def __call__(self, rows: Sequence[Any]) -> list[Any]:
+        x, y = rows
+        values = [as_number(name, x, y) for name in ELEMENTWISE]
+        for function in NESTED:
+            results = function(x)
+            values += results if isinstance(results, list) else [results]
+        return values
+
+
+def wrong(found: FloatArray, x: FloatArray, y: FloatArray) -> list[str]:
+    """Operations whose results are not NumPy's, with where."""
+    names = [*ELEMENTWISE, *["nested"] * Everything.outputs]
+    with np.errstate(all="ignore"):
+        expected = [np.asarray(value, dtype=float) for value in Everything()([x, y])]
+        return [
+            f"{name} at {x[off][0]}, {y[off][0]}: {row[off][0]}, not {right[off][0]}"
+            for name, row, right in zip(names, found, expected, strict=False)
+            if (off := ~close(row, right, 0 if name in EXACT else UNITS)).any()
+        ]
+
+
+def close(found: FloatArray, expected: FloatArray, units: int) -> BoolArray:
+    alike = (found == expected) | (np.isnan(found) & np.isnan(expected))
+    return alike | (np.abs(found - expected) <= units * np.spacing(np.abs(expected)))
+
+
+def test_of_single_samples(tmp_path: Path) -> None:
+    values = Structure("values", "", (Array("x", (2,), ""),))
+    results = Structure("results", "", (Array("y", (Everything.outputs,), ""),))
+    function = Function("all", "", (("values", values),), results, Everything(), flagged=False)
+    (tmp_path / "each.h").write_text(
+        "typedef struct { double x[2]; } each_values;\n"
+        f"typedef struct {{ double y[{Everything.outputs}]; }} each_results;\n"
+        "void each_all(const each_values *values, each_results *results);\n"
+    )
+    (tmp_path / "each.c").write_text(source_text("each", [function], "double", "/* all */"))
+    x, y = samples()
+    found, _ = Compiled(tmp_path, "each")(function, {"x": np.column_stack([x, y])})
+    assert wrong(found["y"].T, x, y) == []
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("processor", PROCESSORS)
+def test_of_lanes(compiler: str, processor: str, tmp_path: Path) -> None:
+    (tmp_path / "lanes.c").write_text(batch_source(record(Everything())))
+    machine = ["-std=gnu11", "-O1", "-fno-math-errno", "-fPIC", "-shared", f"-march={processor}"]
+    compile_c(tmp_path, *machine, "lanes.c", "-o", "lanes.so", "-lm", compiler=compiler)
+    library = Library(tmp_path / "lanes.so", Everything.outputs)
+    x, y = samples()
+    assert wrong(library([x, y], 1), x, y) == []

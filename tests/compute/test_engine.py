@@ -1,0 +1,203 @@
+"""Compiled code beside NumPy: every variable, at every kind of step, for every kind of robot."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samples.drives import ALIKE, joint_with, springs
+from samples.engines import assert_agree, demands, kinds_of_steps, needs_compiler, random_wrench
+from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
+
+from vsacli import load_robot
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.laws.exponential import Exponential
+from vsacli.actuators.laws.four_bar import FourBar
+from vsacli.actuators.laws.polynomial import Polynomial
+from vsacli.actuators.laws.quadratic import Quadratic
+from vsacli.actuators.laws.sinh import Sinh
+from vsacli.base.flags import Flag
+from vsacli.compute.engine import choose, compiler
+from vsacli.compute.engine.engines import Engine
+from vsacli.dynamics.inverse import InverseDynamics, compute_block
+from vsacli.dynamics.link_torques import link_torques
+from vsacli.robot.model import Robot
+
+pytestmark = needs_compiler
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+SAMPLES = 400
+
+
+@pytest.fixture(autouse=True, scope="module")
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture
+def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile without optimisation, for code that is run on a few samples only."""
+    flags = tuple("-O0" if flag == "-O2" else flag for flag in compiler.FLAGS)
+    monkeypatch.setattr(compiler, "FLAGS", flags)
+    compiler._examined.cache_clear()
+
+
+def compiled(robot: Robot, threads: int = 1, frame: str | None = None) -> Engine:
+    return choose("c", InverseDynamics(robot, frame), 1, threads).engine
+
+
+def one_joint(*laws: SpringLaw) -> Robot:
+    return Robot(name="one-joint", joints=(joint_with(springs(*laws)),))
+
+
+@pytest.mark.usefixtures("quickly")
+@pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "mixed_3r", "tendon_1r"])
+def test_example_robots_agree(name: str):
+    robot = load_robot(ROBOTS / f"{name}.yaml")
+    motion = demands(robot, SAMPLES)
+    assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))
+
+
+def test_seven_joints_agree():
+    """With the flags of a real run: contracted and vectorised."""
+    robot = load_robot(ROBOTS / "lwr_7r_vsa.yaml")
+    motion = demands(robot, 5000)
+    expected = compute_block(robot, motion)
+    steps = kinds_of_steps(expected)
+    assert all(steps[flag] > 100 for flag in (Flag.INFEASIBLE, Flag.SINGULAR, Flag.NEAR_SINGULAR))
+    assert_agree(compute_block(robot, motion, engine=compiled(robot)), expected)
+
+
+PAIRS = {
+    "cubic": (ALIKE, ALIKE),
+    "cubics": (ALIKE, Cubic(k=440, k_c=2000)),
+    "polynomial": (Polynomial(c1=400, c3=900, c5=9000), Polynomial(c1=400, c3=900, c5=9000)),
+    "sinh": (Sinh(k=5, a=7), Sinh(k=6, a=7)),
+    "sinhs": (Sinh(k=5, a=7), Sinh(k=6, a=8)),
+    "exponential": (Exponential(c=5, a=7), Exponential(c=5, a=7)),
+    "quadratic": (Quadratic(k=800), Quadratic(k=800)),
+    "four_bar": (FourBar(k=400, ratio=1.5), FourBar(k=400, ratio=1.5)),
+}
+
+
+STRETCHED = {"stiffness_upper": 1e-9}
+"""At the end of the four-bar's domain one unit in the last place of a deflection changes it by 1e-10."""
+
+
+@pytest.mark.usefixtures("quickly")
+@pytest.mark.parametrize("pair", PAIRS)
+def test_spring_laws_agree(pair: str):
+    robot = one_joint(*PAIRS[pair])
+    motion = demands(robot, SAMPLES)
+    expected = compute_block(robot, motion)
+    steps = kinds_of_steps(expected)
+    assert SAMPLES / 40 < steps[Flag.INFEASIBLE] < SAMPLES / 2
+    found = compute_block(robot, motion, engine=compiled(robot))
+    assert_agree(found, expected, STRETCHED if pair == "four_bar" else None)
+
+
+@pytest.mark.usefixtures("quickly")
+def test_measured_springs_agree():
+    robot = load_robot(ROBOTS / "measured_1r.yaml")
+    motion = demands(robot, SAMPLES)
+    assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))
+
+
+@pytest.mark.usefixtures("quickly")
+def test_other_preload_and_followed_deflections_agree():
+    robot = one_joint(ALIKE, ALIKE)
+    actuator = robot.joints[0].actuator
+    assert isinstance(actuator, Antagonistic)
+    turned = Robot(name="turned", joints=(joint_with(replace(actuator, preload="negative")),))
+    motion = demands(turned, SAMPLES)
+    expected = compute_block(turned, motion)
+    assert_agree(compute_block(turned, motion, engine=compiled(turned)), expected)
+    followed = np.moveaxis(expected.phi, 0, -1) * 1.001
+    kernel = InverseDynamics(turned, followed=True)
+    engine = choose("c", kernel, 1, 1).engine
+    found = compute_block(turned, motion, followed=followed, engine=engine)
+    assert_agree(found, compute_block(turned, motion, followed=followed))
+
+
+@pytest.mark.usefixtures("quickly")
+@pytest.mark.parametrize("frame", ["end_effector", "base"])
+def test_wrench_counts_in_either_frame(frame: str):
+    robot = load_robot(ROBOTS / "rp_2.yaml")
+    wrench = random_wrench(SAMPLES, frame)
+    motion = demands(robot, SAMPLES, wrench=wrench)
+    found = compute_block(robot, motion, engine=compiled(robot, frame=frame))
+    assert_agree(found, compute_block(robot, motion))
+    assert not np.allclose(found.tau_e, compute_block(robot, demands(robot, SAMPLES)).tau_e)
+
+
+@pytest.mark.usefixtures("quickly")
+def test_robots_that_differ_in_a_limit_alone_are_told_apart():
+    """Springs compare equal whatever their limits, for pairs of them to be alike."""
+    motion = demands(one_joint(ALIKE, ALIKE), SAMPLES)
+    beyond = []
+    for largest in (0.3, 0.4):
+        limited = replace(ALIKE, max_deflection=largest)
+        robot = one_joint(limited, limited)
+        expected = compute_block(robot, motion)
+        beyond.append(kinds_of_steps(expected)[Flag.DEFLECTION_LIMIT])
+        assert_agree(compute_block(robot, motion, engine=compiled(robot)), expected)
+    assert beyond[0] > beyond[1] > 0
+
+
+def joined(robot: Robot, motion: MotionArrays, starts: list[int]) -> np.ndarray:
+    parts = [
+        np.array(link_torques(robot, *(array[start:stop] for array in motion), engine="c"))
+        for start, stop in zip(starts, [*starts[1:], None], strict=True)
+    ]
+    return np.concatenate(parts, axis=1)
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="names processors of that kind")
+@pytest.mark.parametrize("processor", ["x86-64", "haswell"])
+def test_shorter_vectors_agree(processor: str, monkeypatch: pytest.MonkeyPatch):
+    """2 lanes without, 4 with functions of math.h for vectors; any number of samples is left over."""
+    flags = tuple(f"-march={processor}" if flag == compiler.NATIVE else flag for flag in compiler.FLAGS)
+    monkeypatch.setattr(compiler, "FLAGS", flags)
+    compiler._examined.cache_clear()
+    robot = one_joint(ALIKE, Cubic(k=440, k_c=2000))
+    for samples in (SAMPLES, SAMPLES + 1, 3):
+        motion = demands(robot, samples)
+        assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))
+
+
+def test_results_depend_neither_on_blocks_nor_on_threads():
+    """To the last bit: each sample is computed by the same instructions, in whatever lane."""
+    robot = random_robot("RPR", seed=4)
+    motion = random_motion(robot, 8207, seed=1)
+    whole = np.array(link_torques(robot, *motion, engine="c"))
+    np.testing.assert_array_equal(joined(robot, motion, [0, 1, 3, 6, 10, 17, 26, 4097]), whole)
+    kernel = InverseDynamics(robot)
+    demanded = demands(robot, 8207)
+    one, three = (
+        compute_block(robot, demanded, engine=choose("c", kernel, 1, threads).engine) for threads in (1, 3)
+    )
+    for name, array in one.arrays().items():
+        np.testing.assert_array_equal(three.arrays()[name], array)
+
+
+def test_link_torques_of_no_samples():
+    empty = np.empty((0, 3))
+    for torques in link_torques(vsa_3r(), *[empty] * 5, engine="c"):
+        assert torques.shape == (0, 3)
+
+
+def test_memory_layout_does_not_matter():
+    robot = vsa_3r()
+    motion = random_motion(robot, 20, seed=2)
+    strided = [np.repeat(array, 2, axis=0)[::2] for array in motion]
+    np.testing.assert_array_equal(
+        link_torques(robot, *strided, engine="c"), link_torques(robot, *motion, engine="c")
+    )

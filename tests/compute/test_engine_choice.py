@@ -1,0 +1,148 @@
+"""Which engine computes, and what the user learns about it."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samples.command_line import ROBOT
+from samples.engines import needs_compiler
+from samples.robots import random_motion, vsa_3r
+
+from vsacli.base.errors import InputError
+from vsacli.compute.engine import NUMPY, choice, choose
+from vsacli.compute.engine.choice import LOOK_FROM
+from vsacli.compute.engine.engines import CompiledEngine
+from vsacli.compute.engine.loading import _loaded
+from vsacli.dynamics.link_torques import LinkTorques, link_torques
+
+KERNEL = LinkTorques(vsa_3r())
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("CC", raising=False)
+    _loaded.clear()
+    return tmp_path / "cache"
+
+
+def program(folder: Path, name: str, text: str) -> Path:
+    path = folder / name
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return path
+
+
+def test_unknown_engine_is_refused_with_the_nearest_one():
+    with pytest.raises(InputError, match="unknown engine 'nunpy'; did you mean 'numpy'"):
+        choose("nunpy", KERNEL, 1)
+
+
+@pytest.mark.parametrize("name", ["numpy", "auto"])
+def test_few_samples_are_left_to_numpy_and_nothing_is_compiled(name: str, own_cache: Path):
+    assert choose(name, KERNEL, LOOK_FROM - 1).engine is NUMPY
+    assert not own_cache.exists()
+
+
+@needs_compiler
+def test_auto_compiles_for_many_samples_and_remembers_it_for_fewer():
+    rarely, often = LOOK_FROM, 10_000_000
+    assert (
+        choose("auto", KERNEL, rarely).reason == f"NumPy computes: {rarely} samples would not repay compiling"
+    )
+    assert choose("auto", KERNEL, often, 2).reason == "C code computes, compiled now, in 2 threads"
+    _loaded.clear()  # as in another process
+    assert choose("auto", KERNEL, rarely, 1).reason == "C code computes, compiled before, in 1 thread"
+
+
+@needs_compiler
+def test_threads_are_as_many_as_processors_unless_given(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(choice, "_processors", lambda: 7)
+    assert choose("c", KERNEL, 1).reason.endswith("in 7 threads")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (None, "there is no C compiler 'nocc'"),
+        ("echo 'disk on fire' >&2; exit 1", "the C compiler 'nocc' fails: disk on fire"),
+        ("exit 3", "the C compiler 'nocc' fails: it ended with 3 and no message"),
+        ('case "$*" in *-dM*) echo "#define A";; *) exit 4;; esac', "fails: it ended with 4 and no message"),
+        ('case "$*" in *-dM*) echo "#define B";; esac', "the C compiler 'nocc' made no library"),
+        (
+            'case "$*" in *-dM*) echo "#define C";; *) eval echo no > ${9};; esac',
+            "what the C compiler made cannot be loaded",
+        ),
+    ],
+)
+def test_compiler_that_does_not_work(
+    text: str | None, reason: str, tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+):
+    if text is not None:
+        program(tmp_path, "nocc", text)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    monkeypatch.setenv("CC", "nocc")
+    chosen = choose("auto", KERNEL, 10_000_000)
+    assert not isinstance(chosen.engine, CompiledEngine)
+    assert chosen.reason.startswith("NumPy computes: ")
+    assert reason in chosen.reason
+    with pytest.raises(InputError, match="the engine numpy needs none") as raised:
+        choose("c", KERNEL, 1)
+    assert reason in str(raised.value)
+    assert not [path for path in own_cache.rglob("*") if path.is_file()]
+
+
+def test_link_torques_refuse_an_unknown_engine():
+    with pytest.raises(InputError, match="unknown engine"):
+        link_torques(vsa_3r(), *random_motion(vsa_3r(), 2, seed=1), engine="fortran")
+
+
+@needs_compiler
+def test_link_torques_take_an_engine_that_was_chosen_before():
+    motion = random_motion(vsa_3r(), 20, seed=1)
+    chosen = choose("c", KERNEL, 1).engine
+    np.testing.assert_array_equal(
+        link_torques(vsa_3r(), *motion, engine=chosen), link_torques(vsa_3r(), *motion, engine="c")
+    )
+
+
+# The command line
+
+
+@needs_compiler
+@pytest.mark.parametrize("command", ["invdyn", "check-feasibility"])
+def test_report_is_the_same_and_verbose_says_what_computes(vsacli, motion, command: str):
+    by_numpy = vsacli(command, ROBOT, motion, "--engine", "numpy", "-v")
+    assert "NumPy computes, as asked for" in by_numpy.err.splitlines()
+    options = ["--overwrite"] if command == "invdyn" else []
+    by_c = vsacli(command, ROBOT, motion, "--engine", "c", "--threads", "1", "-v", *options)
+    assert by_c.code == by_numpy.code == 0
+    # The self-check says how large rounding is.
+    *report, check = by_c.out.splitlines()
+    assert report == by_numpy.out.splitlines()[:-1]
+    assert check.startswith("self-check passed")
+    assert "C code computes, compiled now, in 1 thread" in by_c.err.splitlines()
+
+
+def test_asking_for_c_without_a_compiler_is_a_mistake(vsacli, motion, monkeypatch, tmp_path):
+    monkeypatch.setenv("CC", "nocc")
+    refused = vsacli("invdyn", ROBOT, motion, "--engine", "c")
+    assert refused.code == 2
+    assert refused.err == "there is no C compiler 'nocc'; the engine numpy needs none\n"
+    assert not list(tmp_path.glob("*.h5"))
+    assert vsacli("invdyn", ROBOT, motion, "--engine", "auto").code == 0
+
+
+def test_no_threads_are_refused(vsacli, motion):
+    assert vsacli("invdyn", ROBOT, motion, "--threads", "0").code == 2
+
+
+def test_compiling_repays_neither_for_little_work_nor_for_long_code():
+    assert [choice._repays(operations, 300_000) for operations in (200, 4_500, 70_000)] == [
+        False,
+        True,
+        False,
+    ]

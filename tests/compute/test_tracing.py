@@ -1,0 +1,244 @@
+"""What is recorded of NumPy's functions computes what NumPy computes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from samples.listings import carry_out, recorded
+
+from vsacli.base.arrays import FloatArray
+from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray
+
+SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, 1e308, 1.0, -1.0]
+"""Where functions have their limits, poles, and ends."""
+
+NODES = np.array([-1.0, 0.0, 0.5, 2.0])
+HEIGHTS = np.array([7.0, -3.0, math.nan, math.inf, 4.0])
+
+
+def of_one(ufunc: np.ufunc) -> Callable[[Any, Any], Any]:
+    return lambda x, _y: ufunc(x)
+
+
+ELEMENTWISE: dict[str, Callable[[Any, Any], Any]] = {
+    **{
+        name: of_one(getattr(np, name))
+        for name in (
+            *("negative", "positive", "absolute", "fabs", "square", "reciprocal", "sqrt", "cbrt"),
+            *("exp", "expm1", "log", "log1p", "sin", "cos", "tan", "arcsin", "arccos", "arctan"),
+            *("sinh", "cosh", "tanh", "arcsinh", "isnan", "isfinite", "isinf"),
+        )
+    },
+    **{
+        name: getattr(np, name)
+        for name in (
+            *("add", "subtract", "multiply", "divide", "maximum", "minimum", "power", "arctan2"),
+            *("hypot", "copysign", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal"),
+        )
+    },
+    "operators": lambda x, y: 2 * x - y / 3 + (-x) * (1 - y) + 4 / x,
+    "small powers": lambda x, _y: x**2,
+    "and": lambda x, y: (x < y) & (y > 0),
+    "or": lambda x, y: (x < y) | np.isnan(y),
+    "not": lambda x, y: ~(x < y),
+    "logical functions": lambda x, y: np.logical_and(x < y, np.logical_not(np.isnan(y))),
+    "where": lambda x, y: np.where(x < y, x, 2.0),
+    "where of truths": lambda x, y: np.where(x < y, x < 0, np.isnan(y)),
+    "clip": lambda x, _y: np.clip(x, -0.5, 2.0),
+    "clip between values": lambda x, y: np.clip(x, y, 2 * y),
+    "search": lambda x, _y: np.searchsorted(NODES, x, side="right"),
+    "bits": lambda x, y: (x < y).astype(np.uint16) * np.uint16(4) | (y < 0).astype(np.uint16) * np.uint16(16),
+    "any": lambda x, y: np.logical_or.reduce(np.stack([x < y, y < 0])),
+    "hypot of NaN": lambda x, _y: np.hypot(x, np.nan),
+    "sign of NaN": lambda x, _y: np.copysign(x, np.nan),
+    "power of NaN": lambda x, _y: np.power(x, np.nan),
+}
+
+
+def samples() -> tuple[FloatArray, FloatArray]:
+    """Every pair of special values, and some random ones of any size."""
+    rng = np.random.default_rng(0)
+    x, y = (grid.ravel() for grid in np.meshgrid(SPECIAL, SPECIAL))
+    drawn = rng.normal(size=(2, 200)) * 10.0 ** rng.integers(-3, 4, (2, 200))
+    return np.concatenate([x, drawn[0]]), np.concatenate([y, drawn[1]])
+
+
+@pytest.mark.parametrize("name", ELEMENTWISE)
+def test_functions_mean_what_they_mean_in_numpy(name: str) -> None:
+    function, (x, y) = ELEMENTWISE[name], samples()
+    (found,) = carry_out(recorded(function, 2), [x, y])
+    with np.errstate(all="ignore"):
+        expected = function(x, y)
+    np.testing.assert_array_equal(found, expected)
+    if expected.dtype.kind == "f":
+        np.testing.assert_array_equal(np.signbit(found), np.signbit(expected))
+
+
+BINARY = [
+    *(np.add, np.subtract, np.multiply, np.divide, np.maximum, np.minimum, np.arctan2, np.hypot, np.copysign),
+    *(np.less, np.less_equal, np.greater, np.greater_equal, np.equal, np.not_equal, np.power),
+]
+
+
+@pytest.mark.parametrize("ufunc", BINARY, ids=lambda ufunc: ufunc.__name__)
+def test_a_constant_beside_a_value_is_simplified_only_if_the_result_is_the_same(ufunc: np.ufunc) -> None:
+    """But for the sign of a zero: x + 0 is recorded as x, also where x is -0."""
+
+    def with_constants(x: Any) -> Any:
+        sides = [ufunc(x, constant) for constant in SPECIAL], [ufunc(constant, x) for constant in SPECIAL]
+        return [result for side in sides for result in side]
+
+    x, _ = samples()
+    with np.errstate(all="ignore"):
+        expected = with_constants(x)
+    for found, right in zip(carry_out(recorded(with_constants, 1), [x]), expected, strict=True):
+        np.testing.assert_array_equal(np.broadcast_to(found, right.shape), right)
+
+
+@pytest.mark.parametrize("ufunc", BINARY, ids=lambda ufunc: ufunc.__name__)
+def test_the_order_of_operands_counts(ufunc: np.ufunc) -> None:
+    """An operation that was recorded is taken for another only if it is the same."""
+    x, y = samples()
+    found = carry_out(recorded(lambda x, y: [ufunc(x, y), ufunc(y, x)], 2), [x, y])
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(found, [ufunc(x, y), ufunc(y, x)])
+
+
+@pytest.mark.parametrize(("exponent", "units"), [(3, 2), (4, 2), (1.5, 2)])
+def test_powers_by_products_are_off_by_rounding_alone(exponent: float, units: int) -> None:
+    """Each product or root rounds by half a unit in the last place, NumPy's power by one."""
+    x = np.abs(samples()[0][len(SPECIAL) ** 2 :])
+    (found,) = carry_out(recorded(lambda x: x**exponent, 1), [x])
+    np.testing.assert_array_max_ulp(found, x**exponent, units)
+
+
+ARRAYS: dict[str, Callable[[Any, Any], Any]] = {
+    "stack": lambda x, y: np.stack([x, y, x]),
+    "stack with constants": lambda x, y: np.stack([x, np.full_like(x, 3.0), y]),
+    "concatenate": lambda x, y: np.concatenate([x, y]),
+    "sum over an axis": lambda x, y: np.stack([x, y]).sum(axis=0),
+    "index": lambda x, y: np.stack([x, y])[1],
+    "slice": lambda x, y: np.stack([x, y, x])[::2],
+    "negative index": lambda x, y: np.stack([x, y])[-1] - x,
+    "rows of ones": lambda x, y: np.stack([np.ones_like(x), np.zeros_like(y)]) * x,
+    "a constant matrix": lambda x, y: np.array([[1.0, 2.0], [0.0, -1.0]]) @ np.stack([x, y]),
+    "broadcast": lambda x, y: np.array([[2.0], [3.0]]) * np.stack([x, y]),
+    "truths of a shape": lambda x, _y: np.where(np.ones_like(x, dtype=bool), x, 0.0),
+    "clip of a stack": lambda x, y: np.clip(np.stack([x, y]), 0.0, x),
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_arrays_are_arranged_as_by_numpy(name: str) -> None:
+    function = ARRAYS[name]
+    x, y = np.random.default_rng(1).normal(size=(2, 5))
+    for k in range(5):
+        listing = recorded(function, 2)
+        found = np.array([np.ravel(value)[0] for value in carry_out(listing, [x[k : k + 1], y[k : k + 1]])])
+        np.testing.assert_array_equal(found, np.ravel(function(x[k : k + 1], y[k : k + 1])))
+
+
+def test_entries_are_written_in_place() -> None:
+    tape = Tape()
+    (x,) = tape.inputs(1)
+    row = TracedArray(tape, [x])
+    target = np.zeros_like(np.stack([row, row]))
+    target[1] = 2 * row
+    target[0], kept = row, target.copy()
+    (first, second, zero) = carry_out(
+        tape.listing([*target.cells.ravel(), kept.cells[0].item()]), [np.array([3.0])]
+    )
+    assert (first, second, zero) == (3, 6, 0)
+    assert len(target) == 2
+    assert target.shape == (2, 1)
+    assert (target.ndim, target.size, target.T.shape) == (2, 2, (1, 2))
+
+
+@pytest.fixture
+def row() -> TracedArray:
+    tape = Tape()
+    return TracedArray(tape, tape.inputs(1))
+
+
+UNKNOWN = "what is known only when the program runs cannot decide what is recorded"
+
+
+def test_a_decision_on_a_value_is_refused(row: TracedArray) -> None:
+    with pytest.raises(NotImplementedError, match=UNKNOWN):
+        bool(row > 0)
+    with pytest.raises(NotImplementedError, match=UNKNOWN):
+        row[row > 0]
+    with pytest.raises(NotImplementedError, match=UNKNOWN):
+        row[row > 0] = 1.0
+
+
+def test_a_value_does_not_become_a_number(row: TracedArray) -> None:
+    numbers = np.zeros(1)
+    with pytest.raises(TypeError, match="an array of numbers cannot take in"):
+        np.add(row, 1.0, out=numbers)
+    with pytest.raises(TypeError):
+        float(row)
+
+
+@pytest.mark.parametrize(
+    ("use", "reason"),
+    [
+        (lambda x: np.sort(x), "numpy.sort cannot be recorded"),
+        (lambda x: np.median(x), "numpy.median cannot be recorded"),
+        (lambda x: np.sin.at(x, 0), "numpy.sin cannot be recorded in this way"),
+        (lambda x: np.spacing(x), "the operation spacing cannot be recorded"),
+        (lambda x: np.searchsorted(NODES, x), "side='right' only"),
+        (lambda x: x.astype(np.int64), "no conversion"),
+        (lambda x: np.where(x > 0, np.uint16(1), np.uint16(2)), "set or not"),
+        (lambda x: (x > 0) + x, "different kinds"),
+        (lambda x: (x > 0) * 2.0, "truth"),
+        (lambda x: np.searchsorted(NODES, x, side="right") * 0.5, "whole"),
+    ],
+)
+def test_what_cannot_be_recorded_is_refused_by_name(
+    use: Callable[[Any], Any], reason: str, row: TracedArray
+) -> None:
+    with pytest.raises(NotImplementedError, match=reason):
+        use(row)
+
+
+def test_values_of_two_programs_do_not_meet(row: TracedArray) -> None:
+    with pytest.raises(ValueError, match="a value of another program"):
+        row + TracedArray(other := Tape(), other.inputs(1))
+
+
+def test_constants_are_computed_at_once() -> None:
+    tape = Tape()
+    constant = TracedArray(tape, [2.0])
+    assert np.sin(constant * 3 + 1).cells.item() == math.sin(7)
+    assert bool(constant > 1)
+    assert np.where(constant > 1, 5.0, 6.0).cells.item() == 5
+    assert tape.listing([]).operations == ()
+
+
+def test_an_operation_is_recorded_once_and_only_if_needed() -> None:
+    tape = Tape()
+    x, y = tape.inputs(2)
+    product = x * y
+    assert y * x is product
+    assert isinstance(product, Symbol)
+    np.sin(TracedArray(tape, [product]))
+    assert tape.listing([product]).operations == (product,)
+
+
+def test_a_program_computes_numbers_rows_and_becomes_part_of_another() -> None:
+    tape = Tape()
+    x, y = tape.inputs(2)
+    program = Program(tape.listing([x * y - 1, x.sin(), 4.0]))
+    single, rows = np.array([0.3, 2.0]), np.array([[0.3, 2.0], [0.5, -1.0]])
+    np.testing.assert_array_equal(program(single), [0.3 * 2 - 1, math.sin(0.3), 4])
+    np.testing.assert_array_equal(program(rows)[0], program(single))
+
+    listing = recorded(lambda a, b: program(np.concatenate([a + b, b])), 2)
+    found = carry_out(listing, [rows[:, 0], rows[:, 1]])
+    expected = program(np.column_stack([rows.sum(axis=1), rows[:, 1]])).T
+    np.testing.assert_array_equal(np.stack(np.broadcast_arrays(*found)), expected)

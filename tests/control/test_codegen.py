@@ -1,0 +1,215 @@
+"""Generated projects as they reach a controller: files, warnings, self-test, what the object code needs."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samples.codegen import clear, commands, motion_of, shipped, with_springs
+from samples.generated_code import COMPILERS, STRICT, compile_c, compiled_robot, write_files
+from samples.robots import random_robot
+from samples.springs import SPRINGS
+
+from vsacli.base.flags import Flag
+from vsacli.base.variables import VARIABLES
+from vsacli.control.codegen.project import Project, generate, prefix_of
+from vsacli.control.codegen.robot_functions import inverse_dynamics_function
+from vsacli.dynamics.inverse import compute_block
+from vsacli.robot.model import Robot
+
+needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+
+ROBOTS: dict[str, Robot] = {
+    "one joint": random_robot("R", seed=1),
+    "3R": shipped("vsa_3r"),
+    "prismatic": shipped("rp_2"),
+    "mixed": shipped("mixed_3r"),
+    **{law: with_springs(law) for law in SPRINGS},
+}
+
+SANITIZED = ("one joint", "prismatic", "mixed", "sinh", "table")
+
+MATH = {
+    *("sqrt", "cbrt", "exp", "expm1", "log", "log1p", "pow", "hypot", "fabs", "copysign"),
+    *("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh"),
+}
+
+
+@cache
+def project(name: str, precision: str = "double") -> Project:
+    return generate(ROBOTS[name], precision)
+
+
+def self_test(name: str, folder: Path, *flags: str, compiler: str, precision: str = "double") -> str:
+    """Compile with every warning on, and run; what the program says."""
+    write_files(project(name, precision), folder)
+    prefix = prefix_of(ROBOTS[name])
+    sources = (f"{prefix}.c", f"{prefix}_test.c")
+    compile_c(folder, *STRICT, *flags, *sources, "-o", "self_test", "-lm", compiler=compiler)
+    done = subprocess.run(["./self_test"], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stderr == ""
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+def test_it_compiles_without_a_warning_and_passes_its_own_test(
+    compiler: str, name: str, tmp_path: Path
+) -> None:
+    if compiler not in COMPILERS:
+        pytest.skip(f"no {compiler} here")
+    assert self_test(name, tmp_path, compiler=compiler) == "all values agree\n"
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", SANITIZED)
+def test_no_undefined_behaviour(name: str, tmp_path: Path) -> None:
+    flags = ("-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
+    assert self_test(name, tmp_path, *flags, compiler=COMPILERS[0]) == "all values agree\n"
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["3R", "mixed", "sinh", "table", "four_bar"])
+def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_path: Path) -> None:
+    flags = ("-Wconversion", "-Wdouble-promotion") if name == "3R" else ()
+    folder = tmp_path / "library"
+    folder.mkdir()
+    write_files(project(name, "float"), folder)
+    compile_c(folder, *STRICT, *flags, "-c", f"{prefix_of(ROBOTS[name])}.c")
+    assert self_test(name, tmp_path, compiler=COMPILERS[-1], precision="float") == "all values agree\n"
+
+
+@needs_compiler
+def test_the_self_test_notices_a_wrong_number(tmp_path: Path) -> None:
+    write_files(project("prismatic"), tmp_path)
+    source = tmp_path / "rp_2.c"
+    text = source.read_text()
+    assert "* 9.81" in text
+    source.write_text(text.replace("* 9.81", "* 9.82"))
+    done = subprocess.run(["make", "-s", "test"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode != 0
+    assert re.search(r"^case 0: link_torques: tau_e\[0\] is \S+, expected \S+$", done.stdout, re.MULTILINE)
+    assert re.search(r"^\d+ values differ$", done.stdout, re.MULTILINE)
+
+
+@needs_compiler
+@pytest.mark.skipif(not shutil.which("make"), reason="no make")
+def test_the_makefile(tmp_path: Path) -> None:
+    write_files(project("prismatic"), tmp_path)
+    before = {path.name for path in tmp_path.iterdir()}
+    make = ["make", f"CC={COMPILERS[0]}", "CFLAGS=-std=c99 -O2 -Wall -Wextra -pedantic -Werror"]
+    for target in ([], ["test"]):
+        done = subprocess.run([*make, *target], cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+    assert "all values agree" in done.stdout
+    subprocess.run([*make, "clean"], cwd=tmp_path, capture_output=True, check=True)
+    assert {path.name for path in tmp_path.iterdir()} == before
+
+
+@needs_compiler
+@pytest.mark.skipif(not shutil.which("nm"), reason="no nm")
+@pytest.mark.parametrize("name", ["3R", "mixed", "sinh"])
+def test_the_code_keeps_nothing_and_calls_nothing_but_the_math_library(name: str, tmp_path: Path) -> None:
+    write_files(project(name), tmp_path)
+    prefix = prefix_of(ROBOTS[name])
+    compile_c(tmp_path, *STRICT, "-O1", "-c", f"{prefix}.c", "-o", "robot.o")
+    listed = subprocess.run(
+        ["nm", "robot.o"], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout
+    symbols = [line.split()[-2:] for line in listed.splitlines()]
+    called = {symbol for kind, symbol in symbols if kind == "U"}
+    assert called - {"_GLOBAL_OFFSET_TABLE_", "memcpy", "memset", "sincos"} <= MATH
+    assert {kind for kind, _ in symbols} <= set("UTtrR"), "no data that changes"
+    assert all(symbol.startswith(f"{prefix}_") for kind, symbol in symbols if kind == "T")
+
+
+@pytest.mark.parametrize("name", ["3R", "table"])
+def test_every_loop_is_bounded_by_a_constant(name: str) -> None:
+    source = project(name).files[f"{prefix_of(ROBOTS[name])}.c"]
+    assert not re.search(r"\b(goto|do|malloc|calloc|free|printf|static (?!const|inline))\b", source)
+    assert all(re.search(r"_step < \d+ && ", head) for head in re.findall(r"for \(.*\)", source))
+    assert set(re.findall(r"while \(.*\)", source)) <= {"while (low < high)"}, "halving of a table"
+
+
+@needs_compiler
+def test_the_header_is_also_one_of_cpp(tmp_path: Path) -> None:
+    write_files(project("3R"), tmp_path)
+    (tmp_path / "main.cpp").write_text(
+        '#include "vsa_3r.h"\n#include "vsa_3r.h"\n'
+        "int main() { vsa_3r_motion motion = {}; vsa_3r_torques torques;\n"
+        "  vsa_3r_link_torques(&motion, &torques); return torques.tau_e[0] != torques.tau_e[0]; }\n"
+    )
+    plus = {"gcc": "g++", "clang": "clang++"}[COMPILERS[0]]
+    if not shutil.which(plus):
+        pytest.skip(f"no {plus} here")
+    compile_c(tmp_path, *STRICT, "-c", "vsa_3r.c", "-o", "robot.o")
+    compile_c(
+        tmp_path, "-Wall", "-Wextra", "-pedantic", "-Werror", "main.cpp", "robot.o", "-lm", compiler=plus
+    )
+
+
+def test_the_header_says_what_it_is_about() -> None:
+    header = project("prismatic").files["rp_2.h"]
+    for flag in Flag:
+        assert f"RP_2_{flag.name} = {flag.value}, /* {flag.meaning} */" in header
+    for name in ("q", "d4q", "tau_e", "tau_motor", "ddtheta"):
+        quantity = VARIABLES[name].quantity
+        units = " or ".join(quantity.unit(joint_type) for joint_type in ("revolute", "prismatic"))
+        assert re.search(rf"double {name}\[.*/\* .*{re.escape(units)} \*/", header), name
+    prose = " ".join(header.split())
+    assert "0 arm (revolute, antagonistic), 1 slide (prismatic, antagonistic)" in prose
+    assert "nothing acts on the end effector" in prose
+    assert max(map(len, header.splitlines())) <= 160
+
+
+def test_the_files() -> None:
+    assert set(project("3R").files) == {"vsa_3r.c", "vsa_3r.h", "vsa_3r_test.c", "Makefile", "README.md"}
+    readme = project("3R").files["README.md"]
+    assert "vsa_3r_inverse_dynamics(&" in readme or "vsa_3r_inverse_dynamics(command" in readme
+    assert "0 base, 1 shoulder, 2 elbow" in readme
+
+
+def test_a_project_is_the_same_each_time() -> None:
+    assert generate(ROBOTS["mixed"]).files == project("mixed").files
+
+
+def test_what_cannot_be_generated_is_left_out_with_the_reason() -> None:
+    mixed = project("mixed")
+    assert not any("feedback_linearization(" in text for text in mixed.files.values())
+    (omitted,) = mixed.omitted
+    assert omitted.startswith(
+        "no feedback_linearization: feedback linearization needs springs at all joints or at none"
+    )
+    assert omitted in mixed.files["README.md"]
+
+
+FLOAT_BOUND = 1e-6
+"""Of a variable's peak, margin above 10 %; a rounding is 6e-8, and the recursion adds some tens of them."""
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "lwr_7r_vsa"])
+def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
+    robot = shipped(name)
+    function, command = inverse_dynamics_function(robot), commands(robot, 200, seed=9)
+    command = {key: values.astype(np.float32).astype(float) for key, values in command.items()}
+    found, _ = compiled_robot(tmp_path / "c", robot, [function], "float")(function, command)
+    block = compute_block(robot, motion_of(command))
+    with np.errstate(invalid="ignore"):
+        margin = (block.stiffness - block.stiffness_lower) / block.stiffness - 0.1 + 1e-3
+    for key, values in found.items():
+        expected = getattr(block, key)
+        chosen = clear(margin, expected.shape) & np.isfinite(expected)
+        if key == "flags":
+            np.testing.assert_array_equal(values[chosen], expected[chosen])
+            continue
+        scale = np.abs(expected[chosen]).max(initial=0.0)
+        np.testing.assert_allclose(
+            values[chosen], expected[chosen], rtol=0, atol=FLOAT_BOUND * scale, err_msg=key
+        )

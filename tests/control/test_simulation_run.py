@@ -1,0 +1,191 @@
+"""Conditions of a simulation: saturation, early ends, measured positions, what is refused, and the report."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from samples.drives import motion
+from samples.plants import rigid, with_actuators
+from samples.robots import vsa_3r
+from samples.simulated import mixed_3r, short_motion
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.laws.quadratic import Quadratic
+from vsacli.actuators.motor import Motor
+from vsacli.base.errors import InputError
+from vsacli.base.flags import Flag
+from vsacli.base.simulation_variables import SIMULATION_VARIABLES
+from vsacli.control.gains import Gains
+from vsacli.control.simulation import InitialError, Setup, Tolerances, perturbed, simulate
+from vsacli.control.simulation.history import History
+from vsacli.control.simulation.measurement import RateFilter
+from vsacli.control.simulation.simulation_text import render
+from vsacli.control.simulation.state_vector import Phase
+
+GAINS = Gains.from_poles([-20] * 4, [-20] * 2)
+
+
+def with_torque_limit(robot, limit):
+    """At the base."""
+    joint = robot.joints[0]
+    motors = tuple(dataclasses.replace(motor, max_torque=limit) for motor in joint.actuator.motor)
+    joint = dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, motor=motors))
+    return dataclasses.replace(robot, joints=(joint, *robot.joints[1:]))
+
+
+def test_motors_saturate():
+    setup = Setup(gains=GAINS, initial_error=InitialError(0.02, 20))
+    free = simulate(vsa_3r(), short_motion(3), setup).report.joints[0].peak_tau_motor[0]
+    limit = 0.8 * free
+    simulation = simulate(with_torque_limit(vsa_3r(), limit), short_motion(3), setup)
+    past, base = simulation.history, simulation.report.joints[0]
+    beyond = np.abs(past.tau_motor[:, 0]) > limit
+    assert base.peak_tau_motor[0] == limit
+    assert np.array_equal(past.tau_motor_actual[:, 0], np.clip(past.tau_motor[:, 0], -limit, limit))
+    flagged = (past.flags[:, 0] & Flag.MOTOR_TORQUE_LIMIT) != 0
+    assert flagged.any()
+    assert np.array_equal(flagged, beyond.any(axis=1))
+    assert base.steps_over_limit == flagged.sum()
+    assert simulation.report.verdict == "over_limit"
+    worst = base.worst["motor_torque_limit"]
+    assert abs(worst.bound) == limit
+    assert abs(worst.value) == np.abs(past.tau_motor[:, 0]).max()
+    assert f"base: joint-side torque of motor {worst.motor} is {worst.value:.6g}" in render(simulation.report)
+
+
+def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
+    """The stiffness is driven to 805, below what the loaded joints can have."""
+    trajectory = motion((850.0,) * 3, (805.0,) * 3)
+    simulation = simulate(vsa_3r(), trajectory, Setup(gains=GAINS))
+    past, report = simulation.history, simulation.report
+    assert report.verdict == "singular"
+    assert not report.complete
+    assert past.time[-1] < trajectory.duration
+    assert report.ending == (
+        f"shoulder: its decoupling matrix became singular; ended at t = {past.time[-1]:.6g} s"
+    )
+    assert past.flags[-1].tolist() == [0, Flag.SINGULAR, 0]
+    assert not past.flags[:-1].any()
+    # at 1e-4 of the first determinant, to what the event's root finder leaves
+    assert past.det_A_actual[-1, 1] / past.det_A_actual[0, 1] == pytest.approx(1e-4, rel=1e-3)
+
+
+def test_feedforward_ends_where_there_are_no_torques():
+    trajectory = motion((850.0,) * 3, (790.0,) * 3)
+    simulation = simulate(vsa_3r(), trajectory)
+    assert simulation.report.verdict == "infeasible"
+    assert "cannot be executed, so there are no torques to apply" in simulation.report.ending
+    assert 0.5 < simulation.history.time[-1] < trajectory.duration
+    assert np.isfinite(simulation.history.tau_motor).all()
+    assert (simulation.history.flags[-1] & Flag.INFEASIBLE).any()
+
+
+def test_a_tendon_that_goes_slack_ends_the_run():
+    motor = Motor(inertia=3.0, damping=1e-4)
+    actuator = Antagonistic(motor=(motor, motor), spring=(Quadratic(k=2000), Quadratic(k=2000)))
+    robot = vsa_3r()
+    joints = tuple(dataclasses.replace(joint, actuator=actuator) for joint in robot.joints)
+    robot = dataclasses.replace(robot, joints=joints)
+    # 509 N m/rad is what the shoulder's load takes; open loop, the error at the start swings below
+    setup = Setup(initial_error=InitialError(0.02, 50))
+    simulation = simulate(robot, motion((530.0,) * 3, (530.0,) * 3), setup)
+    assert simulation.report.verdict == "infeasible"
+    assert "a spring left the range of its law" in simulation.report.ending
+    phi = simulation.history.phi_actual[-1]
+    assert np.abs(phi * [1, -1]).min() == pytest.approx(0, abs=1e-9)  # the event's root in deflection
+
+
+def test_measured_positions_cost_accuracy_and_the_report_says_how_much():
+    setup = Setup(gains=GAINS, initial_error=InitialError(0.01, 5), measured="positions")
+    losses = {}
+    for rate in (250, 1000):
+        trajectory = short_motion(3, rate=rate, duration=0.3)
+        simulation = simulate(vsa_3r(), trajectory, setup)
+        ideal = simulate(vsa_3r(), trajectory, dataclasses.replace(setup, measured="state"))
+        assert simulation.report.complete
+        assert simulation.report.with_full_state == tuple(joint.q for joint in ideal.report.joints)
+        assert np.array_equal(simulation.history.time, ideal.history.time)
+        losses[rate] = np.abs(simulation.history.q_actual - ideal.history.q_actual).max()
+    # delay and hold are proportional to the step
+    assert 1e-6 < losses[1000] < losses[250] / 2
+    assert "base: with the full state the q error is 0.01 rad at its peak" in render(simulation.report)
+
+
+def test_rates_of_a_ramp_are_found():
+    start = Phase(*(np.zeros(1) for _ in range(4)), integral=None)
+    rates = RateFilter(start)
+    for step in range(1, 60):
+        rates.add(start._replace(q=np.array([0.3 * step]), theta=np.array([-0.2 * step])), 0.1)
+    assert rates.phase.dq == pytest.approx([3.0], rel=1e-14)  # 0.53^59 = 6e-17 of the first error is left
+    assert rates.phase.dtheta == pytest.approx([-2.0], rel=1e-14)
+
+
+def test_rigid_joints_can_be_driven_by_feedforward_but_not_linearized():
+    with pytest.raises(InputError, match="needs springs at all joints or at none: elbow is rigid"):
+        simulate(with_actuators(vsa_3r(), {2: rigid()}), short_motion(3), Setup(gains=GAINS))
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (
+            InitialError([0.1, 0.2]),
+            "initial error of q must be one finite number, or one for each of the 3 joints",
+        ),
+        (InitialError(np.nan), "initial error of q must be one finite number"),
+        (
+            InitialError(0, -100),
+            "no state at the start has this position and stiffness .base, shoulder, elbow",
+        ),
+    ],
+)
+def test_starts_that_cannot_be_had_are_refused(error, message):
+    with pytest.raises(InputError, match=message):
+        simulate(vsa_3r(), motion(), Setup(initial_error=error))
+
+
+def test_setups_that_contradict_themselves_are_refused():
+    with pytest.raises(InputError, match="measured positions need the controller feedback-linearization"):
+        Setup(measured="positions")
+    with pytest.raises(InputError, match="the relative one at least 1e-13, not 1e-15"):
+        Tolerances(rtol=1e-15)
+    with pytest.raises(InputError, match="must lie between 0 and 1, not 1"):
+        perturbed(vsa_3r(), 1.0, seed=0)
+    with pytest.raises(InputError, match="the seed must be zero or positive, not -1"):
+        perturbed(vsa_3r(), 0.1, seed=-1)
+
+
+def test_perturbation_touches_every_dynamic_parameter_and_nothing_else():
+    robot = mixed_3r()[0]
+    other = perturbed(robot, 0.1, seed=0)
+    for before, after in zip(robot.joints, other.joints, strict=True):
+        assert (after.name, after.dh, after.limits) == (before.name, before.dh, before.limits)
+        factor = after.link.inertia.xx / before.link.inertia.xx
+        assert factor != 1
+        assert after.link.inertia.tensor == pytest.approx(factor * before.link.inertia.tensor, rel=1e-14)
+        assert 0 < abs(after.link.mass / before.link.mass - 1) <= 0.1
+        assert after.damping != before.damping
+    (first, second), spring = other.joints[0].actuator.spring, robot.joints[0].actuator.spring[0]
+    assert len({first.k, second.k, spring.k}) == len({first.k_c, second.k_c, spring.k_c}) == 3
+    assert first.max_deflection == spring.max_deflection
+    assert other.joints[1].actuator.stiffness != robot.joints[1].actuator.stiffness
+
+
+def test_every_declared_variable_is_in_the_history():
+    assert [field.name for field in dataclasses.fields(History)] == list(SIMULATION_VARIABLES)
+
+
+def test_the_report_is_plain_json():
+    report = simulate(vsa_3r(), short_motion(3)).report
+    content = json.loads(json.dumps(report.as_json(), allow_nan=False))
+    assert content["format"] == "vsacli-simulation-report/1"
+    assert content["controller"] == "feedforward"
+    assert content["joints"][0]["q_error"].keys() == {"peak", "time", "final"}
+    assert content["ending"] is None
+    lines = render(report).splitlines()
+    assert lines[0].startswith("vsa-3r, short: feedforward, 0.8 s")
+    assert lines[0].endswith(" OK")
+    assert lines[1].split("  ")[0] == "joint"

@@ -1,0 +1,132 @@
+"""Reading any declared document: the rules that the robot and trajectory formats rest on."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from vsacli.base import units
+from vsacli.base.errors import FieldProblem, InputError
+from vsacli.documents.fields import (
+    NON_NEGATIVE,
+    Items,
+    OneOf,
+    PerJoint,
+    Record,
+    check_fields,
+    choice,
+    integer,
+    interval,
+    number,
+    text,
+    value,
+)
+from vsacli.documents.reading import read_document
+
+
+@dataclass(frozen=True)
+class Wheel:
+    radius: float = number(units.POSITION, "radius")
+
+    not_yet = ("tyre",)
+
+    def __post_init__(self):
+        further = [FieldProblem(("radius",), "is a bad omen")] if self.radius == 13 else []
+        check_fields(self, *further)
+
+
+@dataclass(frozen=True)
+class Cart:
+    name: str = text("name", identifier=True)
+    kind: str = choice(("revolute", "prismatic"), "kind", default="prismatic", not_yet=("spherical",))
+    part: object = value(OneOf({"wheel": Wheel}, not_yet=("ski",)), "part", default=None)
+    wheels: tuple = value(Items(Record(Wheel)), "wheels", default=())
+    count: int = integer("count", check=NON_NEGATIVE, default=0)
+    span: tuple = interval(units.POSITION, "span", one_sided=True, default=(0.0, 1.0))
+    loads: tuple = value(PerJoint(units.POSITION), "loads", check=NON_NEGATIVE, default=())
+
+    unit_variant = "kind"
+    not_yet = ("brake",)
+
+    def __post_init__(self):
+        check_fields(self)
+
+
+@pytest.fixture
+def read(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def read_text(lines):
+        Path("cart.yaml").write_text("format: cart/1\nname: c\n" + lines)
+        members = {"left": "revolute", "right": "prismatic"}
+        return read_document("cart.yaml", Cart, "cart/1", members)[0]
+
+    return read_text
+
+
+def problems(read, lines):
+    with pytest.raises(InputError) as caught:
+        read(lines)
+    return str(caught.value).splitlines()
+
+
+def test_defaults(read):
+    assert read("") == Cart(name="c")
+
+
+@pytest.mark.parametrize(
+    ("lines", "field", "expected"),
+    [
+        ("part: {type: wheel, radius: 1}", "part", Wheel(radius=1.0)),
+        ("wheels: [{radius: 1}, {radius: 2}]", "wheels", (Wheel(radius=1.0), Wheel(radius=2.0))),
+        ("count: 2 * 3", "count", 6),
+        ("span: 3", "span", (-math.inf, 3.0)),
+        ("span: [-3, 3]", "span", (-3.0, 3.0)),
+        ("loads: 3", "loads", (3.0, 3.0)),
+        ("loads: [1, 2]", "loads", (1.0, 2.0)),
+        ("loads: {right: 2, left: 1}", "loads", (1.0, 2.0)),
+    ],
+)
+def test_values(read, lines, field, expected):
+    assert getattr(read(lines), field) == expected
+
+
+@pytest.mark.parametrize(
+    ("lines", "problem"),
+    [
+        ("brake: 1", "3: 'brake' is not supported yet"),
+        ("wheels:\n  - radius: 1\n    tyre: 3", "5: 'tyre' is not supported yet"),
+        ("kind: spherical", "3: kind: 'spherical' is not supported yet"),
+        ("part: {type: ski, radius: on}", "3: part.type: 'ski' is not supported yet"),
+        ("part: {type: [wheel]}", "3: part.type: expected one of wheel, found a list of 1"),
+        ("part: wheel", "3: part: expected a mapping with the key 'type', found 'wheel'"),
+        ("wheels:\n  - radius: 1\n  - radius: 13", "5: wheels: radius: is a bad omen"),
+        ("count: -1", "3: count: must be zero or positive, not -1"),
+        ("count: 1/3", "3: count: expected a whole number, found '1/3'"),
+        ("count: many", "3: count: expected a number, found 'many': unknown word 'many'; only `pi` may"),
+        ("loads:\n  left: 1\n  right: -1", "5: loads of joint right: must be zero or positive, not -1"),
+        ("loads: [1]", "3: loads: expected 2 numbers, one for each joint, found a list of 1"),
+        ("loads:\n  left: 1", "3: loads: no value for right; each joint needs one"),
+    ],
+)
+def test_one_problem_is_one_line(read, lines, problem):
+    (line,) = problems(read, lines)
+    assert line.startswith(f"cart.yaml:{problem}")
+
+
+def test_units_follow_the_variant_also_in_nested_records(read):
+    assert read("kind: revolute\nwheels: [{radius: 180 deg}]").wheels[0].radius == math.pi
+    (line,) = problems(read, "kind: prismatic\nwheels: [{radius: 180 deg}]")
+    assert line.startswith("cart.yaml:4: radius: expected a number in m")
+
+
+def test_units_of_per_joint_values_follow_each_joint(read):
+    assert read("loads: {left: 180 deg, right: 1}").loads == (math.pi, 1.0)
+    (line,) = problems(read, "loads:\n  left: 180 deg\n  right: 180 deg")
+    assert line.startswith("cart.yaml:5: loads: expected a number in m")
+
+
+def test_a_bad_value_does_not_hide_the_others_of_its_record(read):
+    lines = problems(read, "count: -1\nloads: [1, x]\nspan: [2, 1]\nwheels: [{radius: 13}, {}]\n")
+    assert [line.split(":")[1] for line in lines] == ["3", "4", "5", "6", "6"]

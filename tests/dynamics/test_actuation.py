@@ -1,0 +1,147 @@
+"""Motor motion and motor torques of whole robots, against a scalar re-computation joint by joint."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles.scalar_vsa import Actuation, Curve, Side, actuation
+
+from vsacli import inverse_dynamics, load_robot, load_trajectory
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.motor import Motor
+from vsacli.analysis.result import Result
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.model import Joint, Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = 300
+COMPARED = {
+    "phi": "phi",
+    "dphi": "dphi",
+    "theta": "theta",
+    "dtheta": "dtheta",
+    "ddtheta": "ddtheta",
+    "tau_spring": "tau_spring",
+    "tau_motor": "tau_motor",
+    "det_A": "det_a",
+}
+"""Names of the variables in the result and in the re-computation."""
+
+GIVEN = ("q", "dq", "ddq", "stiffness", "dstiffness", "ddstiffness", "tau_e", "dtau_e", "ddtau_e")
+"""What of the result the re-computation starts from."""
+
+AGREEMENT = 1e-9
+"""Of a variable's peak: what is asked for. The margins stay above 1 %, where eps/margin is 2e-14."""
+
+
+def example(robot: str, trajectory: str) -> tuple[Robot, Trajectory]:
+    loaded = load_robot(ROOT / "robots" / f"{robot}.yaml")
+    return loaded, load_trajectory(ROOT / "trajectories" / f"{trajectory}.yaml", loaded)
+
+
+def unlike(preloads: tuple[str, ...]) -> tuple[Robot, Trajectory]:
+    """The 3R arm with springs and motors that differ between the sides, more from joint to joint."""
+    robot, trajectory = example("vsa_3r", "rest_to_rest")
+    actuators = [
+        Antagonistic(
+            motor=(Motor(inertia=3.2, damping=0.1), Motor(inertia=2.5 - 0.5 * index, damping=0.3)),
+            spring=(Cubic(k=400, k_c=2000), Cubic(k=420 - 60 * index, k_c=2500 + 4000 * index)),
+            preload=preload,
+        )
+        for index, preload in enumerate(preloads)
+    ]
+    joints = tuple(
+        dataclasses.replace(joint, actuator=actuator)
+        for joint, actuator in zip(robot.joints, actuators, strict=True)
+    )
+    return dataclasses.replace(robot, joints=joints), trajectory
+
+
+CASES = {
+    "3R": lambda: example("vsa_3r", "rest_to_rest"),
+    "3R soft": lambda: example("vsa_3r", "rest_to_rest_soft"),
+    "7R": lambda: example("lwr_7r_vsa", "lwr_7r"),
+    "R-P": lambda: example("rp_2", "rp_2"),
+    "sides differ": lambda: unlike(("positive", "positive", "positive")),
+    "preload negative": lambda: unlike(("negative", "positive", "negative")),
+}
+
+
+def sides_of(joint: Joint) -> tuple[Side, Side]:
+    """The constants of both sides as the robot file gives them."""
+    first, second = (
+        Side(spring.k, spring.k_c, motor.inertia, motor.damping)
+        for spring, motor in zip(joint.actuator.spring, joint.actuator.motor, strict=True)
+        if isinstance(spring, Cubic)
+    )
+    return first, second
+
+
+def recomputed(joint: Joint, result: Result, index: int, steps: FloatArray) -> Iterator[Actuation]:
+    """One sample after the other, from the motion, the stiffness and the link torque."""
+    preload = 1 if joint.actuator.preload == "positive" else -1
+    for step in steps:
+        of_step = {name: float(getattr(result, name)[step, index]) for name in GIVEN}
+        yield actuation(
+            Curve(sides_of(joint), of_step["tau_e"], preload),
+            (of_step["q"], of_step["dq"], of_step["ddq"]),
+            (of_step["stiffness"], of_step["dstiffness"], of_step["ddstiffness"]),
+            (of_step["dtau_e"], of_step["ddtau_e"]),
+        )
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_motors_do_what_a_scalar_recomputation_says(case: str):
+    robot, trajectory = CASES[case]()
+    result = inverse_dynamics(robot, trajectory)
+    assert result.report.verdict == "ok"
+    steps = np.unique(np.linspace(0, len(result.time) - 1, SAMPLES).astype(int))
+    for index, joint in enumerate(robot.joints):
+        expected = list(recomputed(joint, result, index, steps))
+        for name, oracle_name in COMPARED.items():
+            values = np.array([getattr(sample, oracle_name) for sample in expected])
+            peak = np.abs(getattr(result, name)[:, index]).max()
+            np.testing.assert_allclose(
+                getattr(result, name)[steps, index], values, rtol=0, atol=AGREEMENT * peak, err_msg=name
+            )
+        lower = [sample.lower for sample in expected]
+        np.testing.assert_allclose(result.stiffness_lower[steps, index], lower, rtol=AGREEMENT)
+
+
+def test_preload_selects_the_side_that_is_stretched():
+    result = inverse_dynamics(*CASES["preload negative"]())
+    wider = result.phi[:, :, 0] - result.phi[:, :, 1]
+    assert np.all(wider[:, 1] > 0)
+    assert np.all(wider[:, [0, 2]] < 0)
+
+
+def test_opposite_preload_of_alike_sides_swaps_the_motors():
+    robot, trajectory = example("vsa_3r", "rest_to_rest")
+    joints = tuple(
+        dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, preload="negative"))
+        for joint in robot.joints
+    )
+    result = inverse_dynamics(robot, trajectory)
+    turned = inverse_dynamics(dataclasses.replace(robot, joints=joints), trajectory)
+    for name in ("phi", "theta", "tau_spring", "tau_motor"):
+        # The determinant changes its sign, nothing else.
+        np.testing.assert_array_equal(getattr(turned, name), getattr(result, name)[:, :, ::-1])
+    np.testing.assert_array_equal(turned.det_A, -result.det_A)
+
+
+def test_torques_of_springs_and_motors_add_up():
+    """The motors' dynamics (6) summed over both sides, from the result's own variables."""
+    robot, trajectory = CASES["sides differ"]()
+    result = inverse_dynamics(robot, trajectory)
+    inertia = np.array([[motor.inertia for motor in joint.actuator.motor] for joint in robot.joints])
+    damping = np.array([[motor.damping for motor in joint.actuator.motor] for joint in robot.joints])
+    motors = result.tau_motor - inertia * result.ddtheta - damping * result.dtheta
+    peak = np.abs(result.tau_motor).max()
+    # A few roundings of the largest term.
+    np.testing.assert_allclose(motors.sum(axis=2), result.tau_e, rtol=0, atol=1e-13 * peak)

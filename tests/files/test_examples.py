@@ -1,0 +1,134 @@
+"""The robots and trajectories that come along: every command takes each robot with its trajectories."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from samples.command_line import contents
+
+from vsacli import inverse_dynamics, load_trajectory
+from vsacli.base.errors import InputError, StorageError
+from vsacli.files import examples as module
+from vsacli.files.examples import Example, Motion, copy_examples, examples
+
+EXAMPLES = examples()
+RUNS = [(example, motion) for example in EXAMPLES for motion in example.motions]
+TRAJECTORIES = Path(RUNS[0][1].path).parent
+
+in_every_example = pytest.mark.parametrize("example", EXAMPLES, ids=[each.name for each in EXAMPLES])
+in_every_run = pytest.mark.parametrize(
+    ("example", "motion"), RUNS, ids=[f"{example.name} {motion.name}" for example, motion in RUNS]
+)
+
+
+def test_every_robot_has_a_trajectory_and_every_trajectory_a_robot():
+    assert all(example.motions for example in EXAMPLES)
+    assert {motion.path for _, motion in RUNS} == set(TRAJECTORIES.glob("*.yaml"))
+    assert {name for _, motion in RUNS for name in motion.robots} == {each.name for each in EXAMPLES}
+
+
+@in_every_run
+def test_example_can_be_done_with_a_margin(example: Example, motion: Motion):
+    report = inverse_dynamics(example.robot, load_trajectory(motion.path, example.robot)).report
+    assert report.verdict == "ok"
+    # The paper's own runs keep 3.5 %; a shipped example is no edge case.
+    assert all(joint.margin > 0.03 for joint in report.joints if joint.actuator == "antagonistic")
+
+
+@in_every_example
+def test_example_says_where_its_numbers_come_from(example: Example):
+    text = example.path.read_text(encoding="utf-8")
+    assert re.search(r"our own choice|is ours|are ours|Table I", text)
+    assert example.robot.description
+
+
+@in_every_run
+def test_every_command_takes_it(example: Example, motion: Motion, vsacli: Callable[..., Any]):
+    copy_examples([example.name], ".")
+    robot, trajectory = Path("robots", example.path.name), Path("trajectories", motion.path.name)
+    trajectory.write_text(re.sub(r"rate: \d+", "rate: 100", trajectory.read_text()))
+    assert vsacli("invdyn", robot, trajectory, "-o", "result.h5").code == 0
+    assert vsacli("check-feasibility", robot, trajectory).code == 0
+    assert vsacli("plot", "result.h5", "-o", "figures").code == 0
+    assert vsacli("export", "result.h5", "-o", "torques.csv").code == 0
+    with Path("torques.csv").open() as file:
+        header, *rows = csv.reader(file)
+    assert {name.partition(".")[0] for name in header[1:]} == set(example.robot.joint_names)
+    assert all(all(row) for row in rows)
+    assert vsacli("simulate", robot, trajectory, "-o", "simulation.h5").code == 0
+
+
+def test_the_list_names_every_robot_with_its_trajectories(vsacli: Callable[..., Any]):
+    outcome = vsacli("examples")
+    assert outcome.code == 0
+    assert re.findall(r"^(\w+) \(", outcome.out, re.MULTILINE) == [each.name for each in EXAMPLES]
+    assert outcome.out.count("\n    ") == len(RUNS)
+    assert "rp_2 (RP): Revolute arm with a prismatic slide in a vertical plane; all" in outcome.out
+    assert "\n    rp_2: the arm swings up while the slide extends\n" in outcome.out
+    assert "vsacli examples --copy FOLDER" in outcome.err
+
+
+def test_the_list_can_be_limited(vsacli: Callable[..., Any]):
+    outcome = vsacli("examples", "qbmove_arm_manual", "rp_2", "-q")
+    assert [line.split()[0] for line in outcome.out.splitlines()] == [
+        "qbmove_arm_manual",
+        "qbmove_arm:",
+        "rp_2",
+        "rp_2:",
+    ]
+    assert outcome.err == ""
+
+
+def test_a_copy_has_the_tables_of_springs_with_it(vsacli: Callable[..., Any], tmp_path: Path):
+    outcome = vsacli("examples", "measured_1r", "--copy", "mine/of these")
+    assert outcome.code == 0
+    names = ["robots/measured_1r.yaml", "robots/measured_spring.csv", "trajectories/measured_1r.yaml"]
+    assert list(contents(tmp_path)) == [f"mine/of these/{name}" for name in names]
+    assert outcome.err.splitlines() == [f"wrote mine/of these/{name}" for name in names]
+    shipped = TRAJECTORIES.parent
+    copies = tmp_path / "mine/of these"
+    assert all((copies / name).read_bytes() == (shipped / name).read_bytes() for name in names)
+
+
+def test_files_that_exist_are_kept(vsacli: Callable[..., Any], tmp_path: Path):
+    changed = tmp_path / "trajectories" / "qbmove_arm.yaml"
+    changed.parent.mkdir()
+    changed.write_text("mine")
+    outcome = vsacli("examples", "qbmove_arm_gazebo", "--copy", ".")
+    assert outcome.code == 4
+    assert outcome.err.startswith("trajectories/qbmove_arm.yaml: exists already; choose another name, or")
+    assert contents(tmp_path) == {"trajectories/qbmove_arm.yaml": b"mine"}
+    assert vsacli("examples", "qbmove_arm_gazebo", "--copy", ".", "--overwrite").code == 0
+    assert changed.read_text() != "mine"
+
+
+def test_a_folder_that_cannot_be_made(tmp_path: Path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError, match=r"file.*: cannot be written: Not a directory"):
+        copy_examples(["rp_2"], tmp_path / "file")
+
+
+def test_an_unknown_name_gets_the_nearest(vsacli: Callable[..., Any]):
+    outcome = vsacli("examples", "puma_650", "rp_2", "--copy", "new")
+    assert outcome.code == 2
+    assert outcome.err == "no example is called 'puma_650'; did you mean 'puma_560'?\n"
+    assert not Path("new").exists()
+    with pytest.raises(InputError, match=r"'a'.*\n.*'b'"):
+        examples(["a", "rp_2", "b"])
+
+
+def test_a_trajectory_that_names_no_robot_belongs_to_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    for folder in ("robots", "trajectories"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "robots" / "arm.yaml").write_text("")
+    first, second = (tmp_path / "trajectories" / f"{name}.yaml" for name in "ab")
+    first.write_text("# For robots/arm.yaml: it\n# rises. As robots/leg.yaml.\nname: a\n# For all.\n")
+    second.write_text("name: b\n# For robots/arm.yaml: it falls.\n")
+    monkeypatch.setattr(module, "_root", lambda: tmp_path)
+    [example] = examples()
+    assert example.motions == (Motion(first, ("arm",), "it rises"),)

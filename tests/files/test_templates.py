@@ -1,0 +1,169 @@
+"""Templates: what `vsacli new` writes is understood, computes without trouble, and explains every key."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from samples.command_line import REPOSITORY, contents
+
+from vsacli.actuators.kinds import ACTUATORS as ALL_ACTUATORS
+from vsacli.analysis.run import inverse_dynamics
+from vsacli.base.errors import InputError
+from vsacli.cli.new import new
+from vsacli.documents.fields import OneOf, Pair, Record, declared
+from vsacli.files.templates import robot_template, trajectory_template
+from vsacli.files.templates.commented import WIDTH
+from vsacli.files.templates.robot_template import ACTUATORS, MOST_JOINTS
+from vsacli.robot.file import RobotFile, load_robot
+from vsacli.robot.model import Joint, Robot
+from vsacli.trajectory.file import OF_ANY_ROBOT, load_trajectory
+
+ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))
+
+
+def robot_of(text: str, folder: Path) -> Robot:
+    (folder / "robot.yaml").write_text(text)
+    return load_robot(folder / "robot.yaml")
+
+
+def report_of(robot: Robot, text: str, folder: Path) -> Any:
+    """The report of a run at 50 samples a second."""
+    assert "rate: 1000" in text
+    (folder / "move.yaml").write_text(text.replace("rate: 1000", "rate: 50  "))
+    return inverse_dynamics(robot, load_trajectory(folder / "move.yaml", robot)).report
+
+
+@pytest.mark.parametrize("actuator", ACTUATORS)
+@pytest.mark.parametrize("joints", ["R", "P", "RRP", "prp", "RRRRRRR"])
+def test_a_new_robot_executes_its_new_trajectory(joints: str, actuator: str, tmp_path: Path) -> None:
+    robot = robot_of(robot_template(joints, actuator), tmp_path)
+    assert "".join(joint.type[0] for joint in robot.joints) == joints.lower()
+    assert {joint.actuator_type for joint in robot.joints} == {actuator}
+    assert robot.warnings == ()
+    report = report_of(robot, trajectory_template(robot), tmp_path)
+    assert (report.verdict, report.warnings) == ("ok", ())
+
+
+def test_without_a_robot_it_suits_new_ones_with_revolute_joints(tmp_path: Path) -> None:
+    for joints in ("R", "RRRRRR"):
+        robot = robot_of(robot_template(joints), tmp_path)
+        assert report_of(robot, trajectory_template(), tmp_path).verdict == "ok"
+
+
+@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
+def test_a_new_trajectory_suits_every_robot_that_comes_along(path: Path, tmp_path: Path) -> None:
+    robot = load_robot(path)
+    assert report_of(robot, trajectory_template(robot), tmp_path).verdict == "ok"
+
+
+def torque_steps(robot: Robot, text: str, folder: Path) -> list[float]:
+    """The jump of each motor torque at the start."""
+    return [abs(step) for joint in report_of(robot, text, folder).joints for step in joint.torque_step]
+
+
+def test_its_torques_start_without_a_step(tmp_path: Path) -> None:
+    robot = robot_of(robot_template("RRP"), tmp_path)
+    text = trajectory_template(robot)
+    smooth = torque_steps(robot, text, tmp_path)
+    # next to torques of up to 200 N m; what is left is rounding of ddtheta times the motor inertia
+    assert max(smooth) < 1e-9
+    rough = torque_steps(
+        robot, text.replace("degree: 9", "degree: 7").replace("degree: 5", "degree: 3"), tmp_path
+    )
+    assert min(rough) > 0.01
+
+
+OPTIONAL = re.compile(r"^# ( *(?:d|theta|xy|xz|yz|preload|convention): \S.*)$", re.MULTILINE)
+"""Keys with a default that stand commented out beside others that do not."""
+
+
+def test_what_stands_commented_out_is_the_default(tmp_path: Path) -> None:
+    text = robot_template("RP")
+    lines = list(OPTIONAL.finditer(text))
+    assert len(lines) == 7
+    for line in lines:
+        assert robot_of(text[: line.start()] + line[1] + text[line.end() :], tmp_path) == robot_of(
+            text, tmp_path
+        )
+
+
+def keys_of(cls: type, values: dict[str, Any]) -> Iterator[str]:
+    """Every key that a record, and the records that are set in it, may have."""
+    for name, (field, _) in declared(cls).items():
+        yield name
+        content = values.get(name, {})
+        match field.kind:
+            case Record(inner) | Pair(Record(inner)):
+                yield from keys_of(inner, content)
+            case OneOf(variants) | Pair(OneOf(variants)) if content:
+                yield from keys_of(variants[content["type"]], content)
+
+
+def test_every_key_is_there_with_its_meaning() -> None:
+    text = robot_template("R")
+    values = yaml.safe_load(text)
+    for key in [*keys_of(RobotFile, values), *keys_of(Joint, values["joints"][0])]:
+        assert re.search(rf"^#? *(- )?{key}:.* # \w", text, re.MULTILINE), key
+    for key in keys_of(OF_ANY_ROBOT, yaml.safe_load(trajectory_template())):
+        assert re.search(rf"^#? *{key}:.* # \w", trajectory_template(), re.MULTILINE), key
+
+
+def test_lines_are_not_too_long() -> None:
+    for text in (robot_template("RPR"), trajectory_template()):
+        assert max(map(len, text.splitlines())) <= WIDTH + 10  # further joints stand on a line each
+
+
+def test_every_kind_of_actuator_can_be_had() -> None:
+    robot_command = new.commands["robot"]
+    (option,) = (each for each in robot_command.params if each.name == "actuator")
+    assert set(ACTUATORS) == set(ALL_ACTUATORS) == set(option.type.choices)
+
+
+@pytest.mark.parametrize("joints", ["", "X", "RRX", "R R", "R" * (MOST_JOINTS + 1)])
+def test_letters_that_are_no_joints(joints: str) -> None:
+    with pytest.raises(
+        InputError, match=r"joints: expected 1 to 100 letters R \(revolute\) and P \(prismatic\)"
+    ):
+        robot_template(joints)
+
+
+def test_files_are_written_and_never_replaced_by_accident(vsacli: Any, tmp_path: Path) -> None:
+    done = vsacli("new", "robot", "--joints", "RP", "-o", "arm.yaml")
+    assert (done.code, done.out, done.err) == (0, "", "wrote arm.yaml\n")
+    assert (tmp_path / "arm.yaml").read_text() == robot_template("RP")
+    before = contents(tmp_path)
+    again = vsacli("new", "robot", "--joints", "R", "-o", "arm.yaml")
+    assert again.code == 4
+    assert "exists already; choose another name, or replace it with --overwrite" in again.err
+    assert contents(tmp_path) == before
+    assert vsacli("new", "robot", "--joints", "R", "-o", "arm.yaml", "--overwrite", "-q").err == ""
+    assert (tmp_path / "arm.yaml").read_text() == robot_template("R")
+
+
+def test_from_nothing_to_torques(vsacli: Any) -> None:
+    assert vsacli("new", "robot", "--joints", "PR", "--actuator", "elastic", "-o", "arm.yaml").code == 0
+    assert vsacli("new", "trajectory", "--robot", "arm.yaml", "-o", "move.yaml").code == 0
+    assert vsacli("validate", "arm.yaml", "move.yaml").code == 0
+    assert vsacli("invdyn", "arm.yaml", "move.yaml", "-q").code == 0
+
+
+def test_standard_output_is_the_file(vsacli: Any) -> None:
+    assert vsacli("new", "robot", "--joints", "RP").out == robot_template("RP")
+    assert vsacli("new", "trajectory").out == trajectory_template()
+
+
+def test_a_robot_that_cannot_be_read(vsacli: Any) -> None:
+    done = vsacli("new", "trajectory", "--robot", "none.yaml")
+    assert (done.code, done.out, done.err) == (2, "", "none.yaml: no such file\n")
+
+
+@pytest.mark.parametrize("command", ["robot", "trajectory"])
+def test_help_of_both(vsacli: Any, command: str) -> None:
+    done = vsacli("new", command, "-h")
+    assert done.code == 0
+    assert f"vsacli new {command} " in done.out

@@ -1,0 +1,228 @@
+"""Result files with wrong bytes: refused with a sentence, soon, and within the memory of the file."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import struct
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+from samples.command_line import ROBOT
+
+from vsacli.base.errors import InputError
+from vsacli.results.store.damage import check_heaps
+from vsacli.results.store.reader import open_result
+
+CASES = 60
+SECONDS = 30
+"""For all cases together, which take a few; a hang takes forever."""
+
+READER = """
+import resource, sys
+from vsacli.base.errors import InputError, StorageError
+from vsacli.files.info import describe_file, render
+from vsacli.files.validation import check_files
+
+folder, cases = sys.argv[1], int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_AS, (2 * 2**30, 2 * 2**30))
+resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+for case in range(cases):
+    path = f"{folder}/{case}.h5"
+    print(case, flush=True)
+    try:
+        checked = check_files([path])
+        render(describe_file(path))
+    except (InputError, StorageError) as error:
+        assert len(str(error)) < 1000, error
+used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+assert used < 500, f"{used} MB"
+print("done")
+"""
+
+LAUNCH = "import subprocess, sys; sys.exit(subprocess.run(sys.argv[1:]).returncode)"
+"""Run a command from a small process: peak memory begins with that of the process that starts another."""
+
+
+def damaged(content: bytes, random_numbers: random.Random) -> bytes:
+    """The content cut short, or with a few of its bytes changed."""
+    if random_numbers.random() < 0.15:
+        return content[: random_numbers.randrange(len(content))]
+    changed = bytearray(content)
+    for _ in range(random_numbers.choice([1, 1, 2, 8, 64])):
+        place = random_numbers.randrange(len(changed))
+        match random_numbers.randrange(4):
+            case 0:
+                changed[place] ^= 1 << random_numbers.randrange(8)
+            case 1:
+                changed[place] = random_numbers.choice([0, 1, 127, 128, 255])
+            case 2:
+                other = random_numbers.randrange(len(changed))
+                changed[place : place + 16] = changed[other : other + 16]
+            case 3:
+                changed[place : place + 8] = random_numbers.choice([0, 2**63, 2**31]).to_bytes(8, "little")
+    return bytes(changed)
+
+
+@pytest.fixture(scope="module")
+def small_result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result of few samples, so that most of its bytes are structure."""
+    folder = tmp_path_factory.mktemp("small")
+    (folder / "move.yaml").write_text(
+        "format: vsacli-trajectory/1\nname: short\nduration: 0.1\nrate: 100\n"
+        "position: {type: constant, value: 0.5}\nstiffness: {type: constant, value: 1000}\n"
+    )
+    command = [sys.executable, "-m", "vsacli", "invdyn", ROBOT, "move.yaml", "-q", "-o", "r.h5"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    return folder / "r.h5"
+
+
+def test_any_bytes_are_read_or_refused(small_result: Path, tmp_path: Path) -> None:
+    content, random_numbers = small_result.read_bytes(), random.Random(1)
+    for case in range(CASES):
+        (tmp_path / f"{case}.h5").write_bytes(damaged(content, random_numbers))
+    done = subprocess.run(
+        [sys.executable, "-c", LAUNCH, sys.executable, "-c", READER, str(tmp_path), str(CASES)],
+        capture_output=True,
+        text=True,
+        timeout=SECONDS,
+        check=False,
+    )
+    assert done.returncode == 0, f"case {done.stdout.split()[-1]}\n{done.stderr}"
+    assert done.stdout.split()[-1] == "done"
+
+
+def heap_object(content: bytes, index: int) -> int:
+    """Offset of an object of the first heap of texts."""
+    start = content.index(b"GCOL\x01\0\0\0")
+    position = start + 16
+    for _ in range(index):
+        position += 16 + -(-struct.unpack_from("<Q", content, position + 8)[0] // 8) * 8
+    return position
+
+
+@pytest.mark.parametrize(
+    ("fields", "form"),
+    [((0, 0, 0, 0), "<HHIQ"), ((1, 0, 0, 2**63), "<HHIQ"), ((1, 0, 0, 2**64 - 1), "<HHIQ")],
+    ids=["endless loop", "beyond the heap", "wraps around"],
+)
+def test_a_heap_of_texts_that_never_ends(
+    small_result: Path, tmp_path: Path, fields: tuple[int, ...], form: str
+) -> None:
+    content = bytearray(small_result.read_bytes())
+    struct.pack_into(form, content, heap_object(bytes(content), 3), *fields)
+    (tmp_path / "r.h5").write_bytes(content)
+    with pytest.raises(InputError, match=r"r.h5: is damaged: the texts at byte \d+ have no end"):
+        open_result(tmp_path / "r.h5")
+
+
+def test_a_text_is_not_longer_than_the_file(small_result: Path, tmp_path: Path) -> None:
+    with h5py.File(small_result) as file:
+        offset = file["joint_type"].id.get_offset()
+    content = bytearray(small_result.read_bytes())
+    struct.pack_into("<I", content, offset, 2**32 - 1)
+    (tmp_path / "r.h5").write_bytes(content)
+    with pytest.raises(InputError, match=r"r.h5: is damaged .*joint_type claims texts of 4,294,967,"):
+        open_result(tmp_path / "r.h5")
+
+
+def test_heaps_are_found_wherever_a_piece_of_the_file_ends(
+    small_result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = bytearray(small_result.read_bytes())
+    last = bytes(content).rindex(b"GCOL\x01\0\0\0")
+    content[last + 16 : last + 32] = bytes(16)
+    path = tmp_path / "r.h5"
+    path.write_bytes(content)
+    for piece in (last + 3, 1000, 2**20):
+        monkeypatch.setattr("vsacli.results.store.damage.PIECE", piece)
+        check_heaps(small_result)
+        with pytest.raises(InputError, match=f"the texts at byte {last} have no end"):
+            check_heaps(path)
+
+
+def with_claim(path: Path, name: str, shape: tuple[int, ...], chunks: tuple[int, ...]) -> None:
+    """Replace a dataset by one of another shape, of which nothing is stored."""
+    with h5py.File(path, "r+") as file:
+        kind = file[name].dtype
+        del file[name]
+        file.create_dataset(name, shape=shape, dtype=kind, chunks=chunks)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "chunks"),
+    [
+        ("time", (10**12,), (1000,)),
+        ("joint", (10**12,), (1000,)),
+        ("tau_motor", (10**12, 3, 2), (1000, 3, 2)),
+        ("tau_motor", (11, 3, 10**9), (11, 3, 1000)),
+        ("flags", (11, 3), (11, 3)),
+    ],
+)
+def test_shapes_are_not_believed(
+    vsacli: Any, small_result: Path, name: str, shape: tuple[int, ...], chunks: tuple[int, ...]
+) -> None:
+    shutil.copy(small_result, "r.h5")
+    with_claim(Path("r.h5"), name, shape, chunks)
+    done = vsacli("export", "r.h5", "-o", "r.csv")
+    if name == "flags":  # of the right shape, so nothing is wrong
+        assert done.code == 0
+    else:
+        assert done.code == 2
+        assert done.err.startswith("r.h5: is damaged or truncated (")
+        assert not Path("r.csv").exists()
+
+
+@pytest.mark.parametrize("report", ["[]", "1", "{", "[" * 100_000, '{"a": NaN'], ids=len)
+def test_reports_that_are_none(vsacli: Any, small_result: Path, report: str) -> None:
+    shutil.copy(small_result, "r.h5")
+    with h5py.File("r.h5", "r+") as file:
+        del file["report/json"]
+        file["report/json"] = report
+    done = vsacli("info", "r.h5")
+    assert done.code == 2
+    assert done.err.startswith("r.h5: is damaged or truncated (")
+    assert len(done.err) < 400
+
+
+@pytest.mark.parametrize("report", [{}, {"joints": None}, {"joints": [[{"name": 5}]], "x": {"y": []}}])
+def test_a_report_of_another_shape_is_left_to_json(vsacli: Any, small_result: Path, report: Any) -> None:
+    shutil.copy(small_result, "r.h5")
+    with h5py.File("r.h5", "r+") as file:
+        del file["report/json"]
+        file["report/json"] = json.dumps(report)
+    done = vsacli("info", "r.h5")
+    assert (done.code, done.err) == (0, "")
+    assert done.out.endswith("\nits report has another form than this version writes; --json shows it\n")
+    assert json.loads(vsacli("info", "r.h5", "--field", "report").out) == report
+
+
+@pytest.mark.parametrize("attribute", ["created", "versions", "command_line"])
+def test_provenance_that_is_missing(vsacli: Any, small_result: Path, attribute: str) -> None:
+    shutil.copy(small_result, "r.h5")
+    with h5py.File("r.h5", "r+") as file:
+        del file.attrs[attribute]
+    done = vsacli("info", "r.h5")
+    assert (done.code, done.out) == (2, "")
+    assert "is damaged or truncated" in done.err
+
+
+def test_a_link_to_another_file_is_not_followed(vsacli: Any, small_result: Path) -> None:
+    shutil.copy(small_result, "r.h5")
+    shutil.copy(small_result, "other.h5")
+    with h5py.File("r.h5", "r+") as file:
+        del file["tau_e"]
+        file["tau_e"] = h5py.ExternalLink("other.h5", "/tau_e")
+    done = vsacli("validate", "r.h5")
+    assert done.code == 2
+    assert "tau_e" in done.out
+
+
+def test_a_path_with_a_nul(vsacli: Any) -> None:
+    done = vsacli("export", "a\0b.h5")
+    assert (done.code, done.err) == (2, "a\0b.h5: the path holds a NUL character\n")

@@ -1,0 +1,274 @@
+"""Robot files: what is read, and one line with file and line number for each problem."""
+
+import dataclasses
+import hashlib
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.motor import Motor
+from vsacli.base.errors import InputError
+from vsacli.robot.file import load_robot
+from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Robot
+
+ROBOTS = Path(__file__).parents[2] / "robots"
+
+TEXT = """\
+format: vsacli-robot/1
+name: rig
+gravity: [0, 0, -9.81]
+joints:
+  - name: swing
+    type: revolute
+    dh: {a: 0.2, alpha: 90 deg}
+    link:
+      mass: 2
+      com: [0.1, 0, 0]
+      inertia: {xx: 0.1, yy: 0.2, zz: 0.2}
+    damping: 1e-5
+    actuator:
+      type: antagonistic
+      motor: {inertia: 3.2, damping: 1e-4}
+      spring: {type: cubic, k: 400, k_c: 2000}
+    limits: {position: [-pi, 90 deg], velocity: 3, stiffness: 2000}
+  - name: slide
+    type: prismatic
+    dh: {a: 0, alpha: 0, d: 0.1, theta: pi/4}
+    link: {mass: 1, com: [0, 0, 0.05], inertia: {xx: 0.1, yy: 0.1, zz: 0.1, yz: -0.01}}
+    actuator:
+      type: antagonistic
+      motor: [{inertia: 10}, {inertia: 11, max_torque: 90}]
+      spring: [{type: cubic, k: 4e3, k_c: 1e6}, {type: cubic, k: 5e3, k_c: 1e6, max_deflection: 0.02}]
+      preload: negative
+"""
+
+
+@pytest.fixture
+def load(tmp_path, monkeypatch):
+    """Load a robot from a text, in a folder of its own, as `rig.yaml`."""
+    monkeypatch.chdir(tmp_path)
+
+    def load_text(text):
+        Path("rig.yaml").write_text(text)
+        return load_robot("rig.yaml")
+
+    return load_text
+
+
+@pytest.fixture
+def problems(load):
+    """The problems of TEXT after one change."""
+
+    def problems_after(old, new):
+        assert TEXT.count(old) == 1
+        with pytest.raises(InputError) as caught:
+            load(TEXT.replace(old, new))
+        return str(caught.value).splitlines()
+
+    return problems_after
+
+
+def test_every_field_is_read(load):
+    swing = Joint(
+        name="swing",
+        type="revolute",
+        dh=DenavitHartenberg(a=0.2, alpha=math.pi / 2),
+        link=Link(mass=2.0, com=(0.1, 0.0, 0.0), inertia=Inertia(xx=0.1, yy=0.2, zz=0.2)),
+        damping=1e-5,
+        actuator=Antagonistic(
+            motor=(Motor(inertia=3.2, damping=1e-4),) * 2, spring=(Cubic(k=400, k_c=2000),) * 2
+        ),
+        limits=Limits(position=(-math.pi, math.pi / 2), velocity=(-3, 3), stiffness=(-math.inf, 2000)),
+    )
+    slide = Joint(
+        name="slide",
+        type="prismatic",
+        dh=DenavitHartenberg(a=0.0, alpha=0.0, d=0.1, theta=math.pi / 4),
+        link=Link(mass=1.0, com=(0.0, 0.0, 0.05), inertia=Inertia(xx=0.1, yy=0.1, zz=0.1, yz=-0.01)),
+        actuator=Antagonistic(
+            motor=(Motor(inertia=10.0), Motor(inertia=11.0, max_torque=90.0)),
+            spring=(Cubic(k=4000, k_c=1e6), Cubic(k=5000, k_c=1e6, max_deflection=0.02)),
+            preload="negative",
+        ),
+    )
+    robot = load(TEXT)
+    assert robot == Robot(name="rig", gravity=(0, 0, -9.81), joints=(swing, slide))
+    assert (
+        robot.joints[1].actuator.spring[1].max_deflection == 0.02
+    )  # takes no part in the equality of springs
+
+
+def test_the_source_is_kept(load):
+    (source,) = load(TEXT).sources
+    assert (source.path, source.text) == ("rig.yaml", TEXT)
+    assert source.sha256 == hashlib.sha256(TEXT.encode()).hexdigest()
+
+
+def test_gravity_points_down_unless_given(load):
+    assert load(TEXT.replace("gravity: [0, 0, -9.81]\n", "")).gravity == (0, 0, -9.81)
+
+
+def test_a_byte_order_mark_and_windows_line_ends_do_not_matter(load):
+    assert load("\ufeff" + TEXT.replace("\n", "\r\n")) == load(TEXT)
+
+
+def test_a_spring_shared_by_an_alias(load):
+    text = TEXT.replace("spring: {type: cubic, k: 400", "spring: &s {type: cubic, k: 400")
+    robot = load(re.sub(r"spring: \[.*\]", "spring: *s", text))
+    assert robot.joints[1].actuator.spring == robot.joints[0].actuator.spring
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        # the document
+        ("format: vsacli-robot/1\n", "", "1: missing key 'format'; the file must begin with `format: "),
+        ("vsacli-robot/1", "vsacli-robot/2", "1: format: expected 'vsacli-robot/1', found 'vsacli-robot/2'"),
+        # keys
+        ("      mass: 2\n", "", "8: link: missing key 'mass' (mass of the augmented link)"),
+        ("      mass: 2\n", "      mas: 2\n      mass: 2\n", "9: unknown key 'mas'; did you mean 'mass'?"),
+        (
+            "      mass: 2\n",
+            "      mass: 2\n      mass: 3\n",
+            "10: duplicate key 'mass'; it stands on line 9",
+        ),
+        # words
+        ("name: rig", "name: on", "2: name: expected a text, found 'on', a boolean in YAML"),
+        ("name: rig", "name:", "2: name: expected a text, found nothing"),
+        ("name: slide", "name: a b", "18: name: must be made of letters, digits, _ and -"),
+        ("name: slide", "name: swing", "18: joints.name: 'swing' is taken by another entry"),
+        ("type: revolute", "type: rotary", "6: type: unknown word 'rotary'; valid: revolute, prismatic"),
+        ("preload: negative", "preload: {}", "26: preload: expected one of positive, negative"),
+        (
+            "      type: antagonistic\n      motor: {",
+            "      motor: {",
+            "13: actuator: missing key 'type', one of antagonistic",
+        ),
+        ("type: cubic, k: 400", "type: cubik, k: 400", "16: spring.type: unknown word 'cubik'; did you mean"),
+        # numbers
+        ("mass: 2", "mass: on", "9: mass: expected a number in kg, found 'on': YAML takes this"),
+        ("mass: 2", "mass: 'on'", "9: mass: expected a number in kg, found 'on'"),
+        ("mass: 2", "mass:", "9: mass: expected a number in kg, found nothing"),
+        ("mass: 2", "mass: .nan", "9: mass: expected a number in kg, found '.nan': only finite"),
+        ("mass: 2", "mass: .inf", "9: mass: expected a number in kg, found '.inf': only finite"),
+        ("mass: 2", "mass: 1:30", "9: mass: expected a number in kg, found '1:30': base 60 is not read"),
+        ("mass: 2", "mass: 010", "9: mass: expected a number in kg, found '010': a leading zero"),
+        ("mass: 2", "mass: [2]", "9: mass: expected a number in kg, found a list of 1"),
+        ("mass: 2", "mass: -2", "9: mass: must be zero or positive, not -2"),
+        ("inertia: 3.2", "inertia: 0", "15: inertia: must be positive, not 0"),
+        ("k: 400", "k: -400", "16: k: must be positive, not -400"),
+        ("k: 400", "k: 1e300", "16: k: must be at most 1e+30 in size, not 1e+300"),
+        ("inertia: 3.2", "inertia: 1e-40", "15: inertia: must be at least 1e-30 in size, not 1e-40"),
+        ("a: 0.2", "a: 10 deg", "7: a: expected a number in m, found '10 deg': degrees are"),
+        # vectors, tensors, intervals
+        ("[0.1, 0, 0]", "[0.1, 0]", "10: com: expected 3 numbers, found 2"),
+        ("[0.1, 0, 0]", "0.1", "10: com: expected a list of 3 numbers, found '0.1'"),
+        ("yy: 0.2", "yy: -0.2", "11: inertia: the tensor has the negative eigenvalue -0.2 kg m^2"),
+        ("yz: -0.01", "yz: -0.2", "21: inertia: the tensor has the negative eigenvalue -0.1 kg m^2"),
+        ("[-pi, 90 deg]", "[90 deg, -pi]", "17: position: the lower bound 1.5708 exceeds"),
+        ("[-pi, 90 deg]", "[-pi, 1e31]", "17: position: must be at most 1e+30 in size, not 1e+31"),
+        ("[-pi, 90 deg]", "[1, 2, 3]", "17: position: expected [lower, upper] or one number"),
+        ("velocity: 3", "velocity: -3", "17: velocity: the lower bound 3 exceeds the upper bound -3"),
+        # nesting
+        ("link: {mass: 1,", "link: 3\n    links: {mass: 1,", "21: link: expected a mapping, found '3'"),
+        (
+            "motor: [{inertia: 10}, ",
+            "motor: [{inertia: 10}, {inertia: 10}, ",
+            "24: motor: expected one value for both",
+        ),
+    ],
+)
+def test_a_problem_is_named_with_its_line(problems, old, new, problem):
+    assert any(line.startswith(f"rig.yaml:{problem}") for line in problems(old, new))
+
+
+def test_one_mistake_is_one_line(problems):
+    assert len(problems("mass: 2", "mass: on")) == 1
+
+
+@pytest.mark.parametrize("joints", ["", " []", " {a: 1}", " 3"])
+def test_joints_are_a_list_of_one_or_more(load, joints):
+    with pytest.raises(InputError, match=r"^rig.yaml:2: joints: expected a list of one or more, found"):
+        load("format: vsacli-robot/1\njoints:" + joints + "\nname: rig\n")
+
+
+@pytest.mark.parametrize("text", ["[1, 2]", "word"])
+def test_a_document_is_a_mapping(load, text):
+    with pytest.raises(InputError, match=r"^rig.yaml:1: expected a mapping that begins with `format: "):
+        load(text)
+
+
+@pytest.mark.parametrize(("field", "value"), [("position", "90 deg"), ("velocity", "90 deg")])
+def test_degrees_follow_the_type_of_the_joint(load, field, value):
+    limits = f"    limits: {{{field}: {value}}}\n"
+    revolute = TEXT[: TEXT.index("    limits")] + limits
+    assert getattr(load(revolute).joints[0].limits, field) == (-math.pi / 2, math.pi / 2)
+    with pytest.raises(
+        InputError, match=rf"^rig.yaml:27: {field}: expected a number in m.*degrees are for angles only"
+    ):
+        load(TEXT + limits)
+
+
+def test_an_unknown_type_makes_no_problems_of_units(load):
+    with pytest.raises(InputError) as caught:
+        load(TEXT.replace("type: revolute", "type: rotational"))
+    assert [problem.line for problem in caught.value.problems] == [6]
+
+
+def test_all_problems_come_at_once_in_the_order_of_lines(load):
+    text = TEXT + "colour: red\n"
+    for old, new in [("-9.81]", "]"), ("mass: 2", "mass: -2"), ("k: 400", "k: hard"), ("slide", "swing")]:
+        text = text.replace(old, new)
+    with pytest.raises(InputError) as caught:
+        load(text)
+    assert [problem.line for problem in caught.value.problems] == [3, 9, 16, 18, 27]
+
+
+def test_a_problem_behind_an_alias_is_reported_once_where_it_stands(load):
+    text = TEXT.replace("spring: {type: cubic, k: 400", "spring: &s {type: cubic, k: 0")
+    with pytest.raises(InputError) as caught:
+        load(re.sub(r"spring: \[.*\]", "spring: *s", text))
+    assert str(caught.value) == "rig.yaml:16: k: must be positive, not 0"
+
+
+def test_doubtful_physics_is_a_warning(load):
+    robot = load(TEXT.replace("zz: 0.2", "zz: 0.5").replace("mass: 1,", "mass: 0,"))
+    assert robot.warnings == (
+        "link of joint swing: its inertia breaks the triangle inequality: 0.5 > 0.1 + 0.2 by 0.2 kg m^2",
+        "link of joint slide: its mass is zero",
+    )
+
+
+def test_table_one_of_the_paper():
+    robot = load_robot(ROBOTS / "vsa_3r.yaml")
+    assert [joint.link.mass for joint in robot.joints] == [9.0478, 6.7858, 5.0894]
+    assert [joint.dh for joint in robot.joints] == [
+        DenavitHartenberg(a=0.0, alpha=math.pi / 2),
+        DenavitHartenberg(a=0.3, alpha=0.0),
+        DenavitHartenberg(a=0.3, alpha=0.0),
+    ]
+    moments = [dataclasses.astuple(joint.link.inertia)[:3] for joint in robot.joints]
+    assert moments == [(0.1299, 0.0185, 0.1299), (0.0139, 0.0578, 0.0578), (0.0104, 0.0434, 0.0434)]
+    assert [joint.actuator.motor[1].inertia for joint in robot.joints] == [3.20, 3.05, 1.98]
+    assert {spring for joint in robot.joints for spring in joint.actuator.spring} == {Cubic(k=400, k_c=2000)}
+
+
+@pytest.mark.parametrize("path", sorted(ROBOTS.glob("*.yaml")), ids=lambda path: path.stem)
+def test_the_shipped_robots_raise_no_doubts_but_those_that_were_published(path):
+    published = {
+        "puma_560": (
+            "link of joint waist: its mass is zero",
+            "link of joint waist: its inertia breaks the triangle inequality: 0.35 > 0 + 0 by 0.35 kg m^2",
+            "link of joint elbow: its inertia breaks the triangle inequality: 0.086 > 0.0125 + 0.066 by "
+            "0.0075 kg m^2",
+        )
+    }
+    robot = load_robot(path)
+    doubts = [
+        f"link of joint {joint.name}: {doubt}" for joint in robot.joints for doubt in joint.link.doubts()
+    ]
+    assert tuple(doubts) == published.get(path.stem, ())

@@ -1,0 +1,140 @@
+"""Which part of a URDF becomes the robot: ends of the chain, lumped links, side branches."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from samples.urdf import joint, link, robot, write
+
+from vsacli.base.errors import InputError
+from vsacli.robot.urdf import convert
+
+NO_INERTIA = '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>'
+TREE = robot(
+    link("world"),
+    link("torso"),
+    link("arm"),
+    link("hand"),
+    link("left"),
+    link("right"),
+    link("head"),
+    joint("lift", "world", "torso", "P"),
+    joint("shoulder", "torso", "arm", "R", rpy="1 0 0"),
+    joint("wrist", "arm", "hand", "R", rpy="0 1 0"),
+    joint("open_left", "hand", "left", "P", rpy="0 0 1"),
+    joint("open_right", "hand", "right", "P", rest='<mimic joint="open_left"/>'),
+    joint("nod", "torso", "head", "R", rpy="0 1 0"),
+)
+
+
+@pytest.fixture
+def urdf(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return lambda text: write(tmp_path / "arm.urdf", text).name
+
+
+def names(conversion):
+    return [[carried.name for carried in each.links] for each in conversion.chain.joints]
+
+
+def point(xyz: str, mass: float) -> str:
+    return f'<inertial><origin xyz="{xyz}"/><mass value="{mass}"/>{NO_INERTIA}</inertial>'
+
+
+def test_fixed_links_and_held_branches_are_lumped(urdf):
+    conversion = convert(urdf(TREE), tip="hand")
+    assert names(conversion) == [["torso", "head"], ["arm"], ["hand", "left", "right"]]
+    assert conversion.chain.held_beside == ("open_left", "open_right", "nod")
+    assert any("held at zero beside the chain" in note and "nod" in note for note in conversion.notes())
+
+
+def test_joints_below_the_base_are_held(urdf):
+    conversion = convert(urdf(TREE), base="torso", tip="hand")
+    assert names(conversion) == [["arm"], ["hand", "left", "right"]]
+    assert conversion.chain.held_below == ("lift",)
+    assert "held at zero below the base: lift" in conversion.notes()
+
+
+def test_two_points_make_a_dumbbell(urdf):
+    text = robot(
+        link("base"),
+        link("rod", point("1 0 0", 3)),
+        link("end", point("0 0 0", 1)),
+        joint("turn", "base", "rod", xyz="0 0 0"),
+        joint("weld", "rod", "end", "F", xyz="-1 0 0"),
+    )
+    (only,) = convert(urdf(text), tip="rod").robot.joints
+    assert only.link.mass == 4
+    assert only.link.com == (0.5, 0, 0)
+    # Reduced mass 3/4 kg at the distance of 2 m.
+    assert np.diag(only.link.inertia.tensor).tolist() == [0, 3, 3]
+
+
+def test_a_welded_body_keeps_its_orientation(urdf):
+    moments = '<inertia ixx="1" ixy="0" ixz="0" iyy="2" iyz="0" izz="2.5"/>'
+    turned = f'<inertial><mass value="1"/>{moments}</inertial>'
+    text = robot(
+        link("base"),
+        link("rod", ""),
+        link("end", turned),
+        joint("turn", "base", "rod"),
+        joint("weld", "rod", "end", "F", rpy="1.5707963267948966 0 0"),
+    )
+    (only,) = convert(urdf(text), tip="rod").robot.joints
+    assert np.diag(only.link.inertia.tensor).tolist() == [1, 2.5, 2]
+
+
+def test_gravity_follows_the_base(urdf):
+    text = robot(
+        link("floor"), link("wall"), link("arm"),
+        joint("hang", "floor", "wall", "F", rpy="1.5707963267948966 0 0"), joint("turn", "wall", "arm"),
+    )  # fmt: skip
+    assert convert(urdf(text)).robot.gravity == (0, 0, -9.81)
+    assert convert(urdf(text), base="wall").robot.gravity == (0, -9.81, 0)
+
+
+def test_the_only_end_is_the_tip(urdf):
+    text = robot(
+        link("a"), link("b"), link("c"), link("tool"), link("screw"),
+        joint("j1", "a", "b"), joint("j2", "b", "c", rpy="1 0 0"), joint("weld", "c", "tool", "F"),
+        joint("bolt", "b", "screw", "F"),
+    )  # fmt: skip
+    assert convert(urdf(text)).chain.tip == "tool"
+
+
+@pytest.mark.parametrize(
+    ("base", "tip", "problem"),
+    [
+        (None, None, "several links below 'world' could be the end effector; choose one with --tip: "
+         "torso (1 joint), hand (3 joints), head (2 joints), left (4 joints), right (4 joints)"),
+        (None, "hnd", "tip: there is no link 'hnd'; did you mean 'hand'?"),
+        ("torzo", "hand", "base: there is no link 'torzo'; did you mean 'torso'?"),
+        ("head", "hand", "the link 'hand' does not hang below 'head'"),
+        ("hand", "torso", "the link 'torso' does not hang below 'hand'"),
+        ("hand", "hand", "no joint moves between 'hand' and 'hand'"),
+        ("head", None, "no joint moves below 'head'"),
+        (None, "right", "13: joint 'open_right' follows 'open_left' (<mimic>)"),
+        (None, "left", "13: joint 'open_right' beside the chain follows 'open_left' on it (<mimic>)"),
+    ],
+)  # fmt: skip
+def test_a_chain_that_cannot_be(urdf, base, tip, problem):
+    separator = "" if problem[0].isdigit() else " "
+    with pytest.raises(InputError, match=f"^arm.urdf:{separator}{re.escape(problem)}"):
+        convert(urdf(TREE), base, tip)
+
+
+def test_a_floating_base_may_be_held(urdf):
+    text = TREE.replace('name="lift" type="prismatic"', 'name="lift" type="floating"')
+    assert convert(urdf(text), base="torso", tip="hand").chain.held_below == ("lift",)
+    with pytest.raises(InputError, match=r"^arm.urdf:9: joint 'lift' is floating; a chain has revolute"):
+        convert(urdf(text), tip="hand")
+
+
+def test_names_become_identifiers_that_differ(urdf):
+    text = robot(
+        link("a"), link("b"), link("c"), link("d"),
+        joint("arm.1", "a", "b"), joint("arm 1", "b", "c"), joint("7: é", "c", "d"),
+    )  # fmt: skip
+    assert convert(urdf(text)).robot.joint_names == ("arm_1", "arm_1_2", "_7___")

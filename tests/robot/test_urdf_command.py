@@ -1,0 +1,163 @@
+"""`vsacli import-urdf`: the file it writes, its report, and what it refuses to replace."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import pytest
+from samples.command_line import REPOSITORY, contents
+from samples.urdf import joint, link, random_serial, robot, serial, write
+
+from vsacli import load_robot
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.kinds import ACTUATORS
+from vsacli.actuators.rigid import Rigid
+from vsacli.cli.import_urdf import ACTUATOR_TYPES
+from vsacli.robot.urdf import Placeholders, convert, render, robot_text
+
+DESK_ARM = REPOSITORY / "robots" / "desk_arm.urdf"
+
+
+def converted(vsacli, *options):
+    done = vsacli("import-urdf", DESK_ARM, "--tip", "flange", "-o", "arm.yaml", *options)
+    assert done.code == 0, done.err
+    return done
+
+
+def test_the_file_is_the_conversion(vsacli, tmp_path):
+    done = converted(vsacli)
+    conversion = convert(DESK_ARM, tip="flange")
+    assert load_robot(tmp_path / "arm.yaml") == conversion.robot
+    assert (tmp_path / "arm.yaml").read_text() == robot_text(conversion)
+    assert (done.out, done.err) == (f"{render(conversion)}\n", "wrote arm.yaml\n")
+
+
+@pytest.mark.parametrize("actuator", ACTUATORS)
+@pytest.mark.parametrize("seed", range(4))
+def test_every_number_comes_back_from_the_file(tmp_path, actuator, seed):
+    text = random_serial("RPRCR", seed).replace("</joint>", '<dynamics damping="0.1"/></joint>')
+    limits = '<limit lower="-0.7" upper="1.1" velocity="2.3" effort="17.5"/>'
+    path = write(tmp_path / "arm.urdf", text.replace("</joint>", f"{limits}</joint>"))
+    conversion = convert(path, placeholders=Placeholders(actuator, 0.3, 123.4, (1.5, 2.5)))
+    loaded = load_robot(write(tmp_path / "arm.yaml", robot_text(conversion)))
+    assert loaded == conversion.robot
+
+
+def test_right_angles_are_written_as_such(vsacli, tmp_path):
+    converted(vsacli)
+    rows = re.findall(r"alpha: (\S+), d: \S+ theta: (\S+)}", (tmp_path / "arm.yaml").read_text())
+    assert rows == [("-pi/2", "0"), ("0", "0"), ("pi/2", "pi/2"), ("0", "0")]
+
+
+def test_the_command_names_every_actuator():
+    assert tuple(ACTUATORS) == ACTUATOR_TYPES
+
+
+def test_placeholders_are_marked_and_come_from_the_options(vsacli, tmp_path):
+    converted(vsacli, "--motor-inertia", "0.5", "--spring", "300,900")
+    text = (tmp_path / "arm.yaml").read_text()
+    lines = [line for line in text.splitlines() if re.match(" +(motor|spring|stiffness):", line)]
+    assert len(lines) == 8
+    assert all("# placeholder" in line for line in lines)
+    assert "placeholder: not from the URDF; the joint's effort limit there is 30" in text
+    actuator = load_robot(tmp_path / "arm.yaml").joints[0].actuator
+    assert isinstance(actuator, Antagonistic)
+    assert (actuator.motor[0].inertia, actuator.spring[0].k, actuator.spring[0].k_c) == (0.5, 300, 900)
+    assert math.isinf(actuator.motor[0].max_torque)
+
+
+@pytest.mark.parametrize(("word", "kind"), [("elastic", Elastic), ("rigid", Rigid)])
+def test_one_motor_takes_the_effort_limit(vsacli, tmp_path, word, kind):
+    converted(vsacli, "--actuator", word, "--stiffness", "700")
+    actuator = load_robot(tmp_path / "arm.yaml").joints[1].actuator
+    assert isinstance(actuator, kind)
+    assert actuator.motor.max_torque == 30
+    assert getattr(actuator, "stiffness", 700) == 700
+    assert "# placeholder: not from the URDF, but for the effort limit" in (tmp_path / "arm.yaml").read_text()
+
+
+def test_limits_damping_and_names_are_taken_over(vsacli, tmp_path):
+    converted(vsacli)
+    turn, shoulder, _, quill = load_robot(tmp_path / "arm.yaml").joints
+    assert (turn.limits.position, turn.limits.velocity) == ((-math.inf, math.inf), (-3, 3))
+    assert (shoulder.limits.position, shoulder.damping) == ((-2, 1.2), 0.2)
+    assert (quill.name, quill.type, quill.limits.position) == ("quill", "prismatic", (0, 0.1))
+
+
+def test_the_report(vsacli):
+    lines = converted(vsacli).out.splitlines()
+    assert lines[0] == "desk-arm: 4 joints from table to flange"
+    assert lines[4].split() == ["elbow", "0", "1.5708", "0", "1.5708", "1.18", "forearm", "+", "1"]
+    assert "total mass of the moving links: 5.33 kg" in lines
+    exactness = "the same as the URDF's, the tip within 1.0e-12 m and 1.0e-12 rad"
+    assert f"forward kinematics: {exactness}" in lines
+    assert "held at zero beside the chain, their links lumped: left_finger, right_finger" in lines
+    assert "dry friction left out: turn" in lines
+
+
+def test_a_snapped_axis_is_reported(vsacli, tmp_path):
+    write(tmp_path / "arm.urdf", serial("RR", ["0 0 0", "0 1e-5 0"]))
+    done = vsacli("import-urdf", "arm.urdf")
+    assert "forward kinematics: not quite the URDF's, the tip within" in done.out
+    assert "axis of j2 made parallel to the one before it, 1e-05 rad off" in done.out
+    assert "axis of j2" not in vsacli("import-urdf", "arm.urdf", "--snap", "1e-6", "--overwrite").out
+
+
+def test_doubtful_links_are_reported(vsacli, tmp_path):
+    write(tmp_path / "arm.urdf", robot(link("a"), link("b", ""), joint("turn", "a", "b")))
+    assert "link of joint turn: its mass is zero" in vsacli("import-urdf", "arm.urdf").out
+
+
+def test_names_stay_in_their_place(tmp_path):
+    text = robot(link("a"), link("b # } é"), joint("turn: [", "a", "b # } é"))
+    conversion = convert(write(tmp_path / "arm.urdf", text.replace('"sample"', '"a &quot;b: #c\\"')))
+    loaded = load_robot(write(tmp_path / "arm.yaml", robot_text(conversion)))
+    assert loaded == conversion.robot
+    assert (loaded.name, loaded.joint_names) == ('a "b: #c\\', ("turn___",))
+
+
+def test_the_result_runs(vsacli, tmp_path):
+    converted(vsacli, "--actuator", "rigid")
+    write(
+        tmp_path / "move.yaml",
+        "format: vsacli-trajectory/1\nname: move\nduration: 2\nrate: 100\n"
+        "position: {type: polynomial, degree: 9, start: 0, end: [1, 0.5, 0.5, 0.05]}\n",
+    )
+    assert vsacli("invdyn", "arm.yaml", "move.yaml").code == 0
+
+
+@pytest.mark.parametrize("existing", ["arm.yaml", "arm.urdf"])
+def test_nothing_is_replaced(vsacli, tmp_path, existing):
+    write(tmp_path / "arm.urdf", serial("RR"))
+    write(tmp_path / "arm.yaml", "mine")
+    before = contents(tmp_path)
+    done = vsacli("import-urdf", "arm.urdf", "-o", existing)
+    assert (done.code, done.out) == (4 if existing == "arm.yaml" else 2, "")
+    assert re.match(f"{existing}: (exists already|is read by this command)", done.err)
+    assert contents(tmp_path) == before
+
+
+def test_overwriting(vsacli, tmp_path):
+    write(tmp_path / "arm.yaml", "mine")
+    converted(vsacli, "--overwrite")
+    assert load_robot(tmp_path / "arm.yaml").name == "desk-arm"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--motor-inertia", "-1"], "inertia: must be positive, not -1"),
+        (["--spring", "400"], "expected two numbers, k and k_c, e.g. 400,2000"),
+        (["--spring", "0,1"], "k: must be positive, not 0"),
+        (["--snap", "1"], "1.0 is not in the range 0<=x<=0.1"),
+        (["--actuator", "hydraulic"], "'hydraulic' is not one of 'antagonistic', 'elastic', 'rigid'"),
+        (["--tip", "flang"], "tip: there is no link 'flang'; did you mean 'flange'?"),
+    ],
+)
+def test_options_that_cannot_be(vsacli, tmp_path, options, message):
+    done = vsacli("import-urdf", DESK_ARM, "--tip", "flange", *options)
+    assert (done.code, done.out) == (2, "")
+    assert message in done.err
+    assert list(tmp_path.iterdir()) == []

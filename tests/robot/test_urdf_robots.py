@@ -1,0 +1,102 @@
+"""Every serial chain of the robots in `example-robot-data`, against Pinocchio's own reading of the files."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracles.kinematics import tool_pose
+from oracles.urdf_pinocchio import UrdfOracle
+
+from vsacli.base.errors import InputError
+from vsacli.dynamics.link_torques import link_torques
+from vsacli.robot.urdf import Conversion, convert
+from vsacli.robot.urdf.link_tree import Urdf, below
+from vsacli.robot.urdf.reader import read_urdf
+
+PAGE = (Path(__file__).parents[2] / "docs" / "urdf.md").read_text(encoding="utf-8")
+FILES = [
+    Path(str(file.locate()))
+    for file in importlib.metadata.files("example-robot-data") or ()
+    if file.suffix == ".urdf"
+]
+BY_NAME = {file.name: file for file in FILES}
+
+ARM = re.compile(r"^\| `(\S+\.urdf)` \| `(\S+)` \| `(\S+)` \| ([RP]+) \|", re.MULTILINE)
+REFUSED = re.compile(r"^\| `(\S+\.urdf)` \| [^|]+ \| ([^|]+) \|$", re.MULTILINE)
+
+BOUND = 1e-9
+"""m, and relative torque. Seen are 1e-11: multiples of pi/2 that the files round to 11 decimals."""
+
+SAMPLES = 5
+
+
+@cache
+def oracle(path: Path) -> UrdfOracle:
+    return UrdfOracle(path)
+
+
+def check(path: Path, conversion: Conversion) -> None:
+    """Compare tips and torques at random states with those of Pinocchio."""
+    chain, robot = conversion.chain, conversion.robot
+    joints = [joint.urdf.name for joint in chain.joints]
+    q, dq, ddq = np.random.default_rng(len(joints)).uniform(-2, 2, (3, SAMPLES, len(joints)))
+    for position in q:
+        found = tool_pose(robot, position).real
+        expected = oracle(path).tip_pose(joints, chain.base, chain.tip, position)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND)
+    found = link_torques(robot, q, dq, ddq, 0 * q, 0 * q)[0] - dq * [joint.damping for joint in robot.joints]
+    expected = np.array([oracle(path).torques(joints, *row) for row in zip(q, dq, ddq, strict=True)])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND * np.abs(expected).max())
+    assert conversion.residual.position < BOUND
+
+
+def ends(urdf: Urdf) -> Iterator[str]:
+    """A leaf for each different chain of moving joints from the root."""
+    joints = list(below(urdf.root, urdf.joints.values()))
+    parents = {joint.parent for joint in joints}
+    seen: set[tuple[str, ...]] = set()
+    for leaf in (joint.child for joint in joints if joint.child not in parents):
+        moving = tuple(joint.name for joint in urdf.above(leaf) if not joint.is_fixed)
+        if moving and moving not in seen:
+            seen.add(moving)
+            yield leaf
+
+
+def refusals(path: Path) -> Iterator[str]:
+    """Check every chain from the root; yields why one is refused."""
+    try:
+        tips = list(ends(read_urdf(path)))
+    except InputError as error:
+        yield str(error)
+        return
+    for tip in tips or [None]:
+        try:
+            check(path, convert(path, tip=tip))
+        except InputError as error:
+            yield str(error)
+
+
+@pytest.mark.parametrize(("name", "base", "tip", "letters"), ARM.findall(PAGE))
+def test_an_arm_of_the_page(name, base, tip, letters):
+    conversion = convert(BY_NAME[name], base, tip)
+    assert "".join("R" if joint.is_revolute else "P" for joint in conversion.robot.joints) == letters
+    check(BY_NAME[name], conversion)
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parts[-3]}-{path.stem}")
+def test_every_chain_from_the_root_is_exact_or_refused_for_a_reason_on_the_page(path):
+    reasons = {reason for name, reason in REFUSED.findall(PAGE) if name == path.name}
+    found = list(refusals(path))
+    assert [refusal for refusal in found if not any(reason in refusal for reason in reasons)] == []
+    assert {reason for reason in reasons if any(reason in refusal for refusal in found)} == reasons
+
+
+def test_every_file_is_on_the_page():
+    assert len(FILES) > 50
+    assert sorted({file.name for file in FILES if f"`{file.name}`" not in PAGE}) == []

@@ -1,0 +1,1 @@
+"""Robots, trajectories and files that tests of several rooms share."""

@@ -1,0 +1,95 @@
+"""Single joints, steps and short runs for tests of the actuation, about the 3R arm of Table I."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from samples.robots import vsa_3r
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.pairs.pair import Pair
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import FloatArray
+from vsacli.dynamics.drive import drive
+from vsacli.robot.model import Joint, Limits, Robot
+from vsacli.trajectory.curves import POSITION, STIFFNESS, RestToRest
+from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+ALIKE = Cubic(k=400, k_c=2000)
+"""Either spring of Table I."""
+
+
+@dataclass(frozen=True)
+class Stopped(Cubic):
+    """A cubic spring that ends at a stop, at 30 N m to either side."""
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        low, high = self.deflection(np.array(self.torque_range))
+        return float(low), float(high)
+
+    @property
+    def torque_range(self) -> tuple[float, float]:
+        return (-30.0, 30.0)
+
+    def closed_pair(self, _other: SpringLaw) -> Pair | None:
+        return None
+
+
+def springs(first: SpringLaw, second: SpringLaw, preload: str = "positive") -> Antagonistic:
+    motor = Motor(inertia=3, damping=0.1)
+    return Antagonistic(motor=(motor, motor), spring=(first, second), preload=preload)
+
+
+def joint_with(actuator: Antagonistic | None = None, limits: Limits | None = None) -> Joint:
+    joint = vsa_3r().joints[1]
+    return dataclasses.replace(joint, actuator=actuator or joint.actuator, limits=limits or joint.limits)
+
+
+def with_joint(robot: Robot, index: int, joint: Joint) -> Robot:
+    joints = list(robot.joints)
+    joints[index] = joint
+    return dataclasses.replace(robot, joints=tuple(joints))
+
+
+def with_preload(joint: Joint, preload: str) -> Joint:
+    return dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, preload=preload))
+
+
+def lower_by_preload(joint: Joint, tau_e: FloatArray) -> dict[str, FloatArray]:
+    return {
+        preload: drive(with_preload(joint, preload), command(tau_e=tau_e)).stiffness_lower
+        for preload in ("positive", "negative")
+    }
+
+
+def command(**given: FloatArray | float) -> Command:
+    """Steps that rest under no load at 850 N m/rad, except for what is given."""
+    rest = {**dict.fromkeys(Command._fields, 0.0), "stiffness": 850.0}
+    values = (np.atleast_1d(np.asarray({**rest, **given}[name], dtype=float)) for name in Command._fields)
+    return Command(*np.broadcast_arrays(*values))
+
+
+def motion(
+    stiffness: tuple[float, ...] = (850.0,) * 3,
+    end_stiffness: tuple[float, ...] | None = None,
+    duration: float = 2.0,
+    rate: float = 100,
+) -> Trajectory:
+    """Rest to rest from 0 to 90, 45, -60 deg."""
+    span = (0.0, duration)
+    return Trajectory(
+        UniformTimes(duration, rate),
+        RestToRest(
+            signal=POSITION, span=span, degree=7, start=(0,) * 3, end=(math.pi / 2, math.pi / 4, -math.pi / 3)
+        ),
+        RestToRest(signal=STIFFNESS, span=span, degree=3, start=stiffness, end=end_stiffness or stiffness),
+        name="rest-to-rest",
+    )

@@ -1,0 +1,80 @@
+"""Recorded programs, carried out by NumPy operation by operation: what they mean, apart from any C."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.compute.tracing import Listing, Symbol, Tape, TracedArray, cells_of
+
+Values = list[Any]
+
+MEANING: dict[str, Callable[..., Any]] = {
+    "bits": lambda truth, mask: np.where(truth, np.uint16(mask), np.uint16(0)),
+    "searchsorted": lambda table, values: np.searchsorted(table.values, values, side="right"),
+    "take": lambda table, index: np.asarray(table.values)[index],
+}
+"""Operations that are no function of NumPy with these operands."""
+
+
+def recorded(function: Callable[..., Any], count: int) -> Listing:
+    """What a function of `count` rows of samples does."""
+    tape = Tape()
+    rows = [TracedArray(tape, [symbol]) for symbol in tape.inputs(count)]
+    results = function(*rows)
+    results = results if isinstance(results, tuple | list) else [results]
+    return tape.listing([cell for result in results for cell in cells_of(result).ravel()])
+
+
+def carry_out(listing: Listing, inputs: Sequence[FloatArray]) -> Values:
+    """The outputs for rows of samples; constants among them are as they are."""
+    found: dict[int, Any] = {symbol.index: row for symbol, row in zip(listing.inputs, inputs, strict=True)}
+
+    def value(operand: Any) -> Any:
+        return found[operand.index] if isinstance(operand, Symbol) else operand
+
+    with np.errstate(all="ignore"):
+        for symbol in listing.operations:
+            operands = [value(operand) for operand in symbol.operands]
+            found[symbol.index] = _result(symbol.operation, operands)
+    return [value(output) for output in listing.outputs]
+
+
+def _result(operation: str, operands: Values) -> Any:
+    if operation == "item":
+        results, number = operands
+        return results[number]
+    if operation in {"loop", "branch"}:
+        nested, *given = operands
+        rows = np.broadcast_arrays(*given)
+        one = _repeated if operation == "loop" else _branched
+        samples = [one(nested, [row[k] for row in rows]) for k in range(len(rows[0]))]
+        columns = [np.array(column) for column in zip(*samples, strict=True)]
+        return dict(zip(nested.numbers, columns, strict=True))
+    return MEANING.get(operation, getattr(np, operation, None))(*operands)
+
+
+def _repeated(loop: Any, entries: Values) -> Values:
+    """One sample through a loop."""
+    count = len(loop.body.outputs) - 1
+    state, constants = entries[:count], entries[count:]
+    for _ in range(loop.limit):
+        *state, done = _single(loop.body, [*state, *constants])
+        if done:
+            break
+    return state
+
+
+def _branched(branch: Any, entries: Values) -> Values:
+    """One sample through a branch."""
+    count = len(branch.body.outputs)
+    truth, otherwise, arguments = entries[0], entries[1 : 1 + count], entries[1 + count :]
+    return _single(branch.body, arguments) if truth else otherwise
+
+
+def _single(listing: Listing, entries: Values) -> Values:
+    outputs = carry_out(listing, [np.array([entry]) for entry in entries])
+    return [np.ravel(output)[0] for output in outputs]

@@ -1,0 +1,112 @@
+"""Robots, trajectories and random blocks for the tests of files; nothing here is computed by vsacli."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.motor import Motor
+from vsacli.base.variables import VARIABLES, Block
+from vsacli.documents.source import Source
+from vsacli.results.store.writer import ResultWriter
+from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Robot
+from vsacli.trajectory.curves import WRENCH, Constant
+from vsacli.trajectory.trajectory import WrenchProfile
+
+REPORT = {"format": "vsacli-report/1", "verdict": "ok", "samples": 0, "complete": True, "warnings": ["µ: –"]}
+SOURCE = Source("robots/two.yaml", "0" * 64, "name: two\n# °\n")
+
+PUSH = WrenchProfile(Constant(signal=WRENCH, span=(0.0, 1.0), value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), "base")
+
+
+@dataclass(frozen=True)
+class PlannedTrajectory:
+    """What the writer asks of a trajectory."""
+
+    samples: int
+    name: str = "swing"
+    sources: tuple[Source, ...] = ()
+    wrench: WrenchProfile | None = PUSH
+
+
+def joint(name: str, kind: str, index: int = 0) -> Joint:
+    side = Cubic(k=400.0 + index, k_c=2000.0)
+    return Joint(
+        name=name,
+        type=kind,
+        dh=DenavitHartenberg(a=0.1 * index, alpha=0.5, d=0.2, theta=-0.3),
+        link=Link(
+            mass=1.5 + index, com=(0.1, 0.2, 0.3 + index), inertia=Inertia(xx=0.3, yy=0.2, zz=0.2, xy=0.01)
+        ),
+        damping=0.5,
+        actuator=Antagonistic(
+            motor=(Motor(inertia=3.2, max_torque=90.0), Motor(inertia=3.3 + index)),
+            spring=(side, replace(side, k=440.0)),
+        ),
+        limits=Limits(position=(-1.0, 2.0)),
+    )
+
+
+def robot(kinds: str = "RP") -> Robot:
+    """A robot with one joint a letter, named j0, j1, ..."""
+    types = {"R": "revolute", "P": "prismatic"}
+    joints = tuple(joint(f"j{index}", types[kind], index) for index, kind in enumerate(kinds))
+    return Robot(name="two", joints=joints, sources=(SOURCE,))
+
+
+def random_block(samples: int, joints: int, rate: float = 1000.0) -> Block:
+    """Random values, laid out in memory as the pipeline does; times k/rate."""
+    generator = np.random.default_rng(samples + joints)
+
+    def values(name: str) -> np.ndarray:
+        dims = VARIABLES[name].dims
+        if name == "flags":
+            return generator.integers(0, 1024, (joints, samples)).astype(np.uint16).T
+        length = {"joint": joints, "motor": 2, "wrench_axis": 6}
+        shape = (*(length[dim] for dim in dims), samples)
+        return np.moveaxis(generator.standard_normal(shape), -1, 0)
+
+    time = np.arange(samples) / rate
+    return Block(
+        time=time, **{field.name: values(field.name) for field in fields(Block) if field.name != "time"}
+    )
+
+
+def part(block: Block, start: int, stop: int) -> Block:
+    return Block(**{field.name: getattr(block, field.name)[start:stop] for field in fields(Block)})
+
+
+def write_result(
+    path: Path,
+    block: Block,
+    kinds: str = "RP",
+    *,
+    step: int = 100,
+    planned: int | None = None,
+    **options: object,
+) -> Path:
+    """Store a block in parts of `step` samples; `options` go to the writer."""
+    samples = len(block.time)
+    trajectory = PlannedTrajectory(planned or samples)
+    with ResultWriter(path, robot(kinds), trajectory, **options) as writer:
+        for start in range(0, samples, step):
+            writer.write(part(block, start, start + step))
+        writer.finish({**REPORT, "samples": samples})
+    return path
+
+
+def python(script: str, *arguments: str, folder: Path, **options: Any) -> subprocess.Popen[str]:
+    """Start Python on a script in a folder, with this checkout and the tests importable."""
+    here = Path(__file__).parents[1]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(here.parent), str(here)])}
+    command = [sys.executable, "-W", "error", "-c", script, *arguments]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, cwd=folder, env=environment, **pipes, **options)

@@ -1,0 +1,75 @@
+"""Springs of every law, each with the formula of its torque that the oracle scans."""
+
+from __future__ import annotations
+
+import numpy as np
+from oracles import spring_scan as scan
+
+from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.laws.exponential import Exponential
+from vsacli.actuators.laws.four_bar import FourBar
+from vsacli.actuators.laws.polynomial import Polynomial
+from vsacli.actuators.laws.quadratic import Quadratic
+from vsacli.actuators.laws.sinh import Sinh
+from vsacli.actuators.laws.table import MeasuredSpring
+from vsacli.base.arrays import FloatArray
+from vsacli.documents.source import Source
+from vsacli.documents.table import Table
+
+Spring = tuple[SpringLaw, scan.Curve]
+
+
+def measured(deflection: FloatArray, torque: FloatArray) -> MeasuredSpring:
+    """The spring of a table, as if read from a file."""
+    rows = np.column_stack([deflection, torque])
+    return MeasuredSpring(file=Table(("deflection", "torque"), rows, Source("spring.csv", "", None)))
+
+
+def sampled(curve: scan.Curve, low: float, high: float, rows: int) -> Spring:
+    """A table of exact torques; those of a polynomial up to phi^6 lie in the span of the fit."""
+    deflection = np.linspace(low, high, rows)
+    return measured(deflection, curve.torque(deflection)), scan.Curve(curve.torque, (low, high))
+
+
+SPRINGS: dict[str, tuple[Spring, Spring]] = {
+    "cubic": (
+        (Cubic(k=20, k_c=300), scan.polynomial(20, 300)),
+        (Cubic(k=45, k_c=150), scan.polynomial(45, 150)),
+    ),
+    "polynomial": (
+        (Polynomial(c1=15, c3=100, c5=900), scan.polynomial(15, 100, 900)),
+        (Polynomial(c1=30, c3=1, c9=9000), scan.polynomial(30, 1, 0, 0, 9000)),
+    ),
+    "sinh": (
+        (Sinh(k=1.5, a=8), scan.sinh(1.5, 8)),
+        (Sinh(k=3, a=5), scan.sinh(3, 5)),
+    ),
+    "exponential": (
+        (Exponential(c=0.8, a=6), scan.exponential(0.8, 6)),
+        (Exponential(c=2, a=4), scan.exponential(2, 4)),
+    ),
+    "quadratic": (
+        (Quadratic(k=90), scan.quadratic(90)),
+        (Quadratic(k=40), scan.quadratic(40)),
+    ),
+    "four_bar": (
+        (FourBar(k=40, ratio=2.2), scan.four_bar(40, 2.2)),
+        (FourBar(k=150, ratio=1.6), scan.four_bar(150, 1.6)),
+    ),
+    "table": (
+        sampled(scan.polynomial(18, 200, 500), -0.6, 0.6, 41),
+        sampled(scan.polynomial(30, 50, 900), -0.5, 0.6, 30),
+    ),
+    "table, pulling": (
+        sampled(scan.polynomial(5, 60, 700), 0, 0.7, 30),
+        sampled(scan.polynomial(0, 300, 300), 0, 0.7, 41),
+    ),
+}
+"""Two springs of each law, of constants that differ; torques of some 10 N m at some 0.4 rad."""
+
+
+def on_side_2(spring: Spring) -> Spring:
+    """The spring as it acts on side 2."""
+    law, curve = spring
+    return law.as_second(), scan.turned(curve) if law.pulls_only else curve

@@ -1,0 +1,166 @@
+"""`vsacli check-feasibility` with --suggest, --write-fixed and --near-singular."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from samples.command_line import ROBOT, contents, edited
+
+from vsacli.actuators.reach import NEAR_SINGULAR
+from vsacli.cli.check_feasibility import check_feasibility
+
+
+def test_suggestions_follow_the_report(vsacli, too_soft):
+    plain = vsacli("check-feasibility", ROBOT, too_soft)
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--suggest")
+    assert (done.code, done.err) == (3, "")
+    assert done.out.startswith(plain.out)
+    heading, slow_down, offset, profile = done.out[len(plain.out) :].splitlines()
+    assert (
+        heading
+        == "suggestions, with any one of which every step has a margin of at least 1 % and keeps every limit:"
+    )
+    assert slow_down.startswith(
+        "- no slow-down: even at rest, under gravity alone, base needs at least 808.081 N m"
+    )
+    assert offset.startswith("- raise the stiffness of base by 18.0")
+    assert profile.startswith("- reshape the stiffness of base by up to +18.")
+
+
+def test_json_has_them_under_one_key(vsacli, too_soft):
+    plain = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json").out)
+    report = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json", "--suggest").out)
+    suggestions = report.pop("suggestions")
+    assert report == plain
+    assert suggestions["near_singular"] == NEAR_SINGULAR
+    assert suggestions["slow_down"]["possible"] is False
+    offsets = suggestions["stiffness_offset"]["offsets"]
+    assert offsets.keys() == {"base", "shoulder", "elbow"}
+    # the base carries nothing at the end, where 2K/(1-m) is needed: 800/0.99 - 790, up to the grid of 0.01
+    assert 800 / 0.99 - 790 <= offsets["base"] <= 800 / 0.99 - 790 + 0.02
+    changes = suggestions["stiffness_profile"]["changes"]
+    assert changes.keys() == offsets.keys()
+    assert changes["base"]["largest"] == pytest.approx(offsets["base"], abs=0.05)
+
+
+def test_slow_down_with_its_durations(vsacli, tmp_path, motion):
+    fast = edited(
+        motion, tmp_path / "fast.yaml", ("duration: 4.0", "duration: 0.4"), ("rate: 100 ", "rate: 1000 ")
+    )
+    report = json.loads(vsacli("check-feasibility", ROBOT, fast, "--json", "--suggest").out)
+    found = report["suggestions"]["slow_down"]
+    assert found["duration"] == pytest.approx(0.4 * found["factor"])
+    assert found["text"] == f"slow down by a factor {found['factor']} (0.4 s -> {found['duration']:.10g} s)"
+    slower = edited(fast, tmp_path / "slower.yaml", ("duration: 0.4", f"duration: {found['duration']}"))
+    again = vsacli("check-feasibility", ROBOT, slower, "--suggest")
+    assert again.code == 0
+    assert again.out.endswith(
+        "nothing to change: every step has a margin of at least 1 % and keeps every limit\n"
+    )
+
+
+def test_nothing_needs_to_change(vsacli, motion):
+    report = json.loads(vsacli("check-feasibility", ROBOT, motion, "--json", "--suggest").out)
+    assert report["suggestions"] == {
+        "near_singular": 0.01,
+        "slow_down": None,
+        "stiffness_offset": None,
+        "stiffness_profile": None,
+    }
+
+
+def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml")
+    assert (done.code, done.err) == (3, "wrote fixed.yaml and fixed.csv\n")
+    assert "suggestions, with any one of which" in done.out
+    assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml", "fixed.csv"}
+    run = vsacli("invdyn", ROBOT, "fixed.yaml")
+    assert run.code == 0
+    assert "near_singular" not in run.out
+
+
+def test_recorded_trajectory_is_fixed(vsacli, too_soft):
+    vsacli("invdyn", ROBOT, too_soft, "-o", "soft.h5")
+    vsacli(
+        "export",
+        "soft.h5",
+        "--variables",
+        "q,dq,ddq,d3q,d4q,stiffness,dstiffness,ddstiffness",
+        "-o",
+        "soft.csv",
+    )
+    assert vsacli("check-feasibility", ROBOT, "soft.csv", "--write-fixed", "fixed.yaml").code == 3
+    assert vsacli("check-feasibility", ROBOT, "fixed.yaml").code == 0
+
+
+def test_nothing_is_written_if_nothing_needs_to_change(vsacli, tmp_path, motion):
+    done = vsacli("check-feasibility", ROBOT, motion, "--write-fixed", "fixed.yaml")
+    assert (done.code, done.err) == (0, "fixed.yaml is not written: nothing needs to change\n")
+    assert contents(tmp_path).keys() == {"move.yaml"}
+
+
+def test_nothing_is_written_if_no_profile_helps(vsacli, tmp_path, too_soft):
+    robot = edited(
+        ROBOT,
+        tmp_path / "robot.yaml",
+        ("motor: {inertia: 3.20,", "motor: {max_velocity: 0.1, inertia: 3.20,"),
+    )
+    done = vsacli("check-feasibility", robot, too_soft, "--write-fixed", "fixed.yaml")
+    assert (done.code, done.err) == (3, "fixed.yaml is not written: no stiffness profile mends the task\n")
+    assert contents(tmp_path).keys() == {"robot.yaml", "soft.yaml"}
+
+
+def test_files_that_exist_are_kept(vsacli, tmp_path, too_soft):
+    (tmp_path / "fixed.csv").write_text("mine")
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml")
+    assert (done.code, done.out) == (4, "")
+    assert done.err.startswith("fixed.csv: exists already")
+    assert (
+        vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml", "--overwrite").code == 3
+    )
+    assert (tmp_path / "fixed.csv").read_text().startswith("time,base.stiffness,")
+
+
+def test_inputs_are_never_overwritten(vsacli, too_soft):
+    before = too_soft.read_text()
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", too_soft, "--overwrite")
+    assert done.code == 2
+    assert "soft.yaml: is read by this command" in done.err
+    assert too_soft.read_text() == before
+
+
+@pytest.mark.parametrize("margin", ["0", "-0.1", "1e-9", "1", "2", "nan"])
+def test_margins_out_of_range_are_refused(vsacli, motion, margin):
+    done = vsacli("check-feasibility", ROBOT, motion, "--near-singular", margin)
+    assert (done.code, done.out) == (2, "")
+    assert (
+        done.err
+        == f"the near-singular margin must lie between 1e-09 and 1, as 0.01 does, not {float(margin):g}\n"
+    )
+
+
+def test_margin_decides_which_steps_are_near_singular(vsacli, motion):
+    def near_singular(*options):
+        report = json.loads(vsacli("check-feasibility", ROBOT, motion, "--json", *options).out)
+        return sum(joint["steps"]["near_singular"] for joint in report["joints"]), report["verdict"]
+
+    assert near_singular() == near_singular("--near-singular", "0.01") == (0, "ok")
+    steps, verdict = near_singular("--near-singular", "0.1")
+    assert steps > 0
+    assert verdict == "ok"
+
+
+def test_suggestions_keep_the_margin_that_is_asked_for(vsacli, motion):
+    done = vsacli("check-feasibility", ROBOT, motion, "--near-singular", "0.1", "--write-fixed", "fixed.yaml")
+    assert "a margin of at least 10 %" in done.out
+    again = vsacli("check-feasibility", ROBOT, "fixed.yaml", "--near-singular", "0.1", "--suggest")
+    assert (again.code, again.out.splitlines()[-1]) == (
+        0,
+        "nothing to change: every step has a margin of at least 10 % and keeps every limit",
+    )
+
+
+def test_help_names_the_default_margin():
+    (option,) = [each for each in check_feasibility.params if each.name == "near_singular"]
+    assert option.help.endswith(f"by default {NEAR_SINGULAR}.")

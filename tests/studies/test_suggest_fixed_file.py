@@ -1,0 +1,117 @@
+"""The suggested profile as a trajectory file."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from samples.remedies import pushed, rest_to_rest
+from samples.robots import vsa_3r
+
+from vsacli import load_trajectory
+from vsacli.analysis.run import inverse_dynamics
+from vsacli.base.errors import InputError, StorageError
+from vsacli.studies.remedies import StiffnessProfile, check_fixed_target, suggest, write_fixed
+from vsacli.studies.remedies.restiffened import restiffened
+from vsacli.trajectory.curves import POSITION, WRENCH, Constant, RestToRest
+from vsacli.trajectory.curves.piecewise import stepwise
+from vsacli.trajectory.curves.via_points import ViaPoints
+from vsacli.trajectory.trajectory import Trajectory, WrenchProfile
+
+
+def still_and_soft():
+    trajectory = rest_to_rest(1.0, 790.0, end=(0.0, 0.0, 0.0), rate=200)
+    position = Constant(signal=POSITION, span=trajectory.times.span, value=(0.1, 1e-5, -2.0))
+    return Trajectory(trajectory.times, position, trajectory.stiffness, name="still: & 'soft'")
+
+
+def samples_of(trajectory, *given):
+    motion = trajectory.block(0, trajectory.samples)
+    columns = {name: getattr(motion, name) for name in given}
+    if motion.wrench is not None:
+        columns |= {"wrench": motion.wrench.wrench, "wrench_frame": motion.wrench.frame}
+    return Trajectory.from_samples(motion.time + 3.0, motion.q, motion.stiffness, **columns)
+
+
+def through_points(trajectory):
+    """The motion through a point, with a wrench in steps: formulas that the file does not declare."""
+    span, nothing = trajectory.times.span, (0.0,) * 6
+    points = ((0.0, 0.0, 0.0), (0.1, 0.1, -0.1), (0.1, 0.3, 0.2))
+    position = ViaPoints(signal=POSITION, span=span, degree=9, shares=(0.0, 0.6, 1.0), points=points)
+    push = stepwise(WRENCH, span, 5, [nothing, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)], [(0.1, 0.4)])
+    return Trajectory(
+        trajectory.times, position, trajectory.stiffness, wrench=WrenchProfile(push, "base"), name="via"
+    )
+
+
+SOFT = rest_to_rest(0.5, rate=200)
+TASKS = {
+    "polynomial": SOFT,
+    "constant": still_and_soft(),
+    "recorded": samples_of(SOFT),
+    "recorded with derivatives": samples_of(SOFT, "dq", "ddq", "d3q", "d4q"),
+    "via points and steps": through_points(SOFT),
+    "pushed": pushed(SOFT),
+    "pushed and recorded": samples_of(pushed(SOFT, "end_effector")),
+}
+
+
+def fixed(trajectory):
+    found = suggest(vsa_3r(), trajectory).stiffness_profile
+    assert isinstance(found, StiffnessProfile)
+    return found.trajectory
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
+    robot, trajectory = vsa_3r(), fixed(TASKS[task])
+    written = write_fixed(trajectory, robot.joint_names, tmp_path / "fixed.yaml")
+    assert written == (tmp_path / "fixed.yaml", tmp_path / "fixed.csv")
+    assert sorted(tmp_path.iterdir()) == sorted(written)
+    again = load_trajectory(written[0], robot)
+    assert (again.name, again.warnings) == (trajectory.name, ())
+    before, after = (each.block(0, each.samples) for each in (trajectory, again))
+    assert after.variables().keys() == before.variables().keys()
+    for name, array in after.variables().items():
+        np.testing.assert_array_equal(array, before.variables()[name])
+    report = inverse_dynamics(robot, again).report
+    assert report.verdict == "ok"
+    assert all(joint.steps["near_singular"] == 0 for joint in report.joints)
+
+
+@pytest.mark.parametrize(("task", "kind"), [("polynomial", RestToRest), ("constant", Constant)])
+def test_position_stays_a_formula(tmp_path, task, kind):
+    robot = vsa_3r()
+    path, table = write_fixed(fixed(TASKS[task]), robot.joint_names, tmp_path / "fixed.yml")
+    assert load_trajectory(path, robot).position == TASKS[task].position
+    assert isinstance(TASKS[task].position, kind)
+    assert ".q" not in table.read_text().splitlines()[0]
+
+
+def test_many_steps_are_written_block_by_block(tmp_path):
+    robot, trajectory = vsa_3r(), restiffened(rest_to_rest(4.0, rate=5000), {1: np.ones((3, 20_001))})
+    path, _ = write_fixed(trajectory, robot.joint_names, tmp_path / "long.yaml")
+    again = load_trajectory(path, robot)
+    assert again.samples == 20_001
+    np.testing.assert_array_equal(again.block(0, 20_001).stiffness, [[850.0, 851.0, 850.0]] * 20_001)
+
+
+@pytest.mark.parametrize("existing", ["fixed.yaml", "fixed.csv"])
+def test_neither_file_is_replaced_unless_asked(tmp_path, existing):
+    (tmp_path / existing).write_text("mine")
+    robot, trajectory = vsa_3r(), restiffened(SOFT, {})
+    for act in (
+        lambda: check_fixed_target(tmp_path / "fixed.yaml", overwrite=False),
+        lambda: write_fixed(trajectory, robot.joint_names, tmp_path / "fixed.yaml"),
+    ):
+        with pytest.raises(StorageError, match=rf"{existing}: exists already; .*--overwrite"):
+            act()
+    assert [path.name for path in tmp_path.iterdir()] == [existing]
+    assert (tmp_path / existing).read_text() == "mine"
+    write_fixed(trajectory, robot.joint_names, tmp_path / "fixed.yaml", overwrite=True)
+    assert load_trajectory(tmp_path / "fixed.yaml", robot).samples == SOFT.samples
+
+
+@pytest.mark.parametrize("name", ["fixed", "fixed.csv", "fixed.h5"])
+def test_name_must_be_that_of_a_yaml_file(tmp_path, name):
+    with pytest.raises(InputError, match=rf"{name}: .*give a name that ends in \.yaml"):
+        check_fixed_target(tmp_path / name, overwrite=True)

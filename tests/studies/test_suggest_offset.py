@@ -1,0 +1,228 @@
+"""The smallest constant change of a joint's stiffness."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from samples.remedies import (
+    BASE,
+    CUBIC,
+    K_C,
+    SHOULDER,
+    K,
+    accepted,
+    changed,
+    lowest_stiffness,
+    pendulum,
+    rest_to_rest,
+)
+from samples.robots import vsa_3r
+
+from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.laws.exponential import Exponential
+from vsacli.actuators.laws.sinh import Sinh
+from vsacli.actuators.motor import Motor
+from vsacli.analysis.run import Run
+from vsacli.robot.model import Limits
+from vsacli.studies.remedies import suggest
+from vsacli.studies.remedies.acceptance import Acceptance
+from vsacli.studies.remedies.impossible import ImpossibleError
+from vsacli.studies.remedies.load import joint_loads
+from vsacli.studies.remedies.offset import smallest_offset
+from vsacli.studies.remedies.outcome import NotPossible, StiffnessOffset
+from vsacli.trajectory.trajectory import Trajectory
+
+MARGIN = 0.01
+GIVEN = ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")
+UNIT = 0.01
+"""Spacing of the grid for a stiffness of 100 to 1000 N m/rad."""
+
+
+def offsets(robot, trajectory):
+    found = suggest(robot, trajectory, MARGIN).stiffness_offset
+    assert isinstance(found, StiffnessOffset)
+    return {offset.joint: offset.value for offset in found.offsets}
+
+
+def reason(robot, trajectory):
+    found = suggest(robot, trajectory, MARGIN).stiffness_offset
+    assert isinstance(found, NotPossible)
+    (only,) = found.reasons
+    return only
+
+
+def peak_load(robot, trajectory):
+    (block,) = Run(robot, trajectory)
+    return np.abs(block.tau_e).max(axis=0)
+
+
+@pytest.mark.parametrize(("duration", "stiffness"), [(4.0, 790.0), (0.5, 850.0), (0.3, 850.0)])
+def test_offset_reaches_the_closed_bound(duration, stiffness):
+    robot, trajectory = vsa_3r(), rest_to_rest(duration, stiffness, rate=800 / duration)
+    needed = lowest_stiffness(peak_load(robot, trajectory)) / (1 - MARGIN) - stiffness
+    found = np.array(list(offsets(robot, trajectory).values()))
+    np.testing.assert_array_less(-1e-9, found - np.maximum(needed, 0))  # rounding of the two bounds
+    np.testing.assert_array_less(found - np.maximum(needed, 0), UNIT + 1e-9)
+    assert (found > 0).tolist() == (needed > 0).tolist()
+
+
+def test_only_the_joint_in_trouble_is_changed():
+    found = offsets(vsa_3r(), rest_to_rest(4.0, (850.0, 820.0, 850.0)))
+    assert found["shoulder"] > 0
+    assert found["base"] == found["elbow"] == 0
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "limits", "expected"),
+    [(950.0, (0.0, 900.0), -50.0), (850.0, (871.25, 2000.0), 21.25), (850.0, (900.0, 900.0), 50.0)],
+)
+def test_stiffness_limit_is_met_exactly(stiffness, limits, expected):
+    robot = changed(SHOULDER, limits=Limits(stiffness=limits))
+    assert offsets(robot, rest_to_rest(4.0, (850.0, stiffness, 850.0)))["shoulder"] == expected
+
+
+def test_deflection_limit_lowers_the_stiffness_to_its_closed_bound():
+    limit = 0.1
+    robot = changed(0, robot=pendulum(), spring=(dataclasses.replace(CUBIC, max_deflection=limit),) * 2)
+    still = rest_to_rest(1.0, 950.0, start=(0.0,), end=(0.0,))
+    # phi_1 is at its limit and carries tau_1; the other spring carries the rest of the load of 24.525 N m.
+    rest = 5.0 * 9.81 * 0.5 - (K * limit + K_C * limit**3)
+    (phi_2,) = [root.real for root in np.roots([K_C, 0, K, -rest]) if abs(root.imag) < 1e-12]
+    ceiling = 2 * K + 3 * K_C * (limit**2 + phi_2**2)
+    assert offsets(robot, still)["swing"] == pytest.approx(ceiling - 950.0, abs=UNIT)
+
+
+@pytest.mark.parametrize(
+    ("motor", "duration"),
+    [({"max_torque": 60.0}, 1.0), ({"max_torque": 20.0}, 4.0), ({"max_torque": 180.0}, 0.55)],
+)
+def test_motor_limit_takes_the_way_that_is_shorter(motor, duration):
+    robot, trajectory = changed(BASE, motor=motor), rest_to_rest(duration)
+    found = offsets(robot, trajectory)["base"]
+
+    def with_offset(value):
+        return accepted(robot, rest_to_rest(duration, (850.0 + value, 900.0, 900.0)), MARGIN)
+
+    assert found != 0
+    assert with_offset(found)
+    assert not with_offset(found - math.copysign(UNIT, found))
+    nearer = np.linspace(-abs(found), abs(found), 101)[1:-1]
+    assert not any(with_offset(value) for value in nearer.tolist())
+
+
+def test_steps_between_the_watched_ones_count():
+    """Motor torque peaks where a given ddstiffness does, for one step of 8001."""
+    motion = rest_to_rest(4.0, rate=2000).block(0, 8001)
+    columns = {name: getattr(motion, name).copy() for name in GIVEN}
+    columns["ddstiffness"][4003, BASE] = 40_000.0
+    trajectory = Trajectory.from_samples(motion.time, motion.q, motion.stiffness, **columns)
+    robot = changed(BASE, motor={"max_torque": 100.0})
+    found = offsets(robot, trajectory)["base"]
+    stiffer = Trajectory.from_samples(
+        motion.time, motion.q, motion.stiffness + np.array([found, 0, 0]), **columns
+    )
+    assert accepted(robot, stiffer, MARGIN)
+    assert not accepted(robot, trajectory, MARGIN)
+
+
+@pytest.mark.parametrize(
+    "spring",
+    [
+        (CUBIC, dataclasses.replace(CUBIC, k=380.0, k_c=2500.0)),
+        (Sinh(k=80, a=5), Sinh(k=70, a=5.5)),
+        (Exponential(c=80, a=5), Exponential(c=80, a=5)),
+    ],
+    ids=["cubics", "sinh", "tendons"],
+)
+def test_other_springs(spring):
+    robot = changed(SHOULDER, spring=spring)
+    found = offsets(robot, rest_to_rest(0.4))
+    for step, expected in ((0.0, True), (-UNIT, False)):
+        values = 850.0 + found["base"], 850.0 + found["shoulder"] + step, 850.0
+        assert accepted(robot, rest_to_rest(0.4, values), MARGIN) is expected
+
+
+def test_prismatic_joint_has_its_unit():
+    found = suggest(pendulum(letter="P"), rest_to_rest(1.0, 800.0, start=(0.0,), end=(0.3,)))
+    assert found.stiffness_offset.sentence.startswith("raise the stiffness of lift by ")
+    assert found.stiffness_offset.sentence.endswith(" N/m")
+
+
+def test_raised_and_lowered_joints_in_one_sentence():
+    robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 900.0)))
+    found = suggest(robot, rest_to_rest(4.0, (800.0, 950.0, 800.0)))
+    assert found.stiffness_offset.sentence == (
+        "raise the stiffness of base by 8.1 N m/rad, elbow by 9.16 N m/rad "
+        "and lower the stiffness of shoulder by 50 N m/rad"
+    )
+
+
+def test_corridor_and_stiffness_limit_exclude_each_other():
+    robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 820.0)))
+    assert reason(robot, rest_to_rest(4.0, (850.0, 790.0, 850.0))) == (
+        "none takes shoulder from 790 to at least 828.005 N m/rad at t = 0.930 s "
+        "and from 790 to at most 820 N m/rad at t = 0.000 s"
+    )
+
+
+@pytest.mark.parametrize(
+    ("limits", "expected"),
+    [
+        (
+            Limits(position=(-1.0, 1.0)),
+            "the position of base, 1.5708 rad at t = 1.000 s, is above its limit 1",
+        ),
+        (
+            Limits(velocity=(-9.0, 3.0)),
+            "the velocity of base, 3.43612 rad/s at t = 0.500 s, is above its limit 3",
+        ),
+    ],
+    ids=["position", "velocity"],
+)
+def test_limits_of_the_motion_are_none_of_the_stiffness(limits, expected):
+    robot = changed(BASE, limits=limits)
+    assert reason(robot, rest_to_rest(1.0)) == f"no stiffness changes that {expected}"
+
+
+def test_motor_velocity_that_no_stiffness_brings_down():
+    robot = changed(BASE, motor={"max_velocity": 1.0})
+    assert reason(robot, rest_to_rest(1.0)).startswith(
+        "none keeps every limit of base; as it is, the joint-side velocity of motor 1 of base, 3.2972 rad/s"
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class ShortCubic(Cubic):
+    """The spring of Table I, known up to 0.2 rad only."""
+
+    @property
+    def domain(self):
+        return (-0.2, 0.2)
+
+    @property
+    def torque_range(self):
+        return (-96.0, 96.0)  # K 0.2 + Kc 0.2^3
+
+    def closed_pair(self, other):  # noqa: ARG002
+        return None
+
+
+def test_upper_end_of_the_corridor_has_its_margin_too():
+    robot = dataclasses.replace(pendulum(ShortCubic(k=K, k_c=K_C)), gravity=(0.0, 0.0, 0.0))
+    still = rest_to_rest(1.0, 1300.0, start=(0.0,), end=(0.0,))
+    highest = 2 * (K + 3 * K_C * 0.2**2)  # both springs at the end of their domain
+    found = offsets(robot, still)["swing"]
+    assert found == pytest.approx(highest / (1 + MARGIN) - 1300.0, abs=0.1)  # the grid beyond 1000 N m/rad
+    assert accepted(robot, rest_to_rest(1.0, 1300.0 + found, start=(0.0,), end=(0.0,)), MARGIN)
+
+
+def test_elastic_actuator_has_no_stiffness_to_choose():
+    joint = vsa_3r().joints[BASE]
+    elastic = dataclasses.replace(joint, actuator=Elastic(motor=Motor(inertia=1.0), stiffness=850.0))
+    (load,) = joint_loads(vsa_3r(), rest_to_rest(1.0, rate=10), [BASE])
+    with pytest.raises(ImpossibleError, match=r"^the actuator of base has no stiffness to choose$"):
+        smallest_offset(Acceptance(vsa_3r(), MARGIN), elastic, load)

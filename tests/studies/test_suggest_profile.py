@@ -1,0 +1,204 @@
+"""The nearest smooth stiffness profile."""
+
+from __future__ import annotations
+
+import dataclasses
+from itertools import product
+
+import numpy as np
+import pytest
+from samples.remedies import (
+    BASE,
+    CUBIC,
+    SHOULDER,
+    accepted,
+    changed,
+    lowest_stiffness,
+    pendulum,
+    rest_to_rest,
+)
+from samples.robots import vsa_3r
+
+from vsacli.actuators.laws.sinh import Sinh
+from vsacli.analysis.run import Run
+from vsacli.dynamics.link_torques import link_torques
+from vsacli.robot.model import Limits
+from vsacli.studies.remedies import StiffnessProfile, suggest
+from vsacli.studies.remedies.nearest import Bounds, NoSplineError, nearest_spline
+from vsacli.studies.remedies.outcome import NotPossible
+
+MARGIN = 0.01
+
+
+def profile(robot, trajectory):
+    found = suggest(robot, trajectory, MARGIN).stiffness_profile
+    assert isinstance(found, StiffnessProfile)
+    return found
+
+
+def reason(robot, trajectory):
+    found = suggest(robot, trajectory, MARGIN).stiffness_profile
+    assert isinstance(found, NotPossible)
+    (only,) = found.reasons
+    return only
+
+
+def stiffness_needed(robot, motion):
+    tau_e, _, _ = link_torques(robot, motion.q, motion.dq, motion.ddq, motion.d3q, motion.d4q)
+    return lowest_stiffness(tau_e) / (1 - MARGIN)
+
+
+def change(found, trajectory):
+    steps = trajectory.samples
+    return found.trajectory.block(0, steps).stiffness - trajectory.block(0, steps).stiffness
+
+
+def bump(time, height, at, width):
+    return height * (2 * np.exp(-(((time - at) / width) ** 2)) - 1)
+
+
+def test_spline_through_one_point_is_the_green_function():
+    """Least integral of x^2 + T^4 x''^2 with x(0) = 1: x = e^-s (cos s + sin s), s = |t|/(sqrt(2) T)."""
+    smoothing = 0.1
+    time = np.linspace(-3, 3, 6001)
+    low = np.where(time == 0, 1.0, -10.0)
+    spline = nearest_spline(Bounds(time, low, np.full_like(time, np.inf)), smoothing)
+    s = np.abs(time) / np.sqrt(2) / smoothing
+    # The third derivative jumps at 0, where a knot need not be; pieces of T/3 leave (1/3)^3/6 of it, shared.
+    np.testing.assert_allclose(spline(time), np.exp(-s) * (np.cos(s) + np.sin(s)), atol=2e-3)
+
+
+def test_no_other_function_between_the_bounds_is_smaller():
+    smoothing, centre = 0.15, 1.5
+    time = np.linspace(0, 4, 1601)
+    bounds = Bounds(time, bump(time, 30.0, centre, 0.4), np.full_like(time, np.inf))
+
+    def size(values, bend):
+        return np.trapezoid(values**2 + smoothing**4 * bend**2, time)
+
+    spline = nearest_spline(bounds, smoothing)
+    least = size(spline(time), spline(time, nu=2))
+    others = []
+    for height, width in product(np.linspace(30, 40, 11), np.linspace(0.2, 0.6, 41)):
+        u = (time - centre) / width
+        bell = height * np.exp(-u * u)
+        if bounds.missed_by(bell).max() <= 0:
+            others.append(size(bell, bell * (4 * u * u - 2) / width**2))
+    assert least < min(others) < 1.2 * least  # a bell is not far from the best
+
+
+@pytest.mark.parametrize("smoothing", [0.02, 0.1, 0.5])
+@pytest.mark.parametrize("half_width", [0.5, 3.0, np.inf])
+def test_spline_stays_between_bounds(smoothing, half_width):
+    time = np.linspace(0, 4, 4001)
+    middle = 30 * np.sin(2 * time)
+    bounds = Bounds(time, middle - min(half_width, 5.0), middle + half_width)
+    spline = nearest_spline(bounds, smoothing)
+    assert bounds.missed_by(spline(time)).max() < 1e-5  # 1e-7 of the largest miss, 35
+
+
+def test_spline_vanishes_far_from_where_it_is_needed():
+    time = np.linspace(0, 100, 20_001)
+    spline = nearest_spline(Bounds(time, bump(time, 10.0, 40.0, 0.5), np.full_like(time, np.inf)), 0.1)
+    x = spline(time)
+    assert x.max() >= 10 - 1e-5
+    np.testing.assert_array_equal(x[np.abs(time - 40) > 2.5], 0.0)
+
+
+def test_bounds_too_fast_for_any_spline_are_refused():
+    time = np.linspace(0, 4, 4001)
+    middle = np.where(np.arange(4001) % 2, 1.0, -1.0)
+    with pytest.raises(NoSplineError):
+        nearest_spline(Bounds(time, middle - 0.1, middle + 0.1), 0.1)
+
+
+@pytest.mark.parametrize(("duration", "stiffness"), [(4.0, 790.0), (4.0, 820.0), (0.5, 850.0), (0.3, 850.0)])
+def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, stiffness):
+    robot, trajectory = vsa_3r(), rest_to_rest(duration, stiffness, rate=800 / duration)
+    suggestions = suggest(robot, trajectory, MARGIN)
+    found = suggestions.stiffness_profile
+    assert accepted(robot, found.trajectory, MARGIN)
+    constants = {each.joint: each.value for each in suggestions.stiffness_offset.offsets}
+    for joint in found.changes:
+        assert 0 < joint.rms <= constants[joint.joint]
+    moved = change(found, trajectory)
+    motion = trajectory.block(0, trajectory.samples)
+    least = np.maximum(stiffness_needed(robot, motion) - motion.stiffness, 0)
+    # where nothing is needed nothing is gained, and the excess is small: a few percent of the largest change
+    assert np.mean(moved - least) < 0.15 * moved.max()
+    assert moved.min() > -0.1 * moved.max()
+
+
+def test_joints_that_are_fine_are_left_alone():
+    trajectory = rest_to_rest(4.0, (850.0, 820.0, 850.0))
+    found = profile(vsa_3r(), trajectory)
+    assert [joint.joint for joint in found.changes] == ["shoulder"]
+    np.testing.assert_array_equal(change(found, trajectory)[:, [0, 2]], 0.0)
+
+
+def test_profile_and_its_derivatives_belong_together():
+    trajectory = rest_to_rest(0.5)
+    motion = profile(vsa_3r(), trajectory).trajectory.block(0, trajectory.samples)
+    step = 1e-3
+    for values, rates in (("stiffness", "dstiffness"), ("dstiffness", "ddstiffness")):
+        value, rate = getattr(motion, values), getattr(motion, rates)
+        difference = (value[2:] - value[:-2]) / (2 * step)
+        # second order in the step over pieces of 0.02 s, at whose ends the third derivative jumps
+        np.testing.assert_allclose(difference, rate[1:-1], atol=0.03 * np.abs(rate).max())
+
+
+def test_profile_holds_between_the_steps():
+    robot, trajectory = vsa_3r(), rest_to_rest(0.5, rate=100)
+    fixed = profile(robot, trajectory).trajectory
+    motion = fixed.at(np.linspace(0, 0.5, 101))  # steps and the instants half-way
+    gap = motion.stiffness - stiffness_needed(robot, motion)
+    # half-way the file is read as a spline through its steps, off by step^4/384 of the fourth derivative
+    assert gap.min() > -0.02
+
+
+def test_motor_limit_asks_for_a_smoother_or_wider_profile():
+    trajectory = rest_to_rest(0.5)
+    free = profile(vsa_3r(), trajectory)
+    (block,) = Run(vsa_3r(), free.trajectory)
+    peak = float(np.abs(block.tau_motor[:, BASE]).max())
+    robot = changed(BASE, motor={"max_torque": 0.8 * peak})
+    found = profile(robot, trajectory)
+    assert accepted(robot, found.trajectory, MARGIN)
+    assert found.changes[0].rms > free.changes[0].rms
+
+
+def test_springs_that_differ_on_a_prismatic_joint():
+    robot = changed(0, robot=pendulum(letter="P"), spring=(CUBIC, Sinh(k=80, a=5)))
+    found = profile(robot, rest_to_rest(0.2, 850.0, start=(0.0,), end=(0.3,)))
+    assert accepted(robot, found.trajectory, MARGIN)
+    assert found.sentence.startswith("reshape the stiffness of lift by up to +")
+    assert " N/m (at t = " in found.sentence
+
+
+def test_deflection_limit_bounds_the_profile_from_above():
+    robot = changed(SHOULDER, spring=(dataclasses.replace(CUBIC, max_deflection=0.08),) * 2)
+    found = profile(robot, rest_to_rest(4.0, (850.0, 900.0, 850.0)))
+    assert accepted(robot, found.trajectory, MARGIN)
+    assert found.changes[0].largest < 0
+
+
+def test_stiffness_limit_below_what_the_load_needs():
+    robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 820.0)))
+    assert reason(robot, rest_to_rest(4.0, (850.0, 810.0, 850.0))) == (
+        "shoulder needs at least 828.005 N m/rad at t = 0.930 s, "
+        "but its limits of stiffness and deflection allow at most 820"
+    )
+
+
+def test_limits_of_the_motion_are_none_of_the_stiffness():
+    robot = changed(BASE, limits=Limits(position=(-1.0, 1.0)))
+    assert reason(robot, rest_to_rest(1.0)).startswith(
+        "no stiffness changes that the position of base, 1.5708 rad"
+    )
+
+
+def test_motor_limit_that_no_profile_keeps():
+    robot = changed(BASE, motor={"max_velocity": 1.0})
+    assert reason(robot, rest_to_rest(1.0)).startswith(
+        "none that was tried keeps every limit of base; with the nearest, the joint-side velocity of motor 1"
+    )

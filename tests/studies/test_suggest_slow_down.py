@@ -1,0 +1,171 @@
+"""The smallest uniform slow-down."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from samples.remedies import (
+    BASE,
+    CUBIC,
+    K,
+    accepted,
+    changed,
+    lowest_stiffness,
+    pendulum,
+    pushed,
+    rest_to_rest,
+    smallest_margin,
+)
+from samples.robots import vsa_3r
+
+from vsacli.actuators.laws.sinh import Sinh
+from vsacli.robot.model import Limits
+from vsacli.studies.remedies.acceptance import Acceptance
+from vsacli.studies.remedies.impossible import ImpossibleError
+from vsacli.studies.remedies.slow_down import GRID, smallest_slow_down
+from vsacli.trajectory.trajectory import Trajectory
+
+STEP = 1 / GRID
+
+
+def slow_down(robot, trajectory, near_singular=0.01):
+    return smallest_slow_down(Acceptance(robot, near_singular), trajectory)
+
+
+def check_smallest(robot, trajectory, factor, near_singular=0.01):
+    """Accepted on all steps, and the next smaller factor is not."""
+    assert accepted(robot, trajectory.stretched(factor), near_singular)
+    assert not accepted(robot, trajectory.stretched(factor - STEP), near_singular)
+
+
+def test_fast_motion_of_the_paper_ends_at_its_threshold_duration():
+    # The closed bound gives 0.53557 s, to five digits; a margin of 1e-6 moves it by less than that.
+    factor = slow_down(vsa_3r(), rest_to_rest(0.5), near_singular=1e-6)
+    assert 0.5 * factor == pytest.approx(0.53557, abs=0.5 * STEP + 1e-5)
+
+
+@pytest.mark.parametrize("duration", [0.5, 0.4])
+def test_slow_down_agrees_with_a_dense_scan(duration):
+    robot = vsa_3r()
+    factors = np.arange(1.0, 0.6 / duration, 0.002)
+    margins = [smallest_margin(robot, rest_to_rest(f * duration, rate=500 / f)) for f in factors.tolist()]
+    dense = factors[np.argmax(np.array(margins) >= 0.01)]
+    factor = slow_down(robot, rest_to_rest(duration))
+    assert factor == pytest.approx(dense, rel=0.003)  # 1 % is asked for; the scan is this dense
+    check_smallest(robot, rest_to_rest(duration), factor)
+
+
+def test_velocity_limit_gives_the_ratio_of_the_velocities():
+    limit = 2.0
+    robot = changed(BASE, limits=Limits(velocity=(-limit, limit)))
+    peak = math.pi / 2 * math.factorial(7) / math.factorial(3) ** 2 / 4**3  # of the degree 7, in 1 s
+    factor = slow_down(robot, rest_to_rest(1.0))
+    assert factor == pytest.approx(peak / limit, abs=1.01 * STEP)
+    assert factor >= peak / limit * (1 - 1e-6)  # a step may miss the very peak
+
+
+@pytest.mark.parametrize("motor", [{"max_torque": 60.0}, {"max_velocity": 1.0}], ids=str)
+def test_motor_limits_are_kept(motor):
+    robot = changed(BASE, motor=motor)
+    factor = slow_down(robot, rest_to_rest(1.0))
+    check_smallest(robot, rest_to_rest(1.0), factor)
+
+
+def test_springs_that_differ_and_prismatic_joints():
+    springs = dataclasses.replace(CUBIC, k=380.0), Sinh(k=80, a=5)
+    robot = changed(0, robot=pendulum(letter="P"), spring=springs)
+    trajectory = rest_to_rest(0.2, 850.0, start=(0.0,), end=(0.3,))
+    check_smallest(robot, trajectory, slow_down(robot, trajectory))
+
+
+def test_gravity_alone_is_too_much():
+    robot, trajectory = vsa_3r(), rest_to_rest(1.0, (900.0, 810.0, 900.0))
+    needed = lowest_stiffness(np.array([32.45]))[0] / 0.99  # largest static load, to four digits
+    assert 810 < needed < 830
+    with pytest.raises(
+        ImpossibleError,
+        match=r"even at rest, under gravity alone, shoulder needs at least 82\d\.\d+ N m/rad "
+        r"at t = 0\.\d{3} s and is asked for 810$",
+    ):
+        slow_down(robot, trajectory)
+
+
+def test_below_2k_nothing_helps_without_gravity_either():
+    with pytest.raises(ImpossibleError, match=f"lift needs at least {2 * K / 0.99:.6g} N/m at t = 0.000 s"):
+        slow_down(
+            dataclasses.replace(pendulum(letter="P"), gravity=(0.0, 0.0, 0.0)),
+            rest_to_rest(1.0, 790.0, start=(0.0,), end=(0.3,)),
+        )
+
+
+def test_position_limit_is_the_same_at_any_speed():
+    robot = changed(BASE, limits=Limits(position=(-1.0, 1.0)))
+    with pytest.raises(
+        ImpossibleError, match=r"the position of base, 1\.5708 rad at .* is above its limit 1$"
+    ):
+        slow_down(robot, rest_to_rest(1.0))
+
+
+def test_motion_that_passes_the_horizontal_while_braking_must_be_neither_fast_nor_slow():
+    robot, stiffness = pendulum(), 817.0
+    # Upward through the horizontal (0) in the second half of the way: there braking carries part of the load.
+    trajectory = rest_to_rest(0.5, stiffness, start=(-2.5,), end=(1.2,))
+    assert lowest_stiffness(np.array([5.0 * 9.81 * 0.5]))[0] / 0.99 > stiffness  # horizontal, at rest
+    factor = slow_down(robot, trajectory)
+    check_smallest(robot, trajectory, factor)
+    assert not accepted(robot, trajectory.stretched(3 * factor))
+
+
+def test_steps_between_the_watched_ones_count():
+    """A dip of the stiffness three steps wide, in 20 001 steps of which a thousand are watched at first."""
+    duration, at = 0.5, 8123
+    smooth = rest_to_rest(duration, 880.0, rate=40_000)
+    motion = smooth.block(0, smooth.samples)
+    dip = np.zeros_like(motion.stiffness)
+    dip[at - 1 : at + 2, BASE] = -60.0
+    trajectory = Trajectory.from_samples(
+        motion.time,
+        motion.q,
+        motion.stiffness + dip,
+        **{name: getattr(motion, name) for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")},
+    )
+    robot = vsa_3r()
+    assert slow_down(robot, smooth) < slow_down(robot, trajectory)
+    check_smallest(robot, trajectory, slow_down(robot, trajectory))
+
+
+def test_recorded_steps_are_stretched():
+    motion = rest_to_rest(0.5, rate=400).block(0, 201)
+    trajectory = Trajectory.from_samples(motion.time + 2.0, motion.q, motion.stiffness)
+    factor = slow_down(vsa_3r(), trajectory)
+    slower = trajectory.stretched(factor)
+    assert slower.times.span == (2.0, pytest.approx(2.0 + 0.5 * factor))
+    check_smallest(vsa_3r(), trajectory, factor)
+    # interpolation between 201 samples moves the accelerations by less than a thousandth
+    assert factor == pytest.approx(slow_down(vsa_3r(), rest_to_rest(0.5)), rel=1e-3)
+
+
+def test_wrench_counts_and_is_stretched_too():
+    free, loaded = rest_to_rest(0.5, 870.0), pushed(rest_to_rest(0.5, 870.0))
+    factor = slow_down(vsa_3r(), loaded)
+    assert factor != slow_down(vsa_3r(), free)
+    check_smallest(vsa_3r(), loaded, factor)
+
+
+def test_wrench_between_the_watched_steps_counts():
+    """A push one step long, in 8001 steps of which a thousand are watched at first."""
+    motion = rest_to_rest(0.5, 870.0, rate=16_000).block(0, 8001)
+    columns = {
+        name: getattr(motion, name) for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")
+    }
+    wrench, none = np.zeros((8001, 6)), np.zeros((8001, 6))
+    wrench[2203, 3:] = -20.0
+    trajectory = Trajectory.from_samples(
+        motion.time, motion.q, motion.stiffness, **columns, wrench=wrench, dwrench=none, ddwrench=none
+    )
+    factor = slow_down(vsa_3r(), trajectory)
+    assert factor > slow_down(vsa_3r(), rest_to_rest(0.5, 870.0, rate=16_000))
+    check_smallest(vsa_3r(), trajectory, factor)

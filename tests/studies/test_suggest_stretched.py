@@ -1,0 +1,76 @@
+"""Trajectories made slower by a factor."""
+
+import math
+
+import numpy as np
+import pytest
+
+from vsacli.trajectory.curves import POSITION, STIFFNESS, RestToRest
+from vsacli.trajectory.times import RecordedTimes, UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+NAMES = [*POSITION.names, *STIFFNESS.names]
+ORDERS = {name: order for signal in (POSITION, STIFFNESS) for order, name in enumerate(signal.names)}
+FACTOR = 1.7
+
+
+def polynomial(times):
+    first, last = times.span
+    return Trajectory(
+        times,
+        RestToRest(signal=POSITION, span=(first, last), degree=7, start=(0.0, 1.0), end=(1.0, -1.0)),
+        RestToRest(signal=STIFFNESS, span=(first, last), degree=3, start=(850.0,) * 2, end=(900.0, 800.0)),
+        name="test",
+    )
+
+
+def recorded(*given):
+    motion = polynomial(RecordedTimes(2.0 + np.linspace(0, 1, 101) ** 1.1)).block(0, 101)
+    columns = {name: getattr(motion, name) for name in given}
+    return Trajectory.from_samples(motion.time, motion.q, motion.stiffness, **columns)
+
+
+@pytest.mark.parametrize(
+    "trajectory",
+    [
+        polynomial(UniformTimes(1.0, 100.0)),
+        polynomial(RecordedTimes(np.linspace(3.0, 4.0, 101))),
+        recorded(),
+        recorded("dq", "dstiffness", "ddstiffness"),
+    ],
+    ids=["uniform", "recorded times", "recorded", "recorded with derivatives"],
+)
+def test_same_values_at_stretched_times_and_smaller_derivatives(trajectory):
+    first = trajectory.times.span[0]
+    slower = trajectory.stretched(FACTOR)
+    assert slower.duration == pytest.approx(FACTOR * trajectory.duration)
+    time = np.linspace(*trajectory.times.span, 57)[1:-1]
+    before, after = trajectory.at(time), slower.at(first + FACTOR * (time - first))
+    for name, order in ORDERS.items():
+        expected = getattr(before, name) / FACTOR**order
+        # rounding of time, amplified by the derivatives: 1e-16 times 1e8 for the spline's d4q
+        np.testing.assert_allclose(getattr(after, name), expected, atol=1e-7 * np.abs(expected).max() + 1e-12)
+
+
+def test_uniform_steps_keep_their_rate():
+    slower = polynomial(UniformTimes(1.0, 100.0)).stretched(FACTOR)
+    assert (slower.samples, slower.times.block(0, 2)[1]) == (171, pytest.approx(0.01))
+
+
+def test_recorded_steps_keep_their_number_and_first_time():
+    slower = recorded().stretched(FACTOR)
+    assert (slower.samples, slower.times.span[0]) == (101, 2.0)
+
+
+def test_given_derivatives_are_scaled_at_the_steps():
+    trajectory = recorded(*(name for name in NAMES if ORDERS[name]))
+    before, after = trajectory.block(20, 40), trajectory.stretched(FACTOR).block(20, 40)
+    for name, order in ORDERS.items():
+        np.testing.assert_array_equal(getattr(after, name), getattr(before, name) / FACTOR**order)
+
+
+def test_factor_one_changes_nothing():
+    trajectory = recorded("dq")
+    same = trajectory.stretched(1.0)
+    np.testing.assert_array_equal(same.block(0, 101).time, trajectory.block(0, 101).time)
+    assert math.isclose(same.duration, trajectory.duration, rel_tol=0)

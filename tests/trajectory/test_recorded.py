@@ -1,0 +1,198 @@
+"""Columns of CSV tables as motion and stiffness of a robot's joints."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vsacli.base.errors import InputError
+from vsacli.trajectory.curves import POSITION, STIFFNESS
+from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
+
+JOINTS = {"base": "revolute", "elbow": "revolute"}
+TIME = np.arange(8) / 10
+NAMES = [*POSITION.names, *STIFFNESS.names]
+
+
+@pytest.fixture
+def csv(tmp_path):
+    def write(columns, name="motion.csv"):
+        path = tmp_path / name
+        rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
+        lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
+        path.write_text("\n".join(lines) + "\n")
+        return path
+
+    return write
+
+
+def columns(*names, time=TIME):
+    """Positive columns of random doubles after the times."""
+    numbers = np.random.default_rng(0).uniform(800, 1000, (len(names), len(time)))
+    return {"time": time, **dict(zip(names, numbers, strict=True))}
+
+
+def by_joint(*names):
+    return [f"{joint}.{name}" for joint in JOINTS for name in names]
+
+
+def by_number(*names):
+    return [f"{name}{number}" for number in (1, 2) for name in names]
+
+
+def problems(path, wanted=(POSITION, STIFFNESS)):
+    with pytest.raises(InputError) as caught:
+        read_recording(path, JOINTS, dict.fromkeys(wanted))
+    assert {problem.file for problem in caught.value.problems} == {str(path)}
+    return [(problem.line, problem.message) for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize("naming", [by_joint, by_number])
+def test_columns_are_read_bit_for_bit(csv, naming):
+    content = columns(*naming(*NAMES))
+    motion = recorded_trajectory(csv(content), JOINTS).block(0, 8)
+    np.testing.assert_array_equal(motion.time, TIME)
+    for name in NAMES:
+        expected = np.transpose([content[column] for column in naming(name)])
+        np.testing.assert_array_equal(getattr(motion, name), expected)
+
+
+def test_order_of_columns_is_free(csv):
+    content = columns(*by_joint("stiffness", "q"))
+    reverse = dict(reversed(content.items()))
+    forth, back = (recorded_trajectory(csv(c, f"{i}.csv"), JOINTS) for i, c in enumerate((content, reverse)))
+    np.testing.assert_array_equal(forth.block(0, 8).q, back.block(0, 8).q)
+
+
+def test_trajectory_is_named_after_the_file_and_says_what_was_fitted(csv):
+    path = csv(columns(*by_joint("q", "dq", "stiffness")), "swing-up.csv")
+    trajectory = recorded_trajectory(path, JOINTS)
+    assert trajectory.name == "swing-up"
+    few = "on so few knots, derivatives are doubtful far into the record from both ends"
+    assert trajectory.warnings[:1] == (f"ddq, d3q, d4q come from a C6 spline through q; {few}",)
+    assert trajectory.warnings[-1:] == (
+        f"dstiffness, ddstiffness come from a C4 spline through stiffness; {few}",
+    )
+    (source,) = trajectory.sources
+    assert (source.path, source.text) == (str(path), path.read_text())
+    assert source.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_only_wanted_signals_are_needed_and_unused_ones_are_noted(csv):
+    position = read_recording(csv(columns(*by_joint("q"))), JOINTS, {POSITION: None})
+    assert [profile.signal for profile in position.profiles] == [POSITION]
+    assert position.notes == ()
+
+    path = csv(columns(*by_joint("q", "stiffness", "dq")))
+    stiffness = read_recording(path, JOINTS, {STIFFNESS: None})
+    assert [profile.signal for profile in stiffness.profiles] == [STIFFNESS]
+    assert stiffness.notes == (f"{path}: its columns of q are not used",)
+
+
+def test_profiles_come_in_the_order_asked_for(csv):
+    recording = read_recording(
+        csv(columns(*by_joint("q", "stiffness"))), JOINTS, dict.fromkeys([STIFFNESS, POSITION])
+    )
+    assert [profile.signal for profile in recording.profiles] == [STIFFNESS, POSITION]
+
+
+def test_all_problems_of_a_header_at_once(csv):
+    names = ["base.q", "elbow_q", "bsae.dq", "base.stiffness", "elbow.stiffness", "elbow.ddq"]
+    content = columns(*names)
+    content["t"] = content.pop("time")
+    assert problems(csv(content)) == [
+        (1, "unknown column 'elbow_q'; did you mean 'elbow.q'?"),
+        (1, "unknown column 'bsae.dq'; did you mean 'base.dq'?"),
+        (1, "unknown column 't'; did you mean 'time'?"),
+        (1, "there is no column 'time'"),
+        (1, "there is no column elbow.q"),
+        (1, "there is no column base.ddq; ddq is given for all joints or for none"),
+    ]
+
+
+def test_numbers_of_joints_start_at_one(csv):
+    found = problems(csv(columns("q0", "q1", "stiffness0", "stiffness1")))
+    assert found[0][1].startswith("unknown column 'q0'; valid: q2, dq1, dq2, ddq1")
+    assert found[1][1] == "unknown column 'stiffness0'; did you mean 'stiffness2'?"
+    assert (1, "there is no column q2") in found
+    assert (1, "there is no column stiffness2") in found
+
+
+def test_absent_signal_is_named_by_joint(csv):
+    assert problems(csv(columns(*by_joint("q")))) == [
+        (
+            1,
+            "there are no columns base.stiffness, elbow.stiffness;"
+            " a trajectory in YAML can take the motion from here and set the stiffness itself",
+        )
+    ]
+
+
+def test_two_ways_of_naming_are_not_mixed(csv):
+    assert problems(csv(columns("q1", "q2", "base.stiffness", "elbow.stiffness"))) == [
+        (1, "columns are named both by joint and by number ('base.stiffness' and 'q1'); use one way")
+    ]
+
+
+def test_result_variables_that_are_no_input_are_refused(csv):
+    found = problems(csv(columns(*by_joint("q", "stiffness"), "base.tau_motor_1")))
+    assert found[0][0] == 1
+    assert found[0][1].startswith("unknown column 'base.tau_motor_1'")
+
+
+@pytest.mark.parametrize(("again", "text"), [(0.3, "0.3 s follows 0.3 s"), (0.1, "0.1 s follows 0.3 s")])
+def test_time_that_does_not_increase(csv, again, text):
+    time = [0.0, 0.1, 0.2, 0.3, again, 0.4, 0.5, 0.6]
+    found = problems(csv(columns(*by_joint("q", "stiffness"), time=time)))
+    assert found == [(6, f"time must increase strictly, but {text}")]
+
+
+def test_all_problems_of_the_rows_at_once(csv):
+    content = columns(*by_joint("q", "stiffness"), time=[0.0, 0.1, 0.2, 0.3, 0.25, 0.5, 0.6, 0.7])
+    content["elbow.stiffness"][3:5] = -1.0
+    content["base.stiffness"][0] = 0.0
+    assert problems(csv(content)) == [
+        (6, "time must increase strictly, but 0.25 s follows 0.3 s"),
+        (2, "base.stiffness must be positive, not 0 (t = 0 s)"),
+        (5, "elbow.stiffness must be positive, not -1 (t = 0.3 s; 2 such samples)"),
+    ]
+
+
+def test_too_few_rows(csv):
+    found = problems(csv(columns(*by_joint("q", "stiffness"), time=TIME[:3])))
+    assert found == [
+        (0, "q needs at least 8 samples for a C6 spline, not 3"),
+        (0, "stiffness needs at least 6 samples for a C4 spline, not 3"),
+    ]
+
+
+def recording(csv, time, name):
+    return read_recording(csv(columns(*by_joint("q"), time=time), name), JOINTS, {POSITION: None})
+
+
+def test_files_with_equal_times_may_be_combined(csv):
+    recording(csv, TIME, "a.csv").check_times(recording(csv, TIME.copy(), "b.csv"))
+
+
+def test_files_with_different_times_are_refused_at_the_first_row(csv):
+    later = TIME.copy()
+    later[5:] += 1e-15
+    first, second = recording(csv, TIME, "a.csv"), recording(csv, later, "b.csv")
+    with pytest.raises(
+        InputError, match=r"b\.csv:7: time is 0\.5\d* s, but 0\.5 s in the same row of .*a\.csv"
+    ):
+        first.check_times(second)
+
+
+def test_files_with_different_numbers_of_rows_are_refused(csv):
+    longer = np.append(TIME, 0.8)
+    first, second = recording(csv, TIME, "a.csv"), recording(csv, longer, "b.csv")
+    with pytest.raises(InputError, match=r"b\.csv: the file has 9 rows, but .*a\.csv has 8"):
+        first.check_times(second)
+
+
+def test_problems_of_the_table_come_through(tmp_path):
+    path = Path(tmp_path / "motion.csv")
+    path.write_text("time,base.q,elbow.q\n0,1,2\n1,nan,2\n")
+    assert problems(path) == [(3, "column 'base.q': expected a finite number, found 'nan'")]

@@ -1,0 +1,1 @@
+"""What drives a joint: springs, and the kinds of actuator, one file each."""

@@ -1,0 +1,67 @@
+"""Roots between two ends by Chandrupatla's method: inverse quadratic interpolation guarded by bisection."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.control_flow import Values, repeat
+
+Function = Callable[..., FloatArray]
+"""f(x, *constants) on arrays of one shape."""
+
+MOST_STEPS = 120
+"""Twice what bisection needs between neighbouring powers of two; more only if an end lies at zero."""
+
+ROUNDING = 2 * float(np.finfo(float).eps)
+
+
+def bracketed_root(
+    function: Function, low: FloatArray, high: FloatArray, constants: Values = ()
+) -> FloatArray:
+    """A root between `low` and `high`, where the function has opposite signs, to rounding.
+
+    If they have one sign, the end that is nearer to zero.
+
+    T. R. Chandrupatla, A new hybrid quadratic/bisection algorithm for finding the zero of a nonlinear
+    function without using derivatives, Advances in Engineering Software 28 (1997). Arrays (samples,).
+    """
+
+    def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+        share, x_1, f_1, x_2, f_2, _, _ = state
+        x = x_1 + share * (x_2 - x_1)
+        f = function(x, *constants)
+        same = (f > 0) == (f_1 > 0)
+        x_3, f_3 = np.where(same, x_1, x_2), np.where(same, f_1, f_2)
+        x_2, f_2 = np.where(same, x_2, x_1), np.where(same, f_2, f_1)
+        width = np.abs(x_2 - x)
+        resolution = ROUNDING * np.minimum(np.abs(x), np.abs(x_2)) + TINY
+        least = resolution / np.maximum(width, TINY)
+        share = np.clip(_next_share(x, f, x_2, f_2, x_3, f_3), least, 1 - least)
+        return (share, x, f, x_2, f_2, x_3, f_3), (width <= 2 * resolution) | (f == 0)
+
+    at_low, at_high = function(low, *constants), function(high, *constants)
+    half = np.full_like(low, 0.5)
+    start = (half, low, at_low, high, at_high, high, at_high)
+    _, x_1, f_1, x_2, f_2, _, _ = repeat(step, start, constants, MOST_STEPS)
+    enclosed = (at_low < 0) & (at_high > 0) | (at_low > 0) & (at_high < 0)
+    end = np.where(np.abs(at_low) <= np.abs(at_high), low, high)
+    return np.where(enclosed, np.where(np.abs(f_1) <= np.abs(f_2), x_1, x_2), end)
+
+
+TINY = 1e-300
+
+
+def _next_share(
+    x_1: FloatArray, f_1: FloatArray, x_2: FloatArray, f_2: FloatArray, x_3: FloatArray, f_3: FloatArray
+) -> FloatArray:
+    """Where between x_1 and x_2 to look next: by the parabola through three points if it is monotone."""
+    with np.errstate(all="ignore"):
+        xi, phi = (x_1 - x_2) / (x_3 - x_2), (f_1 - f_2) / (f_3 - f_2)
+        monotone = (phi * phi < xi) & ((1 - phi) * (1 - phi) < 1 - xi)
+        parabola = f_1 / (f_2 - f_1) * f_3 / (f_2 - f_3) + (x_3 - x_1) / (x_2 - x_1) * f_1 / (
+            f_3 - f_1
+        ) * f_2 / (f_3 - f_2)
+    return np.where(monotone, parabola, 0.5)

@@ -1,0 +1,85 @@
+"""The cubic spring of the paper, tau = K phi + Kc phi^3, eqs. (24)-(27)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.pairs.pair import Pair, PairSolution
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.documents.fields import POSITIVE, number
+
+
+@dataclass(frozen=True)
+class Cubic(SpringLaw):
+    """tau = k phi + k_c phi^3 (24), Buondonno & De Luca (2016)."""
+
+    k: float = number(units.STIFFNESS, "linear coefficient K", check=POSITIVE)
+    k_c: float = number(units.CUBIC_STIFFNESS, "cubic coefficient Kc", check=POSITIVE)
+
+    def closed_pair(self, other: SpringLaw) -> Pair | None:
+        """Closed for a twin, on the branch of equations (28)-(31)."""
+        return AlikeCubics(self) if other == self else None
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Equation (24)."""
+        return phi * (self.k + self.k_c * phi * phi)
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Equation (25)."""
+        return self.k + 3 * self.k_c * phi * phi
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Equation (26)."""
+        return 6 * self.k_c * phi
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Equation (27)."""
+        return np.full_like(phi, 6 * self.k_c)
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Energy K phi^2/2 + Kc phi^4/4."""
+        squared = phi * phi
+        return squared * (self.k / 2 + self.k_c / 4 * squared)
+
+    def deflection(self, torque: FloatArray) -> FloatArray:
+        """The real root of the cubic, by its hyperbolic form (no cancellation at any size of torque)."""
+        scale = math.sqrt(self.k / (3 * self.k_c))
+        return 2 * scale * np.sinh(np.arcsinh(1.5 * torque / (self.k * scale)) / 3)
+
+
+@dataclass(frozen=True)
+class AlikeCubics(Pair):
+    """Two equal cubic springs, (28)-(31) without the angle: u = phi_1 + phi_2 solves a cubic equation."""
+
+    spring: Cubic
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+        """Solve (14) for each sample; see `Pair.solve`."""
+        k, k_c = self.spring.k, self.spring.k_c
+        lower = self._lowest_stiffness(np.abs(tau_e))
+        demand = np.maximum(stiffness, lower)
+        load = np.clip(3 * math.sqrt(3 * k_c) * tau_e / (demand * np.sqrt(demand)), -1, 1)
+        u = 2 * np.sqrt(demand / (3 * k_c)) * np.sin(np.arcsin(load) / 3)
+        spread_squared = 2 * (demand - 2 * k) / (3 * k_c) - u * u
+        spread = np.sqrt(np.maximum(spread_squared, 0))
+        return PairSolution(
+            lower=lower,
+            upper=np.full_like(tau_e, np.inf),
+            lower_critical=np.ones_like(tau_e, dtype=bool),
+            upper_critical=np.zeros_like(tau_e, dtype=bool),
+            slack_below=np.zeros_like(tau_e, dtype=bool),
+            phi_1=(u + spread) / 2,
+            phi_2=(u - spread) / 2,
+        )
+
+    def _lowest_stiffness(self, load: FloatArray) -> FloatArray:
+        """Outermost critical point: phi_1 = phi_2, or phi_1 phi_2 = K/(3 Kc) beyond its load."""
+        k, k_c = self.spring.k, self.spring.k_c
+        alike = 2 * self.spring.stiffness(self.spring.deflection(load / 2))
+        unlike = np.cbrt((3 * math.sqrt(3 * k_c) * load) ** 2)
+        return np.where(load <= 8 / 3 * k * math.sqrt(k / (3 * k_c)), alike, unlike)

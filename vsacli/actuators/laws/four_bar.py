@@ -1,0 +1,139 @@
+"""The four-bar transmission of the VSA-II."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vsacli.actuators.inversion import FirstGuess, inverse, turned_to
+from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.pairs.decoupling_matrix import Springs
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.documents.fields import POSITIVE, Check, number
+
+ABOVE_ONE = Check(lambda ratio: ratio > 1 and math.isfinite(ratio), "greater than 1")
+
+STRETCHED = 1e-6
+"""How close to 1 the domain lets C sin(phi/2) come. Beyond, where the torque grows without bound, deflections
+that are neighbouring doubles differ in stiffness by more than 1e-10."""
+
+NODES = 20
+"""Points of the curve that the first guess of the inverse begins with."""
+
+
+@dataclass(frozen=True)
+class FourBar(SpringLaw):
+    """Linear spring behind a four-bar linkage: U = k beta^2/2, beta = asin(C sin(phi/2)) - phi/2, C > 1.
+
+    The form of the VSA-II, Schiavi, Grioli, Sen & Bicchi, ICRA 2008. Its domain ends where the linkage is
+    stretched, |phi| = 2 asin(1/C).
+    """
+
+    k: float = number(units.TORQUE, "constant k of the linear spring, per rad of beta", check=POSITIVE)
+    ratio: float = number(units.DIMENSIONLESS, "ratio C of the linkage's arms", check=ABOVE_ONE)
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """Up to the stretched linkage, all but a millionth."""
+        end = 2 * math.asin((1 - STRETCHED) / self.ratio)
+        return (-end, end)
+
+    @cached_property
+    def torque_range(self) -> tuple[float, float]:
+        """Torques at the ends of the domain."""
+        low, high = self.torque(np.array(self.domain))
+        return float(low), float(high)
+
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Derivatives of the energy k beta^2/2, which share the angles."""
+        return _derivatives(self.k, self._angle(phi, order + 1))
+
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+        """Energy and all derivatives, which share the angles."""
+        beta = self._angle(phi, 4)
+        return self.k / 2 * beta[0] * beta[0], Springs(*_derivatives(self.k, beta))
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Torque k beta beta'."""
+        return self.derivatives(phi, 0)[0]
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Stiffness k (beta'^2 + beta beta'')."""
+        return self.derivatives(phi, 1)[1]
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Slope k (3 beta' beta'' + beta beta''')."""
+        return self.derivatives(phi, 2)[2]
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Curvature k (3 beta''^2 + 4 beta' beta''' + beta beta'''')."""
+        return self.derivatives(phi, 3)[3]
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Energy k beta^2/2."""
+        (beta,) = self._angle(phi, 0)
+        return self.k / 2 * beta * beta
+
+    def deflection(self, torque: FloatArray) -> FloatArray:
+        """Inverse by safeguarded iteration within the domain."""
+        return self.under(torque)[0]
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+        """Deflection and spring by one iteration."""
+        load = np.minimum(np.abs(torque), self.torque_range[1])
+        low, high = np.zeros_like(load), np.full_like(load, self.domain[1])
+        start = np.minimum(self._first_guess(load), high)
+        return turned_to(torque, *inverse(self, load, low, high, start))
+
+    @cached_property
+    def _first_guess(self) -> FirstGuess:
+        """From nodes over the domain, denser towards its end."""
+        psi = np.linspace(0, math.pi / 2, NODES)
+        return FirstGuess(self, 2 * np.arcsin((1 - STRETCHED) * np.sin(psi) / self.ratio))
+
+    def _angle(self, phi: FloatArray, order: int) -> list[FloatArray]:
+        """Angle beta of the linear spring, and its derivatives up to an order, 4 at most.
+
+        With psi = asin(C sin(phi/2)) and beta = psi - phi/2, written by
+        C cos(phi/2) - cos psi = (C^2 - 1)/(C cos(phi/2) + cos psi), so that nothing cancels. The higher
+        derivatives of beta are those of psi, with psi'' = (psi'^2 - 1/4) tan psi. Sines and cosines are
+        multiplied by 1 + tan^2(phi/4).
+        """
+        tangent = np.tan(phi / 4)
+        whole = 1 + tangent * tangent
+        sin_psi, ratio_cos = 2 * self.ratio * tangent, self.ratio * (2 - whole)
+        cos_psi = np.sqrt((whole - sin_psi) * (whole + sin_psi))
+        gain = (self.ratio - 1) * (self.ratio + 1) / (ratio_cos + cos_psi)
+        beta = [np.arcsin(2 * tangent * gain)]
+        if order > 0:
+            half_secant = 0.5 / cos_psi
+            beta.append(gain * whole * whole * half_secant)
+        if order > 1:
+            rate, tan_psi = ratio_cos * half_secant, sin_psi / cos_psi  # psi', tan psi
+            beyond = beta[1] * (rate + 0.5)  # psi'^2 - 1/4
+            beta.append(beyond * tan_psi)
+        if order > 2:
+            squared = tan_psi * tan_psi
+            grown = 1 + 3 * squared
+            beta.append(rate * beyond * grown)
+        if order > 3:
+            rates = 4 * rate * rate
+            beta.append(beta[2] * (grown * (beyond + rates) + rates))
+        return beta
+
+
+def _derivatives(k: float, beta: list[FloatArray]) -> tuple[FloatArray, ...]:
+    """Of k beta^2/2, from beta and its derivatives: as many as there are of these."""
+    k_beta, k_rate = k * beta[0], k * beta[1]
+    derivatives = [k_beta * beta[1]]
+    if len(beta) > 2:
+        derivatives.append(k_rate * beta[1] + k_beta * beta[2])
+    if len(beta) > 3:
+        derivatives.append(3 * k_rate * beta[2] + k_beta * beta[3])
+    if len(beta) > 4:
+        derivatives.append(3 * k * beta[2] * beta[2] + 4 * k_rate * beta[3] + k_beta * beta[4])
+    return tuple(derivatives)

@@ -1,0 +1,104 @@
+"""The odd polynomial spring."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, reduce
+
+import numpy as np
+
+from vsacli.actuators.inversion import inverse, turned_to
+from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.pairs.decoupling_matrix import Springs
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, number
+
+
+@dataclass(frozen=True)
+class Polynomial(SpringLaw):
+    """tau = c1 phi + c3 phi^3 + c5 phi^5 + c7 phi^7 + c9 phi^9; with c1 alone it is a linear spring."""
+
+    c1: float = number(units.STIFFNESS, "linear coefficient", check=POSITIVE)
+    c3: float = number(units.CUBIC_STIFFNESS, "cubic coefficient", check=NON_NEGATIVE, default=0.0)
+    c5: float = number(units.FIFTH_STIFFNESS, "coefficient of phi^5", check=NON_NEGATIVE, default=0.0)
+    c7: float = number(units.SEVENTH_STIFFNESS, "coefficient of phi^7", check=NON_NEGATIVE, default=0.0)
+    c9: float = number(units.NINTH_STIFFNESS, "coefficient of phi^9", check=NON_NEGATIVE, default=0.0)
+
+    @cached_property
+    def _coefficients(self) -> tuple[float, ...]:
+        """Of phi, phi^3, ... up to the last that is not zero."""
+        coefficients = (self.c1, self.c3, self.c5, self.c7, self.c9)
+        return coefficients[: max(index for index, each in enumerate(coefficients, start=1) if each)]
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether all but the first coefficient vanish."""
+        return len(self._coefficients) == 1
+
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Even power series, and odd ones in turn, which share the square."""
+        squared = phi * phi
+        even = [self._derivative(each, squared) for each in range(order + 1)]
+        return tuple(value if each % 2 else phi * value for each, value in enumerate(even))
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Torque c1 phi + c3 phi^3 + ..."""
+        return phi * self._derivative(0, phi * phi)
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Stiffness, the first derivative."""
+        return self._derivative(1, phi * phi)
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Slope, the second derivative."""
+        return phi * self._derivative(2, phi * phi)
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Curvature, the third derivative."""
+        return self._derivative(3, phi * phi)
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Energy, the integral of the torque."""
+        squared = phi * phi
+        return squared * _series([each / (2 * n + 2) for n, each in enumerate(self._coefficients)], squared)
+
+    def deflection(self, torque: FloatArray) -> FloatArray:
+        """Inverse by safeguarded iteration from the bound that each term alone sets."""
+        return self.under(torque)[0]
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+        """Deflection and spring by one iteration."""
+        load = np.abs(torque)
+        bounds = [
+            (load / coefficient) ** (1 / (2 * index + 1))
+            for index, coefficient in enumerate(self._coefficients)
+            if coefficient > 0
+        ]
+        high = reduce(np.minimum, bounds)
+        return turned_to(torque, *inverse(self, load, np.zeros_like(load), high, start=high))
+
+    def _derivative(self, order: int, squared: FloatArray) -> FloatArray:
+        """Derivative of the torque, without the factor phi that those of even order have."""
+        return _series(self._factors[order], squared)
+
+    @cached_property
+    def _factors(self) -> list[list[float]]:
+        """Coefficients of each derivative."""
+        return [
+            [math.perm(2 * n + 1, order) * each for n, each in enumerate(self._coefficients)][order // 2 :]
+            for order in range(4)
+        ]
+
+
+def _series(coefficients: Sequence[float], x: FloatArray) -> FloatArray:
+    """Power series from the constant on."""
+    if not coefficients:
+        return np.zeros_like(x)
+    *lower, highest = coefficients
+    result = np.full_like(x, highest)
+    for coefficient in reversed(lower):
+        result = result * x + coefficient
+    return result

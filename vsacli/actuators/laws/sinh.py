@@ -1,0 +1,97 @@
+"""The hyperbolic-sine spring of the qbmove and VSA-CubeBot family."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.pairs.pair import Pair, PairSolution
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.documents.fields import POSITIVE, number
+
+
+@dataclass(frozen=True)
+class Sinh(SpringLaw):
+    """tau = k sinh(a phi), the qbmove and VSA-CubeBot family; qbmove Advanced manual (April 2021), 3.2.2."""
+
+    k: float = number(units.TORQUE, "torque scale k", check=POSITIVE)
+    a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
+
+    def closed_pair(self, other: SpringLaw) -> Pair | None:
+        """Closed where both sides have the same a."""
+        return SinhPair(self, other) if isinstance(other, Sinh) and other.a == self.a else None
+
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Of the torque and the stiffness in turn, from one exponential function."""
+        grown = np.expm1(np.abs(self.a * phi))
+        shrunk = 1 / (1 + grown)
+        half = self.k / 2 * grown
+        torque = np.copysign(half * (1 + shrunk), phi)
+        stiffness = self.a * (self.k + half * (1 - shrunk))
+        return (torque, stiffness, self.a**2 * torque, self.a**2 * stiffness)[: order + 1]
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Torque k sinh(a phi)."""
+        return self.derivatives(phi, 0)[0]
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Stiffness k a cosh(a phi)."""
+        return self.derivatives(phi, 1)[1]
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Slope a^2 tau."""
+        return self.a**2 * self.torque(phi)
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Curvature a^2 sigma."""
+        return self.a**2 * self.stiffness(phi)
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Energy k (cosh(a phi) - 1)/a, without cancellation near zero."""
+        return 2 * self.k / self.a * np.sinh(self.a * phi / 2) ** 2
+
+    def deflection(self, torque: FloatArray) -> FloatArray:
+        """Inverse asinh(tau/k)/a."""
+        return np.arcsinh(torque / self.k) / self.a
+
+
+@dataclass(frozen=True)
+class SinhPair(Pair):
+    """Two sinh springs of the same a, from their sum and difference.
+
+    With h = a(phi_1 - phi_2)/2, m = a(phi_1 + phi_2)/2 and x = sigma/a:
+    x^2 - tau_e^2 = (k_1 + k_2)^2 + 4 k_1 k_2 sinh(h)^2 = R^2, and
+    m = asinh(tau_e/R) - asinh((k_1 - k_2) sinh(h)/R).
+    """
+
+    first: Sinh
+    second: Sinh
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+        """Solve (14) for each sample; see `Pair.solve`."""
+        a, k_1, k_2 = self.first.a, self.first.k, self.second.k
+        lower = a * np.hypot(tau_e, k_1 + k_2)
+        demand = np.maximum(stiffness, lower)
+        sinh = np.sqrt((demand - lower) / (2 * a * k_1)) * np.sqrt((demand + lower) / (2 * a * k_2))
+        radius = np.hypot(k_1 + k_2, 2 * math.sqrt(k_1) * math.sqrt(k_2) * sinh)
+        mean = np.arcsinh(tau_e / radius) - np.arcsinh((k_1 - k_2) / radius * sinh)
+        half_spread = np.arcsinh(sinh)
+        phi_1, phi_2 = (mean + half_spread) / a, (mean - half_spread) / a
+        # The weaker spring takes up what rounding leaves of the balance of the torques.
+        if k_1 < k_2:
+            phi_1 = self.first.deflection(tau_e - self.second.torque(phi_2))
+        elif k_2 < k_1:
+            phi_2 = self.second.deflection(tau_e - self.first.torque(phi_1))
+        return PairSolution(
+            lower=lower,
+            upper=np.full_like(tau_e, np.inf),
+            lower_critical=np.ones_like(tau_e, dtype=bool),
+            upper_critical=np.zeros_like(tau_e, dtype=bool),
+            slack_below=np.zeros_like(tau_e, dtype=bool),
+            phi_1=phi_1,
+            phi_2=phi_2,
+        )

@@ -1,0 +1,189 @@
+"""A spring given by its measured torque-deflection curve."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vsacli.actuators.inversion import FirstGuess, inverse
+from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.measured_curve import MeasuredCurve, fit_curve
+from vsacli.actuators.laws.mirrored import Mirrored
+from vsacli.actuators.pairs.decoupling_matrix import Springs
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError, Problem
+from vsacli.documents.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
+from vsacli.documents.source import Source
+from vsacli.documents.table import Table
+
+LEAST_ROWS = 6
+NODES = 25
+"""Points of the curve on either side that the first guess of the inverse begins with."""
+
+SHAPE_TOLERANCE = 1e-3
+"""Share of the torque range by which measurement noise may hide the shape: a point above its chord, say."""
+
+
+@dataclass(frozen=True)
+class MeasuredSpring(SpringLaw):
+    """Torques measured over deflections, with a smooth hardening curve fitted through them; no extrapolation.
+
+    A table that begins at zero deflection is a spring that only pulls.
+    """
+
+    file: Table = value(
+        TableFile(("deflection", "torque")),
+        "CSV file with the header deflection,torque in rad,N m (m,N), path relative to the robot file",
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        problems = list(_problems(self.file))
+        if problems:
+            raise InputError(problems)
+
+    @cached_property
+    def _curve(self) -> MeasuredCurve:
+        return fit_curve(*self.file.values.T)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How well the curve fits."""
+        share = 100 * self._curve.residual / np.ptp(self.file.values[:, 1])
+        misfit = f"{self._curve.residual:.2g} ({share:.2g} % of its range)"
+        return (f"the curve through {self.file.source.path} misses a measured torque by up to {misfit}",)
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """The table."""
+        return (self.file.source,)
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """The measured range."""
+        return float(self.file.values[0, 0]), float(self.file.values[-1, 0])
+
+    @cached_property
+    def torque_range(self) -> tuple[float, float]:
+        """Fitted torques at the ends of the measured range."""
+        low, high = self.torque(np.array(self.domain))
+        return float(low), float(high)
+
+    @property
+    def pulls_only(self) -> bool:
+        """Whether the table begins at zero deflection."""
+        return self.domain[0] == 0
+
+    def as_second(self) -> SpringLaw:
+        """Turned around if it only pulls."""
+        return Mirrored(law=self) if self.pulls_only else self
+
+    def hardening(self, phi: FloatArray) -> FloatArray:
+        """Relative hardening, infinite where a spring without stiffness at rest goes slack."""
+        _, stiffness, slope = self.derivatives(phi, 2)
+        slack = stiffness == 0
+        return np.where(slack, np.inf, slope / np.where(slack, 1.0, stiffness))
+
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """Of the fitted curve, looked up once."""
+        return self._curve(phi, 1, order + 1)
+
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+        """Of the fitted curve, looked up once."""
+        energy, *derivatives = self._curve(phi, 0, 4)
+        return energy, Springs(*derivatives)
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Torque of the fitted curve."""
+        return self._curve(phi, 1, 1)[0]
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Stiffness of the fitted curve."""
+        return self.derivatives(phi, 1)[1]
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Slope of the fitted curve."""
+        return self.derivatives(phi, 2)[2]
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Curvature of the fitted curve."""
+        return self.derivatives(phi, 3)[3]
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Energy of the fitted curve."""
+        return self._curve(phi, 0, 0)[0]
+
+    def deflection(self, torque: FloatArray) -> FloatArray:
+        """Inverse by safeguarded iteration within the measured range."""
+        return self.under(torque)[0]
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+        """Deflection and spring by one iteration."""
+        low, high = (np.full_like(torque, end) for end in self.domain)
+        least, largest = self.torque_range
+        carried = np.minimum(np.maximum(torque, least), largest)
+        start = np.minimum(np.maximum(self._first_guess(carried), low), high)
+        return inverse(self, carried, low, high, start)
+
+    @cached_property
+    def _first_guess(self) -> FirstGuess:
+        low, high = self.domain
+        shares = np.linspace(0, 1, NODES)
+        return FirstGuess(self, np.unique(np.concatenate((low * shares, high * shares))))
+
+
+def _problems(table: Table) -> Iterator[Problem]:
+    """Why the rows are no hardening spring, with the lines."""
+    deflection, torque = table.values.T
+    path = table.source.path
+
+    def at(row: int, message: str) -> Problem:
+        return Problem(path, table.line_of(row), message)
+
+    if len(deflection) < LEAST_ROWS:
+        yield Problem(path, 0, f"expected at least {LEAST_ROWS} rows, found {len(deflection)}")
+    elif sizes := list(_wrong_sizes(deflection, torque)):
+        yield from (at(row, message) for row, message in sizes)
+    elif not deflection[0] <= 0 < deflection[-1]:
+        yield at(0, "the deflections must go from zero (a spring that only pulls) or below to above zero")
+    elif (steps := np.flatnonzero(np.diff(deflection) <= 0)).size:
+        yield at(steps[0] + 1, "the deflection does not increase from the row before")
+    elif (steps := np.flatnonzero(np.diff(torque) <= 0)).size:
+        yield at(steps[0] + 1, "the torque does not increase from the row before, as a spring's does")
+    elif (offset := abs(np.interp(0, deflection, torque))) > 10 * SHAPE_TOLERANCE * np.ptp(torque):
+        yield Problem(
+            path, 0, f"the torque at zero deflection is {offset:.4g}, expected zero; remove the offset"
+        )
+    else:
+        yield from (at(row, message) for row, message in _wrong_bends(deflection, torque))
+
+
+def _wrong_sizes(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
+    """Rows with numbers too large, or with an end of the curve too near to zero, as in declared fields."""
+    for name, column in (("deflection", deflection), ("torque", torque)):
+        for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:
+            yield int(row), f"the {name} {FINITE.problem(column[row])}"
+        for row in (0, len(column) - 1):
+            if 0 < abs(column[row]) < SMALLEST:
+                yield row, f"the {name} {NON_ZERO.problem(column[row])}"
+
+
+def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
+    """Rows where the torque is not convex for positive, or not concave for negative deflections."""
+    left, middle, right = deflection[:-2], deflection[1:-1], deflection[2:]
+    share = (middle - left) / (right - left)
+    chord = (1 - share) * torque[:-2] + share * torque[2:]
+    above_chord = torque[1:-1] - chord
+    tolerance = SHAPE_TOLERANCE * np.ptp(torque)
+    for row in np.flatnonzero((left >= 0) & (above_chord > tolerance)):
+        yield int(row) + 1, _bend(torque[row + 1], "above", chord[row], "convex")
+    for row in np.flatnonzero((right <= 0) & (above_chord < -tolerance)):
+        yield int(row) + 1, _bend(torque[row + 1], "below", chord[row], "concave")
+
+
+def _bend(torque: float, side: str, chord: float, shape: str) -> str:
+    where = f"the torque {torque:.4g} lies {side} {chord:.4g}, the line between the rows before and after"
+    return f"{where}: it is not {shape} here, so the spring would not harden away from zero"

@@ -1,0 +1,27 @@
+"""Pairs of springs that drive a joint: (14) solved, and which stiffness can be reached."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from vsacli.actuators.pairs.pair import Pair, PairSolution
+
+if TYPE_CHECKING:
+    from vsacli.actuators.laws.law import SpringLaw
+
+__all__ = ["Pair", "PairSolution", "make_pair"]
+
+
+@lru_cache(maxsize=1024)
+def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:
+    """The solver of (14) for two laws, side 1 preloaded upward: closed where one exists, else iterated.
+
+    Equal laws get the same pair, which keeps what it has found out about them.
+    """
+    closed = first.closed_pair(second)
+    if closed is not None:
+        return closed
+    from vsacli.actuators.pairs.iterated import IteratedPair
+
+    return IteratedPair(first, second)

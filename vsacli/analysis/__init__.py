@@ -1,0 +1,1 @@
+"""One run over a trajectory: its report, and its self-check."""

@@ -1,0 +1,262 @@
+"""The verdict on a run: one object, rendered as text and as JSON, and stored in the result file."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vsacli.analysis.self_check import DRIFT_BOUND, LADDER_BOUND, SPRING_BOUND, SelfCheck
+from vsacli.base.flags import LIMITS, Flag
+from vsacli.base.json_values import Plain, finite, number, pair
+from vsacli.dynamics.energy import JointEnergy
+
+if TYPE_CHECKING:
+    from vsacli.dynamics.integrated_deflections import Stop
+
+FORMAT = "vsacli-report/1"
+
+VERDICTS = ("ok", "over_limit", "singular", "infeasible", "self_check_failed")
+"""From best to worst; the worst that applies wins."""
+
+COUNTED = {
+    "infeasible": Flag.INFEASIBLE,
+    "singular": Flag.SINGULAR,
+    "near_singular": Flag.NEAR_SINGULAR,
+    "slack": Flag.SLACK,
+    "over_limit": LIMITS,
+}
+"""Kinds of trouble whose steps are counted, and the bits that make them."""
+
+
+class Worst(NamedTuple):
+    """The worst step of a kind of trouble: when, what value, against which bound.
+
+    `bound` is NaN where the elastic torque itself cannot be carried; `motor` is 1, 2 or None.
+    """
+
+    kind: str
+    time: float
+    value: float
+    bound: float
+    unit: str
+    motor: int | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values; the kind is the key under which they stand."""
+        entry = {"time": self.time, "value": self.value, "bound": self.bound, "unit": self.unit}
+        return entry if self.motor is None else {**entry, "motor": self.motor}
+
+    @classmethod
+    def from_json(cls, kind: str, plain: Plain) -> Worst:
+        """From what `as_json` gave, `finite`."""
+        time, value, bound = (number(plain[name]) for name in ("time", "value", "bound"))
+        return cls(kind, time, value, bound, plain["unit"], plain.get("motor"))
+
+
+class JointReport(NamedTuple):
+    """What a run found at one joint; torques in N m (N), stiffness in N m/rad (N/m).
+
+    Attributes:
+        name: of the joint.
+        type: "revolute" or "prismatic".
+        actuator: "antagonistic", "elastic" or "rigid"; what the last two do not have is NaN: motor 2, margin
+            and corridor, and the stiffness of a rigid joint.
+        steps: how many steps have each kind of trouble.
+        first_time: when each kind that occurs first does, s.
+        worst: the worst step of each kind that occurs; limits one by one.
+        margin: smallest relative margin to an end of the corridor, NaN if a torque cannot be carried.
+        margin_time: when.
+        reachable: the corridor at that time.
+        stiffness: smallest and largest commanded stiffness.
+        peak_tau_e: largest |tau_e|.
+        peak_tau_motor: largest |tau_motor| of motors 1 and 2, over the steps where it exists.
+        start_theta: motor positions at the first step, to which the motors go before the start.
+        torque_step: |tau_motor - tau_spring| at the first step: by how much the torque that holds the motor
+            at rest must jump there; NaN at a rigid joint, where tau_e may jump as well.
+        other_preload: whether every infeasible step could be done with the opposite preload.
+        energy: work of the motors, elastic energy, co-contraction.
+    """
+
+    name: str
+    type: str
+    actuator: str
+    steps: dict[str, int]
+    first_time: dict[str, float]
+    worst: dict[str, Worst]
+    margin: float
+    margin_time: float
+    reachable: tuple[float, float]
+    stiffness: tuple[float, float]
+    peak_tau_e: float
+    peak_tau_motor: tuple[float, float]
+    start_theta: tuple[float, float]
+    torque_step: tuple[float, float]
+    other_preload: bool
+    energy: JointEnergy
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values under the published keys."""
+        return {
+            "name": self.name,
+            "type": self.type,
+            "actuator": self.actuator,
+            "steps": self.steps,
+            "first_time": self.first_time,
+            "worst": {kind: worst.as_json() for kind, worst in self.worst.items()},
+            "margin": {"min": self.margin, "time": self.margin_time, "reachable": list(self.reachable)},
+            "stiffness": {"min": self.stiffness[0], "max": self.stiffness[1]},
+            "peak": {"tau_e": self.peak_tau_e, "tau_motor": list(self.peak_tau_motor)},
+            "start": {"theta": list(self.start_theta), "torque_step": list(self.torque_step)},
+            "other_preload": self.other_preload,
+            "energy": self.energy.as_json(),
+        }
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> JointReport:
+        """From what `as_json` gave, `finite`: no end of a corridor is NaN alone, so the upper is infinite."""
+        margin = plain["margin"]
+        lower, upper = pair(margin["reachable"])
+        if math.isnan(upper) and not math.isnan(lower):
+            upper = math.inf
+        return cls(
+            **{name: plain[name] for name in ("name", "type", "actuator", "steps", "first_time")},
+            worst={kind: Worst.from_json(kind, worst) for kind, worst in plain["worst"].items()},
+            margin=number(margin["min"]),
+            margin_time=number(margin["time"]),
+            reachable=(lower, upper),
+            stiffness=pair(plain["stiffness"][end] for end in ("min", "max")),
+            peak_tau_e=number(plain["peak"]["tau_e"]),
+            peak_tau_motor=pair(plain["peak"]["tau_motor"]),
+            start_theta=pair(plain["start"]["theta"]),
+            torque_step=pair(plain["start"]["torque_step"]),
+            other_preload=plain["other_preload"],
+            energy=JointEnergy.from_json(plain["energy"]),
+        )
+
+
+class JointDrift(NamedTuple):
+    """What became of the followed deflections of a joint.
+
+    Attributes:
+        joint: its name.
+        largest: largest distance of a deflection from the root of (14), NaN if no step was followed.
+        time: when, s.
+        unit: of the distance.
+        stop: from when on they could not be followed, and why.
+    """
+
+    joint: str
+    largest: float
+    time: float
+    unit: str
+    stop: Stop | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values under the published keys."""
+        return {
+            "joint": self.joint,
+            "drift": self.largest,
+            "time": self.time,
+            "unit": self.unit,
+            "stopped": None if self.stop is None else {"time": self.stop.time, "reason": self.stop.reason},
+        }
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> JointDrift:
+        """From what `as_json` gave, `finite`."""
+        from vsacli.dynamics.integrated_deflections import Stop
+
+        stop = None if plain["stopped"] is None else Stop(**plain["stopped"])
+        return cls(plain["joint"], number(plain["drift"]), number(plain["time"]), plain["unit"], stop)
+
+
+class Report(NamedTuple):
+    """The verdict on a run.
+
+    Attributes:
+        robot: name of the robot.
+        trajectory: name of the trajectory.
+        samples: steps computed, both ends included.
+        duration: time from the first to the last step of the trajectory, s.
+        complete: whether every step of the trajectory was computed.
+        warnings: why the inputs may not be what was meant.
+        notes: how they were understood, where that is not obvious.
+        self_check: outcome of the self-check.
+        joints: one report a joint.
+        drifts: one a joint if the deflections were followed by integration, else none.
+        fits: what is known of the splines that recorded samples were replaced by, plain values.
+    """
+
+    robot: str
+    trajectory: str
+    samples: int
+    duration: float
+    complete: bool
+    self_check: SelfCheck
+    joints: tuple[JointReport, ...]
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    drifts: tuple[JointDrift, ...] = ()
+    fits: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """The worst of `VERDICTS` that applies."""
+        applies = {kind for joint in self.joints for kind, count in joint.steps.items() if count}
+        if not self.self_check.passed:
+            applies.add("self_check_failed")
+        return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values for `json.dumps`; numbers that are not finite become None."""
+        check = self.self_check
+        plain: dict[str, Any] = finite(
+            {
+                "format": FORMAT,
+                "verdict": self.verdict,
+                "robot": self.robot,
+                "trajectory": self.trajectory,
+                "samples": self.samples,
+                "duration": self.duration,
+                "complete": self.complete,
+                "warnings": list(self.warnings),
+                "notes": list(self.notes),
+                "fits": list(self.fits),
+                "self_check": {
+                    "passed": check.passed,
+                    "spring_residual": check.spring_residual,
+                    "ladder": check.ladder,
+                    "bound": LADDER_BOUND,
+                },
+                "deflections": self._deflections(),
+                "joints": [joint.as_json() for joint in self.joints],
+            }
+        )
+        return plain
+
+    def _deflections(self) -> dict[str, Any]:
+        if not self.drifts:
+            return {"method": "root"}
+        return {"method": "integrate", "joints": [drift.as_json() for drift in self.drifts]}
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> Report:
+        """From what `as_json` gave, as a result file holds it.
+
+        Raises:
+            LookupError, TypeError, AttributeError, ValueError: it is no such report.
+        """
+        check, drifts = plain["self_check"], plain["deflections"].get("joints", ())
+        return cls(
+            **{name: plain[name] for name in ("robot", "trajectory", "samples", "duration", "complete")},
+            warnings=tuple(plain["warnings"]),
+            notes=tuple(plain.get("notes", ())),
+            fits=tuple(plain["fits"]),
+            self_check=SelfCheck(
+                number(check["spring_residual"]),
+                number(check["ladder"]),
+                DRIFT_BOUND if drifts else SPRING_BOUND,
+            ),
+            joints=tuple(map(JointReport.from_json, plain["joints"])),
+            drifts=tuple(map(JointDrift.from_json, drifts)),
+        )

@@ -1,0 +1,286 @@
+"""The report as text: headline, table, a sentence for each kind of trouble, what to know before a start."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+from vsacli.analysis.report import JointDrift, JointReport, Report, Worst
+from vsacli.analysis.self_check import LADDER_BOUND
+from vsacli.base.flags import Flag
+from vsacli.base.units import POSITION, TORQUE
+from vsacli.dynamics.energy import JointEnergy
+
+WIDTH = 78
+JOINTS_PER_LINE = 3
+
+HUGE = 1e8
+"""Torque or stiffness shown with an exponent, as next to a singular step."""
+
+QUANTITY_OF_LIMIT = {
+    Flag.POSITION_LIMIT.label: "position",
+    Flag.VELOCITY_LIMIT.label: "velocity",
+    Flag.STIFFNESS_LIMIT.label: "stiffness",
+    Flag.DEFLECTION_LIMIT.label: "deflection of spring",
+    Flag.MOTOR_VELOCITY_LIMIT.label: "joint-side velocity of motor",
+    Flag.MOTOR_TORQUE_LIMIT.label: "joint-side torque of motor",
+}
+
+TROUBLE = ("infeasible", "singular", "over_limit")
+"""Kinds that make the verdict worse than ok."""
+
+
+def render(report: Report) -> str:
+    """The report as lines of text, without a final newline."""
+    return "\n".join(
+        [
+            _headline(report),
+            *_table(report),
+            *remarks(report.warnings, report.notes),
+            *(sentence for joint in report.joints for sentence in sentences(joint)),
+            *_stops(report),
+            *_start(report),
+            *energy_lines([(joint.name, joint.type, joint.energy) for joint in report.joints]),
+            *_drift(report),
+            _self_check(report),
+        ]
+    )
+
+
+def remarks(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
+    """A line each, marked as what it is."""
+    yield from (f"warning: {warning}" for warning in warnings)
+    yield from (f"note: {note}" for note in notes)
+
+
+def sentences(joint: JointReport) -> Iterator[str]:
+    """One sentence for each kind of trouble of a joint, naming it."""
+    for kind, worst in joint.worst.items():
+        yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, worst)}"
+
+
+def _headline(report: Report) -> str:
+    left = f"{report.robot}, {report.trajectory}: {_count(report.samples)}, {report.duration:g} s"
+    if not report.complete:
+        left += " planned, stopped early"
+    return f"{left:<{WIDTH - 32}} {_verdict(report):>31}".rstrip()
+
+
+def _verdict(report: Report) -> str:
+    verdict = report.verdict
+    words = verdict.upper().replace("_", " ")
+    concerned = sum(1 for joint in report.joints if joint.steps.get(verdict))
+    return f"{words} ({concerned} of {len(report.joints)} joints)" if verdict in TROUBLE else words
+
+
+def _table(report: Report) -> Iterator[str]:
+    rows: list[tuple[str, ...]] = [
+        ("joint", "peak tau_e", "peak motor 1 / 2", "stiffness", "reachable", "margin")
+    ]
+    return aligned(rows + [_row(joint) for joint in report.joints])
+
+
+def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """The lines of a table: the first column to the left, the others to the right."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    for row in rows:
+        name, *cells = (
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        yield "   ".join([name, *cells])
+
+
+def _row(joint: JointReport) -> tuple[str, ...]:
+    torque = TORQUE.unit(joint.type)
+    motors = " / ".join(_number(peak) for peak in _of_motors(joint, joint.peak_tau_motor))
+    return (
+        joint.name,
+        f"{_number(joint.peak_tau_e)} {torque}",
+        f"{motors} {torque}",
+        _span(*joint.stiffness),
+        *((_corridor(*joint.reachable), _percent(joint.margin)) if _is_antagonistic(joint) else ("-", "-")),
+    )
+
+
+def _is_antagonistic(joint: JointReport) -> bool:
+    return joint.actuator == "antagonistic"
+
+
+def _of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
+    """Of a pair of numbers those of the motors that the joint has."""
+    return pair if _is_antagonistic(joint) else pair[:1]
+
+
+def _corridor(lower: float, upper: float) -> str:
+    if math.isnan(lower):
+        return "nothing"
+    return f"from {_number(lower)}" if math.isinf(upper) else f"{_number(lower)}-{_number(upper)}"
+
+
+def _span(low: float, high: float) -> str:
+    if math.isnan(low):
+        return "-"
+    return f"{low:.6g}" if low == high else f"{low:.6g}-{high:.6g}"
+
+
+def _number(value: float) -> str:
+    """One decimal for large numbers, three digits for small ones and for those that no machine has."""
+    return "-" if math.isnan(value) else f"{value:.1f}" if 10 <= abs(value) < HUGE else f"{value:.3g}"
+
+
+def _percent(share: float) -> str:
+    """Two decimals, or one digit of what is smaller."""
+    if math.isnan(share):
+        return "none"
+    return f"{100 * share:.2f} %" if abs(share) >= 1e-4 or share == 0 else f"{100 * share:.1g} %"
+
+
+def _apart(value: float, bound: float) -> tuple[str, str]:
+    """Both with as many digits as it takes to see how far they are apart, at least four."""
+    for digits in range(4, 17):
+        shown = _rounded(value, digits), _rounded(bound, digits)
+        if math.isclose(float(shown[0]) - float(shown[1]), value - bound, rel_tol=0.1):
+            return shown
+    return repr(value), repr(bound)
+
+
+def _rounded(value: float, digits: int) -> str:
+    """To so many significant digits, or to all those before the point."""
+    return f"{value:.{max(digits, len(f'{abs(value):.0f}'))}g}"
+
+
+def _time(time: float) -> str:
+    """Milliseconds, or microseconds where steps are that short."""
+    return f"{time:.3f} s" if abs(time - round(time, 3)) < 5e-7 else f"{time:.6f} s"
+
+
+def _count(steps: int) -> str:
+    return f"{steps} step" if steps == 1 else f"{steps} steps"
+
+
+def _steps(joint: JointReport, kind: str) -> str:
+    count = joint.steps[kind]
+    return _count(count) if count == 1 else f"{_count(count)}, from {_time(joint.first_time[kind])}"
+
+
+def _infeasible(joint: JointReport, worst: Worst) -> str:
+    steps = _steps(joint, "infeasible")
+    slack = f"; a tendon goes slack at {_count(joint.steps['slack'])}" if joint.steps["slack"] else ""
+    preload = "; the opposite preload would reach it" if joint.other_preload else ""
+    hints = f"({steps}){slack}{preload}"
+    if math.isnan(worst.bound):
+        return (
+            f"its springs cannot carry the elastic torque at t = {_time(worst.time)} at any stiffness {hints}"
+        )
+    value, bound = _apart(worst.value, worst.bound)
+    relation, remedy = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
+    return (
+        f"stiffness {value} {worst.unit} at t = {_time(worst.time)} is {relation} the {bound} "
+        f"its load allows, {remedy} it {hints}"
+    )
+
+
+def _singular(joint: JointReport, worst: Worst) -> str:
+    remedy = "lower" if worst.bound == joint.reachable[1] else "raise"
+    return (
+        f"stiffness {worst.value:.6g} {worst.unit} at t = {_time(worst.time)} is singular: "
+        f"motor torques are undefined at the end of its range, {remedy} it ({_steps(joint, 'singular')})"
+    )
+
+
+def _near_singular(joint: JointReport, worst: Worst) -> str:
+    gap = abs(worst.value - worst.bound) / worst.value
+    return (
+        f"warning: stiffness {worst.value:.6g} {worst.unit} at t = {_time(worst.time)} is {100 * gap:.2g} % "
+        f"from singular, where motor torques grow without bound ({_steps(joint, 'near_singular')})"
+    )
+
+
+def _limit(joint: JointReport, worst: Worst) -> str:
+    whose = QUANTITY_OF_LIMIT[worst.kind]
+    if worst.motor is not None:
+        whose += f" {worst.motor}"
+    value, bound = _apart(worst.value, worst.bound)
+    relation = "below" if worst.value < worst.bound else "above"
+    first = joint.first_time[worst.kind]
+    return (
+        f"{whose} is {value} {worst.unit} at t = {_time(worst.time)}, {relation} its limit {bound} "
+        f"(first at {_time(first)})"
+    )
+
+
+_SENTENCES = {"infeasible": _infeasible, "singular": _singular, "near_singular": _near_singular}
+
+
+def _start(report: Report) -> Iterator[str]:
+    yield _by_joint("start motors at: ", [_start_of(joint) for joint in report.joints])
+    steps = [(max(_of_motors(joint, joint.torque_step)), joint) for joint in report.joints]
+    defined = [entry for entry in steps if not math.isnan(entry[0])]
+    if defined:
+        step, joint = max(defined, key=lambda entry: entry[0])
+        yield f"torque step at start: {step:.3g} {TORQUE.unit(joint.type)} ({joint.name})"
+
+
+def _start_of(joint: JointReport) -> str:
+    positions = _of_motors(joint, joint.start_theta)
+    if any(map(math.isnan, positions)):
+        return f"{joint.name} undefined (first step infeasible)"
+    return f"{joint.name} {' '.join(f'{theta:+.4g}' for theta in positions)} {POSITION.unit(joint.type)}"
+
+
+def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str]:
+    """From names, types and energies of joints: sums, if all have them, and the joints with the most."""
+    energies = [energy for _, _, energy in joints]
+    if not any(math.isnan(energy.spent) for energy in energies):
+        spent, recovered = (
+            _number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
+        )
+        name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
+        held = f"; springs hold up to {_number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
+        yield f"energy: motors spend {spent} J, take back {recovered} J{held}"
+    paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
+    if paired:
+        name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
+        unit = TORQUE.unit(joint_type)
+        effort, load = f"{_number(most.co_contraction)} {unit}", f"{_number(most.load)} {unit}"
+        yield f"co-contraction: up to {effort} rms for each motor ({name}), its load takes {load}"
+
+
+def _stops(report: Report) -> Iterator[str]:
+    infeasible = {joint.name: joint.steps["infeasible"] for joint in report.joints}
+    for drift in report.drifts:
+        if drift.stop is not None:
+            time, reason = _time(drift.stop.time), drift.stop.reason
+            steps = f"infeasible: {_count(infeasible[drift.joint])}"
+            yield f"{drift.joint}: its deflections cannot be followed beyond t = {time}: {reason} ({steps})"
+
+
+def _drift(report: Report) -> Iterator[str]:
+    if report.drifts:
+        yield _by_joint("drift of the integration: ", [_drift_of(drift) for drift in report.drifts])
+
+
+def _drift_of(drift: JointDrift) -> str:
+    if math.isnan(drift.largest):
+        return f"{drift.joint} none (no step followed)"
+    return f"{drift.joint} {drift.largest:.1e} {drift.unit} at {_time(drift.time)}"
+
+
+def _by_joint(label: str, entries: Sequence[str]) -> str:
+    """What is to be said of each joint, a few to a line."""
+    lines = [
+        ", ".join(entries[first : first + JOINTS_PER_LINE])
+        for first in range(0, len(entries), JOINTS_PER_LINE)
+    ]
+    return label + (",\n" + " " * len(label)).join(lines)
+
+
+def _self_check(report: Report) -> str:
+    check = report.self_check
+    if check.passed:
+        return f"self-check passed ({check.ladder:.1g}, bound {LADDER_BOUND:.0e})"
+    return (
+        f"SELF-CHECK FAILED: derivatives are off by {check.ladder:.1e} (bound {LADDER_BOUND:.0e}), "
+        f"springs by {check.spring_residual:.1e} (bound {check.spring_bound:.0e}); do not use these torques"
+    )

@@ -1,0 +1,179 @@
+"""Inverse dynamics along a trajectory: the one place that walks over time, block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular, has
+from vsacli.analysis.report import Report
+from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
+from vsacli.analysis.summaries import JointTally
+from vsacli.base.arrays import AnyArray
+from vsacli.base.flags import Flag
+from vsacli.base.variables import Block
+from vsacli.compute.engine import choose
+from vsacli.dynamics.energy import RunEnergy
+from vsacli.dynamics.inverse import InverseDynamics, check_fit, compute_block, usual_block
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.analysis.drift import DriftTally
+    from vsacli.analysis.result import Result
+    from vsacli.dynamics.integrated_deflections import Following
+
+
+class Run:
+    """One pass over a trajectory: iterate it for the blocks, then ask it for the report.
+
+    Args:
+        robot: the robot.
+        trajectory: what it is asked to do.
+        stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does.
+        near_singular: margin below which a step is near-singular.
+        following: deflections to use, by `follow`, instead of the root of (14) at each step.
+        block_samples: steps in a block, as `usual_block` has it if None; results do not depend on it.
+        engine: what computes, one of `vsacli.compute.engine.NAMES`.
+        threads: of compiled code; as many as there are processors if None.
+
+    Attributes:
+        choice: the engine that was chosen, and why.
+
+    Raises:
+        InputError: the margin is none, the trajectory does not fit the robot, there is no such engine,
+            or no C compiler for it.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        trajectory: Trajectory,
+        *,
+        stop_on_infeasible: bool = False,
+        near_singular: float = NEAR_SINGULAR,
+        following: Following | None = None,
+        block_samples: int | None = None,
+        engine: str = "numpy",
+        threads: int | None = None,
+    ) -> None:
+        check_near_singular(near_singular)
+        check_fit(robot, trajectory)
+        self.robot = robot
+        self.trajectory = trajectory
+        self._stop_on_infeasible = stop_on_infeasible
+        self._near_singular = near_singular
+        self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
+        self._following = following
+        frame = None if trajectory.wrench is None else trajectory.wrench.frame
+        kernel = InverseDynamics(robot, frame, near_singular, following is not None)
+        self.choice = choose(engine, kernel, trajectory.samples, threads)
+        self._tallies = [JointTally(joint, index) for index, joint in enumerate(robot.joints)]
+        self._drifts = [] if following is None else _drift_tallies(robot, following)
+        self._energy = RunEnergy(robot)
+        self._spring_residual = 0.0
+        self._samples = 0
+
+    def __iter__(self) -> Iterator[Block]:
+        for start in range(0, self.trajectory.samples, self._block_samples):
+            stop = min(start + self._block_samples, self.trajectory.samples)
+            motion = self.trajectory.block(start, stop)
+            followed = None if self._following is None else self._following.at(motion.time)
+            block = compute_block(self.robot, motion, self._near_singular, followed, self.choice.engine)
+            infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
+            if self._stop_on_infeasible and infeasible.any():
+                yield self._added(_shortened(block, int(infeasible.argmax()) + 1))
+                return
+            yield self._added(block)
+
+    def _added(self, block: Block) -> Block:
+        """The block with the energy that the motors have spent, once it is merged into the report."""
+        self._samples += len(block.time)
+        self._spring_residual = float(np.maximum(self._spring_residual, spring_residual(self.robot, block)))
+        for tally in self._tallies:
+            tally.add(block)
+        for drift in self._drifts:
+            drift.add(block)
+        return replace(block, motor_energy=self._energy.add(block))
+
+    def report(self) -> Report:
+        """The verdict on the blocks so far, with the self-check of the whole."""
+        return Report(
+            robot=self.robot.name,
+            trajectory=self.trajectory.name,
+            samples=self._samples,
+            duration=self.trajectory.duration,
+            complete=self._samples == self.trajectory.samples,
+            warnings=(*self.robot.warnings, *self.trajectory.warnings),
+            notes=self.trajectory.notes,
+            self_check=self._self_check(),
+            joints=tuple(map(JointTally.report, self._tallies, self._energy.report())),
+            drifts=tuple(drift.report() for drift in self._drifts),
+            fits=self.trajectory.fits,
+        )
+
+    def _self_check(self) -> SelfCheck:
+        """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
+        bound = SPRING_BOUND if self._following is None else DRIFT_BOUND
+        found = ladder(self.robot, self.trajectory, self.choice.engine)
+        return SelfCheck(self._spring_residual, found, bound)
+
+
+def inverse_dynamics(
+    robot: Robot,
+    trajectory: Trajectory,
+    *,
+    stop_on_infeasible: bool = False,
+    following: Following | None = None,
+    engine: str = "numpy",
+) -> Result:
+    """Motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
+
+    Pure: prints nothing, writes nothing; but compiled code is kept in the user's cache folder.
+
+    Args:
+        robot: the robot, from `load_robot` or built in Python.
+        trajectory: for this robot, from `load_trajectory` or `Trajectory.from_samples`.
+        stop_on_infeasible: end with the first infeasible step.
+        following: deflections to use, by `follow`, instead of the root of (14) at each step.
+        engine: what computes, "numpy", compiled "c", or "auto", which takes the latter where that saves
+            time.
+
+    Returns:
+        Every variable of `Block` over (samples, joints[, 2]); `report` holds the verdict.
+
+    Raises:
+        InputError: the trajectory has another number of joints than the robot, or no stiffness for a joint
+            that needs one; there is no such engine, or no C compiler for it.
+    """
+    from vsacli.analysis.result import Result
+
+    run = Run(robot, trajectory, stop_on_infeasible=stop_on_infeasible, following=following, engine=engine)
+    return Result(**_joined(list(run)), report=run.report(), joint_names=robot.joint_names)
+
+
+def _drift_tallies(robot: Robot, following: Following) -> list[DriftTally]:
+    from vsacli.analysis.drift import DriftTally
+
+    pairs = zip(robot.joints, following.stops, strict=True)
+    return [
+        DriftTally(joint, joint.actuator, index, stop)
+        for index, (joint, stop) in enumerate(pairs)
+        if isinstance(joint.actuator, Antagonistic)
+    ]
+
+
+def _shortened(block: Block, samples: int) -> Block:
+    return Block(**{name: array[:samples] for name, array in block.arrays().items()})
+
+
+def _joined(blocks: list[Block]) -> dict[str, AnyArray]:
+    """Blocks one after the other, samples contiguous."""
+    rows = [{name: np.moveaxis(array, 0, -1) for name, array in block.arrays().items()} for block in blocks]
+    return {
+        name: np.moveaxis(np.concatenate([row[name] for row in rows], axis=-1), -1, 0) for name in rows[0]
+    }

@@ -1,0 +1,187 @@
+"""The check every run makes of itself: do the numbers satisfy what they were computed from?"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import SIDES, motors_and_springs
+from vsacli.actuators.reach import has, margin
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.flags import Flag
+from vsacli.base.variables import Block
+from vsacli.compute.engine import NUMPY, Engine
+from vsacli.dynamics.inverse import compute_block
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+SPRING_BOUND = 1e-11
+"""Bound on the scaled residual of (14); solutions reach 1e-15, and 1e-12 is asked of them."""
+
+DRIFT_BOUND = 1e-6
+"""The same where the deflections are followed by integration: below what spring constants are known to."""
+
+LADDER_BOUND = 1e-8
+"""Bound on derivative errors relative to their peak: a hundred times what rounding leaves, a millionth of
+1 %."""
+
+
+class Rung(NamedTuple):
+    """A variable, its derivative, and the variable of which that is the derivative of an order."""
+
+    value: str
+    derivative: str
+    whole: str
+    order: int
+
+
+RUNGS = (
+    Rung("tau_e", "dtau_e", "tau_e", 1),
+    Rung("dtau_e", "ddtau_e", "tau_e", 2),
+    Rung("phi", "dphi", "phi", 1),
+    Rung("theta", "dtheta", "theta", 1),
+    Rung("dtheta", "ddtheta", "theta", 2),
+)
+"""What is compared; the deflections by themselves, since the motion of the joint can hide them in theta."""
+
+PROBES = 200
+"""About how many times are probed."""
+
+STEP_SCALES = np.array([8.0**-power for power in range(5)])
+"""Difference steps tried at each time; the best counts, since a wrong derivative is wrong at every step.
+
+The smallest are for motions that leave the corridor within a thousandth of their duration.
+"""
+
+FIRST_SCALES = STEP_SCALES[:2]
+"""Those that are tried first: for most motions the smaller ones only add rounding."""
+
+CLEAR = 1e-10
+"""Error at which smaller steps are not tried any more, a hundredth of the bound."""
+
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
+"""Central first difference of sixth order over the offsets -3..3."""
+
+SMALL_JOINT = 1e-3
+"""Share of the largest joint's peak against which smaller joints are measured: what is below may be nothing
+but rounding of the larger torques."""
+
+
+class SelfCheck(NamedTuple):
+    """Outcome of the self-check.
+
+    Attributes:
+        spring_residual: largest scaled residual of (14); NaN, like `ladder`, if a number is missing.
+        ladder: largest relative error of a derivative against differences of what it derives.
+        spring_bound: bound on the residual of (14).
+    """
+
+    spring_residual: float
+    ladder: float
+    spring_bound: float = SPRING_BOUND
+
+    @property
+    def passed(self) -> bool:
+        """Whether both are within their bounds."""
+        return self.spring_residual <= self.spring_bound and self.ladder <= LADDER_BOUND
+
+
+def spring_residual(robot: Robot, block: Block) -> float:
+    """Largest scaled residual of (14) on the regular steps, from the laws evaluated at phi.
+
+    Scaled as |sum tau_k - tau_e| / sum |tau_k| and |sum sigma_k - sigma| / sigma. An elastic joint has one
+    linear law; a rigid one has none, and so no residual.
+    """
+    errors = []
+    for index, joint in enumerate(robot.joints):
+        laws = [law for _, law in motors_and_springs(joint.actuator) if law is not None]
+        if not laws:
+            continue
+        regular = ~has(block.flags[:, index], Flag.INFEASIBLE | Flag.SINGULAR)
+        phi, tau_e = block.phi[regular, index], block.tau_e[regular, index]
+        stiffness = block.stiffness[regular, index]
+        tau = np.stack([law.torque(phi[:, side]) for side, law in enumerate(laws)])
+        sigma = np.stack([law.stiffness(phi[:, side]) for side, law in enumerate(laws)])
+        torque_error = np.abs(tau.sum(axis=0) - tau_e)
+        size = np.maximum(np.abs(tau).sum(axis=0), np.finfo(float).tiny)
+        errors += [torque_error / size, np.abs(sigma.sum(axis=0) - stiffness) / stiffness]
+    return float(np.max(np.concatenate([np.zeros(1), *errors])))
+
+
+def ladder(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> float:
+    """Largest error of a derivative of `RUNGS` against first differences, relative to its peak.
+
+    Differences are taken at about 200 times with steps of their own, over which the trajectory is analytic.
+    Motor motion is compared where it is smooth over the difference. The engine is that of the run.
+    """
+    error, everywhere = _ladder(robot, trajectory, engine, FIRST_SCALES)
+    if everywhere and error <= CLEAR:
+        return error
+    return _ladder(robot, trajectory, engine, STEP_SCALES)[0]
+
+
+def _ladder(robot: Robot, trajectory: Trajectory, engine: Engine, scales: FloatArray) -> tuple[float, bool]:
+    """The error by the best of some difference steps; whether all motors could be compared at all times."""
+    times, reach = trajectory.check_points(PROBES)
+    steps = scales[:, None] * np.minimum(reach / 3, trajectory.duration / 500)
+    grid = times + steps[:, None, :] * np.arange(-3, 4)[None, :, None]
+    block = compute_block(robot, trajectory.at(grid.ravel()), engine=engine)
+    smooth = _motors_move_smoothly(block, grid.shape)
+    motors = np.array([len(motors_and_springs(joint.actuator)) for joint in robot.joints])
+    absent = np.arange(SIDES) >= motors[:, None]
+
+    def on_grid(name: str) -> FloatArray:
+        values: FloatArray = getattr(block, name).reshape(*grid.shape, len(robot.joints), -1)
+        return values if name.endswith("tau_e") else np.where(absent, 0.0, values)
+
+    errors = [
+        _rung_error(
+            on_grid(rung.value),
+            on_grid(rung.derivative),
+            steps,
+            np.ones_like(smooth) if rung.value.endswith("tau_e") else smooth,
+            np.abs(on_grid(rung.whole)) / trajectory.duration**rung.order,
+        )
+        for rung in RUNGS
+    ]
+    return float(np.max(errors)), bool(smooth.any(axis=0).all())
+
+
+def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
+    """Over which differences, (scales, times, joints), of a block of the shape (scales, offsets, times).
+
+    No step is infeasible, singular or near-singular, and the margin changes by less than a tenth: the motors'
+    motion has features as short as the way to the end of the corridor.
+    """
+    troubled = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
+    gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper).reshape(*shape, -1)
+    hasty = np.ptp(gap, axis=1) > gap[:, shape[1] // 2] / 10
+    smooth: BoolArray = ~(np.any(troubled, axis=1) | hasty)
+    return smooth
+
+
+def _rung_error(
+    values: FloatArray, derivatives: FloatArray, steps: FloatArray, compared: BoolArray, slowest: FloatArray
+) -> float:
+    """Error of a derivative over its peak.
+
+    Args:
+        values: of what is derived, (scales, offsets, times, joints, motors).
+        derivatives: that are to be checked, likewise.
+        steps: (scales, times), s.
+        compared: (scales, times, joints).
+        slowest: |derivative| if the change took the whole trajectory; below may be only rounding.
+    """
+    difference = np.einsum("o,sotjm->stjm", WEIGHTS, values) / steps[:, :, None, None]
+    error = np.where(compared[..., None], np.abs(difference - derivatives[:, 3]), np.inf).min(axis=0)
+    valid: BoolArray = np.any(compared, axis=0)
+    peak = np.maximum(_peak(derivatives[0, 3], valid), _peak(slowest[0, 3], valid))
+    scale = np.maximum(peak, SMALL_JOINT * peak.max())
+    error = np.where(valid[..., None], error, 0.0)
+    return float(np.max(np.divide(error, scale, out=np.zeros_like(error), where=scale != 0)))
+
+
+def _peak(values: FloatArray, valid: BoolArray) -> FloatArray:
+    peak: FloatArray = np.max(np.abs(values), axis=0, where=valid[..., None], initial=0.0)
+    return peak

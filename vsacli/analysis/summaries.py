@@ -1,0 +1,157 @@
+"""Merges blocks of steps into the report of a joint: counts, first times, worst steps, peaks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do
+from vsacli.actuators.reach import TOUCHING, excess, has, margin
+from vsacli.actuators.rigid import Rigid
+from vsacli.analysis.report import COUNTED, JointReport, Worst
+from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.variables import MOTORS, VARIABLES, Block
+from vsacli.dynamics.energy import JointEnergy
+from vsacli.dynamics.limits import limit_checks
+from vsacli.robot.model import Joint
+
+REACH = {kind: COUNTED[kind] for kind in ("infeasible", "singular", "near_singular")}
+"""Kinds of trouble whose worst step is the one with the smallest margin."""
+
+
+class JointTally:
+    """Running record of one joint; `add` blocks in order, then ask for the `report`."""
+
+    def __init__(self, joint: Joint, index: int) -> None:
+        self._joint = joint
+        self._index = index
+        self._steps = dict.fromkeys(COUNTED, 0)
+        self._first_time: dict[str, float] = {}
+        self._worst: dict[str, tuple[float, Worst]] = {}
+        self._margin = (math.inf, math.nan, (math.nan, math.nan))
+        self._stiffness = (math.nan, math.nan)
+        self._peaks = np.full(3, np.nan)
+        self._start: FloatArray | None = None
+        self._other_preload = True
+
+    def add(self, block: Block) -> None:
+        """Merge a block of steps."""
+        index = self._index
+        flags = block.flags[:, index]
+        stiffness = block.stiffness[:, index]
+
+        if self._start is None:
+            self._start = np.stack((block.theta[0, index], self._torque_step(block)))
+        self._count(flags, block.time)
+        if isinstance(self._joint.actuator, Antagonistic):
+            self._add_reach(self._joint.actuator, flags, block)
+        self._record_limits(flags, block)
+        least, most = self._stiffness
+        self._stiffness = np.fmin(least, stiffness.min()), np.fmax(most, stiffness.max())
+        peaks = np.abs(block.tau_e[:, index]), *np.abs(block.tau_motor[:, index]).T
+        self._peaks = np.fmax(self._peaks, [np.fmax.reduce(values) for values in peaks])
+
+    def _add_reach(self, actuator: Antagonistic, flags: FlagArray, block: Block) -> None:
+        """Merge what there is to say about the corridor."""
+        index = self._index
+        stiffness = block.stiffness[:, index]
+        corridor = block.stiffness_lower[:, index], block.stiffness_upper[:, index]
+        # A step whose torque cannot be carried at all is worse than any margin.
+        gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
+        self._record_margin(gap, block.time, corridor)
+        self._record_reach(flags, gap, block)
+        beyond = gap < -TOUCHING
+        if self._other_preload and beyond.any():
+            demand = block.tau_e[beyond, index], stiffness[beyond]
+            self._other_preload = bool(other_preload_would_do(actuator, *demand).all())
+
+    def report(self, energy: JointEnergy) -> JointReport:
+        """What was found so far, besides the energy; at least one block must have been added."""
+        assert self._start is not None
+        least, time, reachable = self._margin
+        (theta_1, theta_2), (step_1, step_2) = self._start.tolist()
+        peak_tau_e, peak_1, peak_2 = self._peaks.tolist()
+        return JointReport(
+            name=self._joint.name,
+            type=self._joint.type,
+            actuator=self._joint.actuator_type,
+            steps=dict(self._steps),
+            first_time=dict(self._first_time),
+            worst={kind: worst for kind, (_, worst) in self._worst.items()},
+            margin=least if math.isfinite(least) else math.nan,
+            margin_time=time,
+            reachable=reachable,
+            stiffness=(float(self._stiffness[0]), float(self._stiffness[1])),
+            peak_tau_e=peak_tau_e,
+            peak_tau_motor=(peak_1, peak_2),
+            start_theta=(theta_1, theta_2),
+            torque_step=(step_1, step_2),
+            other_preload="infeasible" in self._worst and self._other_preload,
+            energy=energy,
+        )
+
+    def _count(self, flags: FlagArray, time: FloatArray) -> None:
+        for kind, bits in COUNTED.items():
+            hit = has(flags, bits)
+            if hit.any():
+                self._steps[kind] += int(hit.sum())
+                self._first_time.setdefault(kind, float(time[hit.argmax()]))
+
+    def _record_margin(
+        self, gap: FloatArray, time: FloatArray, corridor: tuple[FloatArray, FloatArray]
+    ) -> None:
+        step = int(gap.argmin())
+        if gap[step] < self._margin[0]:
+            self._margin = (
+                float(gap[step]),
+                float(time[step]),
+                (float(corridor[0][step]), float(corridor[1][step])),
+            )
+
+    def _record_reach(self, flags: FlagArray, gap: FloatArray, block: Block) -> None:
+        """Followed deflections may end inside the corridor; such a step is infeasible, but has no worst."""
+        beyond = gap < -TOUCHING
+        for kind, bits in REACH.items():
+            hit = has(flags, bits) & (beyond if kind == "infeasible" else ~beyond)
+            for step in _worst_step(hit, -gap):
+                value, lower, upper = (
+                    float(getattr(block, name)[step, self._index])
+                    for name in ("stiffness", "stiffness_lower", "stiffness_upper")
+                )
+                bound = lower if value - lower <= upper - value or math.isnan(lower) else upper
+                unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
+                self._keep(-gap[step], Worst(kind, float(block.time[step]), value, bound, unit))
+
+    def _record_limits(self, flags: FlagArray, block: Block) -> None:
+        for check in limit_checks(self._joint):
+            values = getattr(block, check.variable)[:, self._index]
+            values = values if check.motor is None else values[:, check.motor - 1]
+            over = np.nan_to_num(excess(values, check.range), nan=-np.inf)
+            hit = has(flags, check.flag) & (over > 0)
+            for step in _worst_step(hit, over):
+                label = check.flag.label
+                value, (lower, upper) = float(values[step]), check.range
+                bound = lower if value < lower else upper
+                unit = VARIABLES[check.variable].quantity.unit(self._joint.type)
+                first = float(block.time[hit.argmax()])
+                self._first_time[label] = min(first, self._first_time.get(label, first))  # either motor
+                self._keep(over[step], Worst(label, float(block.time[step]), value, bound, unit, check.motor))
+
+    def _torque_step(self, block: Block) -> FloatArray:
+        """Of motors behind springs, whose torques do not jump."""
+        if isinstance(self._joint.actuator, Rigid):
+            return np.full(len(MOTORS), np.nan)
+        step: FloatArray = np.abs(block.tau_motor[0, self._index] - block.tau_spring[0, self._index])
+        return step
+
+    def _keep(self, badness: float, worst: Worst) -> None:
+        if worst.kind not in self._worst or badness > self._worst[worst.kind][0]:
+            self._worst[worst.kind] = (badness, worst)
+
+
+def _worst_step(hit: BoolArray, badness: FloatArray) -> Iterator[int]:
+    """The step with the largest badness among those hit, if there is one."""
+    if hit.any():
+        yield int(np.where(hit, badness, -np.inf).argmax())

@@ -1,0 +1,88 @@
+"""What can go wrong, as exceptions that carry data and build their own sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+
+class VsacliError(Exception):
+    """Root of every error the tool raises on purpose."""
+
+
+class Problem(NamedTuple):
+    """One thing wrong with an input: where it stands and what is expected there.
+
+    Attributes:
+        file: path as the user gave it, or "" for values that came from Python.
+        line: line number from 1, or 0 if the problem concerns the whole file.
+        message: what is wrong, what was expected, how to mend it; no full stop at the end.
+    """
+
+    file: str
+    line: int
+    message: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
+        return place + self.message
+
+
+class InputError(VsacliError, ValueError):
+    """An input file, or a value given from Python, cannot be used. Carries every problem found."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(str(problem) for problem in self.problems))
+
+    @classmethod
+    def one(cls, message: str, file: str | Path = "", line: int = 0) -> InputError:
+        """An error with a single problem."""
+        return cls([Problem(str(file), line, message)])
+
+
+class FieldProblem(NamedTuple):
+    """A field of a record that cannot hold its value.
+
+    Attributes:
+        path: leads to the field, e.g. ("inertia", "xx"); numbers are indices in lists, and of joints.
+        message: as in `Problem`.
+        joint: index of the joint it concerns, if it is one of them; a file reader knows its name.
+    """
+
+    path: tuple[str | int, ...]
+    message: str
+    joint: int | None = None
+
+    def __str__(self) -> str:
+        return self._sentence(map(str, self.path), None if self.joint is None else str(self.joint + 1))
+
+    def in_file(self, joints: Sequence[str]) -> str:
+        """The same sentence with names of joints, and without indices in lists, since the line is known."""
+        keys = (step for step in self.path if isinstance(step, str))
+        return self._sentence(keys, None if self.joint is None else joints[self.joint])
+
+    def _sentence(self, path: Iterable[str], joint: str | None) -> str:
+        where = " of joint ".join(filter(None, [".".join(path), joint]))
+        return f"{where}: {self.message}" if where else self.message
+
+    def inside(self, *outer: str | int) -> FieldProblem:
+        """The same, seen from a record that holds this one; `outer` leads to it."""
+        return self._replace(path=(*outer, *self.path))
+
+
+class InvalidRecordError(InputError):
+    """A record was built with values it cannot have. A file reader adds file and line to each problem."""
+
+    def __init__(self, record: str, fields: Iterable[FieldProblem]) -> None:
+        self.fields = tuple(fields)
+        super().__init__(Problem("", 0, f"{record}: {field}") for field in self.fields)
+
+
+class StorageError(VsacliError):
+    """A file cannot be written or read: disk full, permission, a name that is taken."""
+
+    def __init__(self, path: str | Path, message: str) -> None:
+        self.path = str(path)
+        super().__init__(f"{path}: {message}")

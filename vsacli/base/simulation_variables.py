@@ -1,0 +1,45 @@
+"""The variables of a simulation: those of the inverse dynamics as commanded, as they were, and apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from vsacli.base.variables import VARIABLES, Variable
+
+COMMANDED = ("q", "dq", "ddq", "stiffness", "dstiffness")
+ACTUAL = (
+    *COMMANDED,
+    *("tau_e", "phi", "dphi", "theta", "dtheta", "tau_spring", "tau_motor"),
+    *("elastic_energy", "motor_power", "motor_energy", "det_A"),
+)
+ERRORS = ("q", "dq", "stiffness", "dstiffness")
+
+
+def actual(name: str) -> str:
+    """Name under which the actual value of a variable is stored."""
+    return f"{name}_actual"
+
+
+def error(name: str) -> str:
+    """Name under which the error of a variable is stored, actual minus commanded."""
+    return f"{name}_error"
+
+
+def _declared() -> Iterator[Variable]:
+    yield VARIABLES["time"]
+    yield from (VARIABLES[name] for name in COMMANDED)
+    yield VARIABLES["tau_motor"]._replace(
+        long_name="motor torque that the controller asks for", equation="controller"
+    )
+    for name in ACTUAL:
+        was = VARIABLES[name]
+        words = was.long_name.replace("commanded ", "")
+        yield was._replace(name=actual(name), long_name=f"{words}, as it was", equation="(5)")
+    for name in ERRORS:
+        words = VARIABLES[name].long_name.replace("commanded ", "")
+        yield VARIABLES[name]._replace(name=error(name), long_name=f"{words}, actual minus commanded")
+    yield VARIABLES["flags"]._replace(equation="state")
+
+
+SIMULATION_VARIABLES: dict[str, Variable] = {variable.name: variable for variable in _declared()}
+"""Every variable of a simulation by name, `time` first."""

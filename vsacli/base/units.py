@@ -1,0 +1,75 @@
+"""Units of joint quantities, which differ between revolute and prismatic joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A joint quantity and its SI unit at a revolute and at a prismatic joint."""
+
+    revolute: str
+    prismatic: str
+
+    def unit(self, joint_type: str) -> str:
+        """Unit at a joint of the type "revolute" or "prismatic"."""
+        return self.revolute if joint_type == "revolute" else self.prismatic
+
+    def __str__(self) -> str:
+        if self.revolute == self.prismatic:
+            return self.revolute
+        return f"{self.revolute} ({self.prismatic} if prismatic)"
+
+
+class WrenchQuantity(Quantity):
+    """A wrench or a rate of it; its moments have the unit `revolute`, its forces the unit `prismatic`."""
+
+    def unit(self, _joint_type: str) -> str:
+        """Both units, whatever the joint."""
+        return str(self)
+
+    def __str__(self) -> str:
+        return f"{self.prismatic} (forces), {self.revolute} (moments)"
+
+
+def constant(unit: str) -> Quantity:
+    """A quantity whose unit is the same at every joint."""
+    return Quantity(unit, unit)
+
+
+TIME = constant("s")
+ANGLE = constant("rad")
+LENGTH = constant("m")
+MASS = constant("kg")
+INERTIA = constant("kg m^2")
+ACCELERATION = constant("m/s^2")
+RATE = constant("1/s")
+DIMENSIONLESS = constant("1")
+
+POSITION = Quantity("rad", "m")
+VELOCITY = Quantity("rad/s", "m/s")
+JOINT_ACCELERATION = Quantity("rad/s^2", "m/s^2")
+JERK = Quantity("rad/s^3", "m/s^3")
+SNAP = Quantity("rad/s^4", "m/s^4")
+TORQUE = Quantity("N m", "N")
+TORQUE_RATE = Quantity("N m/s", "N/s")
+TORQUE_ACCELERATION = Quantity("N m/s^2", "N/s^2")
+WRENCH = WrenchQuantity("N m", "N")
+WRENCH_RATE = WrenchQuantity("N m/s", "N/s")
+WRENCH_ACCELERATION = WrenchQuantity("N m/s^2", "N/s^2")
+STIFFNESS = Quantity("N m/rad", "N/m")
+STIFFNESS_RATE = Quantity("N m/(rad s)", "N/(m s)")
+STIFFNESS_ACCELERATION = Quantity("N m/(rad s^2)", "N/(m s^2)")
+CUBIC_STIFFNESS = Quantity("N m/rad^3", "N/m^3")
+INVERSE_POSITION = Quantity("1/rad", "1/m")
+QUADRATIC_STIFFNESS = Quantity("N m/rad^2", "N/m^2")
+FIFTH_STIFFNESS = Quantity("N m/rad^5", "N/m^5")
+SEVENTH_STIFFNESS = Quantity("N m/rad^7", "N/m^7")
+NINTH_STIFFNESS = Quantity("N m/rad^9", "N/m^9")
+DAMPING = Quantity("N m s/rad", "N s/m")
+MOTOR_INERTIA = Quantity("kg m^2", "kg")
+GEAR_RATIO = Quantity("1", "rad/m")
+ENERGY = constant("J")
+POWER = constant("W")
+DECOUPLING = Quantity("N^2 m^2/rad^3", "N^2/m^3")

@@ -1,0 +1,60 @@
+"""The wrench that the environment exerts on the end effector, over samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError
+
+WRENCH_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
+"""Components: the force, and the moment about the origin of the tool frame."""
+
+WRENCH_NAMES = ("wrench", "dwrench", "ddwrench")
+"""The wrench and its derivatives, as in `Wrench`, files and results."""
+
+WRENCH_FRAMES = ("end_effector", "base")
+"""Frames along whose axes the components may be given."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wrench:
+    """What the environment exerts on the end effector.
+
+    Attributes:
+        wrench: force and moment about the origin of the tool frame, (samples, 6), or (6,) at one instant, by
+            `WRENCH_AXES`; N and N m, as are the derivatives per s^k.
+        dwrench: first time derivative of these components.
+        ddwrench: second time derivative of these components.
+        frame: along whose axes the components are, one of `WRENCH_FRAMES`.
+    """
+
+    wrench: FloatArray
+    dwrench: FloatArray
+    ddwrench: FloatArray
+    frame: str = field(default="end_effector", kw_only=True)
+
+    def __post_init__(self) -> None:
+        check_frame(self.frame)
+
+    def mapped(self, function: Callable[[FloatArray, int], FloatArray]) -> Wrench:
+        """The wrench with a function applied to each array and its order of derivation."""
+        arrays = (function(getattr(self, name), order) for order, name in enumerate(WRENCH_NAMES))
+        return Wrench(*arrays, frame=self.frame)
+
+
+def check_frame(frame: str) -> None:
+    """Refuse a word that is no frame of a wrench.
+
+    Raises:
+        InputError: naming the nearest one that is.
+    """
+    if frame not in WRENCH_FRAMES:
+        raise InputError.one(f"unknown frame {frame!r} of the wrench{did_you_mean(frame, WRENCH_FRAMES)}")
+
+
+def wrench_columns(name: str) -> list[str]:
+    """CSV headers of the wrench or of a derivative of it, e.g. `dfx` for `dwrench`."""
+    return [name.removesuffix("wrench") + axis for axis in WRENCH_AXES]

@@ -1,0 +1,107 @@
+"""Which engine is worth its while."""
+
+from __future__ import annotations
+
+import os
+from typing import NamedTuple
+
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError
+from vsacli.compute.engine.engines import CompiledEngine, Engine, NumPyEngine
+from vsacli.compute.engine.kernel import Kernel
+
+NAMES = ("numpy", "c", "auto")
+"""Engines that may be asked for."""
+
+NUMPY_SECONDS = 0.9e-9
+"""What NumPy takes for an operation on a sample."""
+
+COMPILER_SECONDS = (0.25, 2.5e-8)
+"""What the compiler takes to start, and the square of the operations times this."""
+
+LOOK_FROM = 20_000
+"""Samples with which it is busy for longer than it takes to see whether there is compiled code."""
+
+RECORD_FROM = 100_000
+"""Samples from which on NumPy saves more time with a recorded program than recording it takes."""
+
+NUMPY: Engine = NumPyEngine()
+
+
+class Choice(NamedTuple):
+    """An engine.
+
+    Attributes:
+        engine: it.
+        reason: what computes, and why; a clause.
+        remarks: what was wrong on the way to it.
+    """
+
+    engine: Engine
+    reason: str
+    remarks: tuple[str, ...] = ()
+
+
+def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) -> Choice:
+    """The engine for a computation.
+
+    Args:
+        name: one of `NAMES`; "auto" takes compiled code where that saves time.
+        kernel: what is computed.
+        samples: over how many samples.
+        threads: of compiled code; as many as there are processors if None.
+
+    Raises:
+        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works, or
+            nothing that it could compile.
+    """
+    if name not in NAMES:
+        raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
+    if name == "numpy":
+        return Choice(_numpy(samples), "NumPy computes, as asked for")
+    if name == "auto" and samples < LOOK_FROM:
+        return Choice(NUMPY, f"NumPy computes: {samples} samples are few")
+    from vsacli.compute.engine.compiler import CompilerError, system_compiler
+
+    threads = threads or _processors()
+    remarks: list[str] = []
+    try:
+        engine = CompiledEngine(system_compiler(), threads, remarks.append)
+        loaded = engine.prepare(kernel, lambda operations: name == "c" or _repays(operations, samples))
+    except CompilerError as error:
+        if name == "c":
+            raise InputError.one(f"{error}; the engine numpy needs none") from error
+        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(remarks))
+    except NotImplementedError as error:
+        if name == "c":
+            raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
+        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(remarks))
+    if loaded is None:
+        return Choice(
+            _numpy(samples), f"NumPy computes: {samples} samples would not repay compiling", tuple(remarks)
+        )
+    when = "now" if loaded.compiled else "before"
+    return Choice(engine, f"C code computes, compiled {when}, in {_counted(threads)}", tuple(remarks))
+
+
+def _repays(operations: int, samples: int) -> bool:
+    """Whether NumPy would be busy for longer than the compiler."""
+    start, growth = COMPILER_SECONDS
+    return operations * samples * NUMPY_SECONDS > start + growth * operations**2
+
+
+def _numpy(samples: int) -> Engine:
+    if samples < RECORD_FROM:
+        return NUMPY
+    from vsacli.compute.engine.row_engine import RecordedEngine
+
+    return RecordedEngine()
+
+
+def _counted(threads: int) -> str:
+    return f"{threads} threads" if threads > 1 else "1 thread"
+
+
+def _processors() -> int:
+    """Those that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

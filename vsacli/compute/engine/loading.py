@@ -1,0 +1,95 @@
+"""From a kernel to machine code: recorded, compiled unless it was before, loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+from vsacli.compute.engine.cache import LIBRARY, Cache, CacheError, key_of, open_cache
+from vsacli.compute.engine.compiler import Compiler
+from vsacli.compute.engine.kernel import Kernel, operations, record
+from vsacli.compute.engine.lanes import batch_source
+from vsacli.compute.engine.library import Library
+
+Tell = Callable[[str], None]
+"""Receives a message for the user."""
+
+Build = Callable[[int], bool]
+"""Says whether code of so many operations shall be compiled."""
+
+
+class Loaded(NamedTuple):
+    """A library, and whether it had to be compiled for this process."""
+
+    library: Library
+    compiled: bool
+
+
+def load(kernel: Kernel, compiler: Compiler, tell: Tell, build: Build) -> Loaded | None:
+    """The library of a kernel.
+
+    Args:
+        kernel: what it computes.
+        compiler: what compiles it.
+        tell: learns what is wrong with the cache, which is no reason to fail.
+        build: whether to compile so many operations if they are not in the cache; else there may be none.
+
+    Raises:
+        CompilerError: it cannot be compiled or loaded.
+    """
+    source, count = _source(kernel)
+    key = key_of(source, compiler.identity)
+    if key not in _loaded:
+        cache = _opened(tell)
+        path = None if cache is None else _found(cache, key, tell)
+        if path is not None:
+            _loaded[key] = Loaded(Library(path, kernel.outputs), compiled=False)
+        elif build(count):
+            _loaded[key] = Loaded(_built(source, key, kernel.outputs, compiler, cache, tell), compiled=True)
+    return _loaded.get(key)
+
+
+_loaded: dict[str, Loaded] = {}
+"""What this process has loaded, by its key."""
+
+
+@lru_cache(maxsize=32)
+def _source(kernel: Kernel) -> tuple[str, int]:
+    """The code of a kernel, and how many operations it has."""
+    listing = record(kernel)
+    return batch_source(listing), operations(listing)
+
+
+def _opened(tell: Tell) -> Cache | None:
+    try:
+        return open_cache()
+    except CacheError as error:
+        tell(f"{error}; compiled code is not kept")
+        return None
+
+
+def _found(cache: Cache, key: str, tell: Tell) -> Path | None:
+    try:
+        return cache.find(key)
+    except CacheError as error:
+        tell(str(error))
+        return None
+
+
+def _built(
+    source: str, key: str, outputs: int, compiler: Compiler, cache: Cache | None, tell: Tell
+) -> Library:
+    with TemporaryDirectory(prefix="vsacli-") as folder:
+        text, library = Path(folder) / "program.c", Path(folder) / LIBRARY
+        text.write_text(source, encoding="utf-8")
+        compiler.build(text, library)
+        loaded = Library(library, outputs)
+        if cache is not None:
+            try:
+                cache.store(key, library)
+            except CacheError as error:
+                tell(f"{error}; compiled code is not kept")
+        return loaded

@@ -1,0 +1,149 @@
+"""Arrays of symbols and constants that NumPy's functions accept, so that one text computes and records."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from numpy.lib.mixins import NDArrayOperatorsMixin
+
+from vsacli.compute.tracing.functions import FUNCTIONS, STRUCTURAL
+from vsacli.compute.tracing.symbol import Kind, Operand, Symbol
+from vsacli.compute.tracing.tape import Tape
+from vsacli.compute.tracing.ufuncs import apply
+
+Cells = npt.NDArray[np.object_]
+
+
+class TracedArray(NDArrayOperatorsMixin):
+    """An array whose entries are symbols or constants, by the protocols of NumPy (NEP 13 and 18).
+
+    A row of samples is an array (1,): what NumPy broadcasts along samples is broadcast along the one.
+
+    Attributes:
+        tape: where operations are recorded.
+        cells: the entries.
+    """
+
+    def __init__(self, tape: Tape, cells: Any) -> None:
+        self.tape = tape
+        self.cells: Cells = np.asarray(cells, dtype=object)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> TracedArray:
+        out = options.pop("out", (None,))[0]
+        cells = apply(self.tape, ufunc, method, [cells_of(array) for array in inputs], options)
+        if out is None:
+            return TracedArray(self.tape, cells)
+        if not isinstance(out, TracedArray):
+            raise TypeError("an array of numbers cannot take in what is known only when the program runs")
+        out.cells[...] = cells
+        return out
+
+    def __array_function__(
+        self, function: Callable[..., Any], _types: Any, arguments: tuple[Any, ...], options: dict[str, Any]
+    ) -> Any:
+        if function in FUNCTIONS:
+            return TracedArray(self.tape, FUNCTIONS[function](self.tape, *_unpacked(arguments), **options))
+        if function not in STRUCTURAL:
+            raise NotImplementedError(f"numpy.{function.__name__} cannot be recorded")
+        result = function(
+            *_unpacked(arguments), **{name: _unpacked(value) for name, value in options.items()}
+        )
+        return TracedArray(self.tape, result) if isinstance(result, np.ndarray) else result
+
+    def __getitem__(self, index: Any) -> TracedArray:
+        return TracedArray(self.tape, self.cells[_known(index)])
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        self.cells[_known(index)] = cells_of(value)
+
+    def __iter__(self) -> Iterator[TracedArray]:
+        return (self[index] for index in range(len(self)))
+
+    def __len__(self) -> int:
+        return len(self.cells)
+
+    def __bool__(self) -> bool:
+        return bool(_known(self))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """As of an array."""
+        return self.cells.shape
+
+    @property
+    def ndim(self) -> int:
+        """As of an array."""
+        return self.cells.ndim
+
+    @property
+    def size(self) -> int:
+        """As of an array."""
+        return self.cells.size
+
+    @property
+    def T(self) -> TracedArray:  # noqa: N802  (NumPy's name)
+        """As of an array."""
+        return TracedArray(self.tape, self.cells.T)
+
+    def astype(self, dtype: npt.DTypeLike) -> TracedArray:
+        """As of an array; truth values become the lowest bit of an unsigned integer."""
+        wanted = np.dtype(dtype).kind
+        return TracedArray(
+            self.tape, np.vectorize(lambda cell: self._cast(cell, wanted), otypes=[object])(self.cells)
+        )
+
+    def _cast(self, cell: Operand, wanted: str) -> Operand:
+        if isinstance(cell, Symbol):
+            if cell.kind is Kind.TRUTH and wanted == "u":
+                return self.tape.record("bits", cell, 1)
+            if (cell.kind, wanted) in {(Kind.REAL, "f"), (Kind.TRUTH, "b"), (Kind.BITS, "u")}:
+                return cell
+            raise NotImplementedError(f"no conversion of {cell.kind} to the NumPy kind {wanted!r}")
+        return _CASTS[wanted](cell)
+
+    def copy(self) -> TracedArray:
+        """As of an array."""
+        return TracedArray(self.tape, self.cells.copy())
+
+    def sum(self, axis: int | None = None) -> TracedArray:
+        """As of an array."""
+        return TracedArray(self.tape, np.sum(self.cells, axis=axis))
+
+    def ravel(self) -> TracedArray:
+        """As of an array."""
+        return TracedArray(self.tape, self.cells.ravel())
+
+    def reshape(self, *shape: int) -> TracedArray:
+        """As of an array."""
+        return TracedArray(self.tape, self.cells.reshape(*shape))
+
+
+_CASTS: dict[str, Callable[[float], Operand]] = {"u": int, "f": float, "b": bool}
+
+
+def cells_of(array: Any) -> Cells:
+    """The entries of an array, traced or not, as symbols and Python's numbers."""
+    if isinstance(array, TracedArray):
+        return array.cells
+    return np.asarray(array, dtype=object)
+
+
+def _unpacked(argument: Any) -> Any:
+    """Cells in place of traced arrays, inside of lists and tuples also."""
+    if isinstance(argument, TracedArray):
+        return argument.cells
+    if isinstance(argument, list | tuple):
+        return type(argument)(map(_unpacked, argument))
+    return argument
+
+
+def _known(index: Any) -> Any:
+    """An index or truth value; only one that does not depend on a sample."""
+    if not isinstance(index, TracedArray):
+        return index
+    if any(isinstance(cell, Symbol) for cell in index.cells.flat):
+        raise NotImplementedError("what is known only when the program runs cannot decide what is recorded")
+    return index.cells.astype(bool)

@@ -1,0 +1,192 @@
+"""Recorded programs as statements of C."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from vsacli.compute.tracing.c_dialect import Dialect, digits
+from vsacli.compute.tracing.dead_code import Branch, Listing, Loop
+from vsacli.compute.tracing.operations import BITWISE, LOGICAL, kind_of
+from vsacli.compute.tracing.symbol import Kind, Operand, Symbol, Table
+
+INFIX = {
+    "add": "+",
+    "subtract": "-",
+    "multiply": "*",
+    "divide": "/",
+    "less": "<",
+    "less_equal": "<=",
+    "greater": ">",
+    "greater_equal": ">=",
+    "equal": "==",
+    "not_equal": "!=",
+    "bitwise_and": "&",
+    "bitwise_or": "|",
+}
+
+C_NAMES = {
+    "absolute": "fabs",
+    "power": "pow",
+    "searchsorted": "search",
+    **{f"arc{name}": f"a{name}" for name in ("sin", "cos", "tan", "tan2", "sinh")},
+}
+"""Functions that have another name than in NumPy."""
+
+Names = Mapping[int, str]
+"""What inputs of a program are called, by index."""
+
+
+class Writer:
+    """Writes programs in a dialect.
+
+    Args:
+        dialect: how to write.
+        tables: what their constants are called.
+    """
+
+    def __init__(self, dialect: Dialect, tables: Mapping[Table, str]) -> None:
+        self._dialect = dialect
+        self._tables = tables
+
+    def statements(self, listing: Listing, names: Names, prefix: str = "v") -> Iterator[str]:
+        """Declarations of all values of a program, in its order; names of values begin with the prefix."""
+        for symbol in listing.operations:
+            if symbol.operation in {"loop", "branch"}:
+                yield from self._nested(symbol, names, prefix)
+            elif symbol.operation != "item":
+                text = self._expression(symbol, names, prefix)
+                yield f"const {self._dialect.types[symbol.kind]} {_name(symbol, names, prefix)} = {text};"
+
+    def value(self, operand: Operand, kind: Kind, names: Names, prefix: str = "v") -> str:
+        """A value, or a constant of that kind."""
+        if isinstance(operand, Symbol):
+            return _name(operand, names, prefix)
+        return self._dialect.constant(operand, kind)
+
+    def _expression(self, symbol: Symbol, names: Names, prefix: str) -> str:
+        operation, dialect = symbol.operation, self._dialect
+        texts = [
+            self._tables[operand] if isinstance(operand, Table) else self.value(operand, kind, names, prefix)
+            for operand, kind in zip(symbol.operands, _kinds_of_operands(symbol), strict=True)
+        ]
+        if operation in INFIX and not (operation in BITWISE and symbol.kind is Kind.TRUTH):
+            return f"{texts[0]} {INFIX[operation]} {texts[1]}"
+        if operation == "negative":
+            return f"-{texts[0]}"
+        if operation == "isnan":
+            return f"{texts[0]} != {texts[0]}"
+        if operation == "where":
+            return dialect.where(symbol.kind, *texts)
+        if operation == "bits":
+            return dialect.masked(*texts)
+        if operation in LOGICAL:
+            return dialect.logical(LOGICAL[operation], texts)
+        return dialect.function(symbol.kind, C_NAMES.get(operation, operation), texts)
+
+    def _nested(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
+        """A loop or branch: variables of its results, and the block that computes them."""
+        nested, *operands = symbol.operands
+        own = _name(symbol, names, prefix)
+        if isinstance(nested, Loop):
+            yield from self._loop(nested, own, operands, names, prefix)
+        else:
+            yield from self._branch(nested, own, operands, names, prefix)
+
+    def _loop(self, loop: Loop, own: str, operands: list[Any], names: Names, prefix: str) -> Iterator[str]:
+        body, dialect = loop.body, self._dialect
+        state = [f"{own}_{number}" for number in loop.numbers]
+        kinds = [symbol.kind for symbol in body.inputs]
+        given = [
+            self.value(operand, kind, names, prefix) for operand, kind in zip(operands, kinds, strict=True)
+        ]
+        going = f"{own}_going"
+        yield f"{dialect.types[Kind.TRUTH]} {going} = {dialect.truth(True)};"
+        yield from self._variables(state, given, kinds)
+        yield f"for (int {own}_step = 0; {own}_step < {loop.limit} && {dialect.any(going)}; {own}_step++) {{"
+        inner = _renamed(body, [*state, *given[len(state) :]])
+        yield from self._body(body, own, inner, state, going)
+        done = self.value(body.outputs[-1], Kind.TRUTH, inner, f"{own}_v")
+        ongoing = dialect.logical("not", [done])
+        yield f"{going} = {dialect.logical('and', [going, f'({ongoing})'])};"
+        yield "}"
+
+    def _branch(
+        self, branch: Branch, own: str, operands: list[Any], names: Names, prefix: str
+    ) -> Iterator[str]:
+        body, dialect = branch.body, self._dialect
+        count = len(body.outputs)
+        truth, otherwise, arguments = operands[0], operands[1 : 1 + count], operands[1 + count :]
+        results = [f"{own}_{number}" for number in branch.numbers]
+        kinds = [kind_of(output) for output in body.outputs]
+        given = [
+            self.value(operand, kind, names, prefix) for operand, kind in zip(otherwise, kinds, strict=True)
+        ]
+        yield from self._variables(results, given, kinds)
+        where = self.value(truth, Kind.TRUTH, names, prefix)
+        yield f"if ({dialect.any(where)}) {{"
+        texts = [
+            self.value(operand, symbol.kind, names, prefix)
+            for operand, symbol in zip(arguments, body.inputs, strict=True)
+        ]
+        yield from self._body(body, own, _renamed(body, texts), results, where)
+        yield "}"
+
+    def _variables(self, names: list[str], values: list[str], kinds: list[Kind]) -> Iterator[str]:
+        for name, value, kind in zip(names, values, kinds, strict=False):
+            yield f"{self._dialect.types[kind]} {name} = {value};"
+
+    def _body(self, body: Listing, own: str, names: Names, results: list[str], where: str) -> Iterator[str]:
+        """Statements of a body, and its outputs put into variables all at once."""
+        prefix = f"{own}_v"
+        yield from self.statements(body, names, prefix)
+        kinds = [kind_of(output) for output in body.outputs]
+        for result, output, kind in zip(results, body.outputs, kinds, strict=False):
+            value = self.value(output, kind, names, prefix)
+            yield f"const {self._dialect.types[kind]} {result}_new = {value};"
+        for result, kind in zip(results, kinds, strict=False):
+            yield f"{result} = {self._dialect.replaced(kind, where, f'{result}_new', result)};"
+
+
+def table_names(listings: Iterable[Listing]) -> dict[Table, str]:
+    """What the tables of programs are called."""
+    found = dict.fromkeys(table for listing in listings for table in _tables(listing))
+    return {table: f"table_{number}" for number, table in enumerate(found)}
+
+
+def table_declarations(names: Mapping[Table, str], dialect: Dialect) -> Iterator[str]:
+    """Constants at the head of a file."""
+    for table, name in names.items():
+        values = ", ".join(map(digits, table.values))
+        yield f"static const {dialect.table_type} {name}[{len(table.values)}] = {{{values}}};"
+
+
+def _tables(listing: Listing) -> Iterator[Table]:
+    for symbol in listing.operations:
+        for operand in symbol.operands:
+            if isinstance(operand, Table):
+                yield operand
+            elif isinstance(operand, Loop | Branch):
+                yield from _tables(operand.body)
+
+
+def _name(symbol: Symbol, names: Names, prefix: str) -> str:
+    if symbol.operation == "item":
+        nested, number = symbol.operands
+        return f"{_name(nested, names, prefix)}_{number}"
+    return names.get(symbol.index, f"{prefix}{symbol.index}")
+
+
+def _renamed(body: Listing, texts: list[str]) -> Names:
+    """The inputs of a body by what they are given."""
+    return {symbol.index: text for symbol, text in zip(body.inputs, texts, strict=True)}
+
+
+def _kinds_of_operands(symbol: Symbol) -> list[Kind]:
+    """As what each operand counts, which decides how a constant is written."""
+    if symbol.operation == "where":
+        return [Kind.TRUTH, symbol.kind, symbol.kind]
+    if symbol.operation == "bits":
+        return [Kind.TRUTH, Kind.BITS]
+    kind = next(operand.kind for operand in symbol.operands if isinstance(operand, Symbol))
+    return [kind] * len(symbol.operands)

@@ -1,0 +1,125 @@
+"""Programs without the operations that their outputs do not need, loops and branches included."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+from vsacli.compute.tracing.symbol import Operand, Symbol
+
+
+class Listing(NamedTuple):
+    """A program: the operations that its outputs need, each after its operands.
+
+    Attributes:
+        inputs: what the program receives.
+        operations: what it does, in this order.
+        outputs: what it returns.
+    """
+
+    inputs: tuple[Symbol, ...]
+    operations: tuple[Symbol, ...]
+    outputs: tuple[Operand, ...]
+
+
+class Loop(NamedTuple):
+    """A program that is repeated.
+
+    Attributes:
+        body: receives the state and constants; returns the next state and whether that is the last one.
+        limit: largest number of times.
+        numbers: of the entries of the state.
+    """
+
+    body: Listing
+    limit: int
+    numbers: tuple[int, ...]
+
+
+class Branch(NamedTuple):
+    """A program that runs only where a truth value holds.
+
+    Attributes:
+        body: the program.
+        numbers: of its outputs.
+    """
+
+    body: Listing
+    numbers: tuple[int, ...]
+
+
+def pruned(inputs: Sequence[Symbol], operations: Sequence[Symbol], outputs: Sequence[Operand]) -> Listing:
+    """What computes these outputs, by some of the operations."""
+    needed = {output.index for output in outputs if isinstance(output, Symbol)}
+    items: dict[int, set[int]] = defaultdict(set)
+    kept = []
+    for symbol in reversed(operations):
+        if symbol.index not in needed:
+            continue
+        if symbol.operation == "item":
+            nested, number = symbol.operands
+            items[nested.index].add(number)
+        elif symbol.operation == "loop":
+            symbol = _loop(symbol, items[symbol.index])
+        elif symbol.operation == "branch":
+            symbol = _branch(symbol, items[symbol.index])
+        needed.update(operand.index for operand in symbol.operands if isinstance(operand, Symbol))
+        kept.append(symbol)
+    return Listing(tuple(inputs), tuple(reversed(kept)), tuple(outputs))
+
+
+def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
+    """A loop with the part of the state on which the wanted entries, and the end, depend."""
+    (body, limit, numbers), *operands = symbol.operands
+    places = _places(numbers, wanted)
+    live: set[int] = set()
+    while places - live:
+        live |= places
+        shorter = pruned(body.inputs, body.operations, [*_chosen(body.outputs, live), body.outputs[-1]])
+        places = {place for place in range(len(numbers)) if body.inputs[place].index in _used(shorter)}
+    used = _used(shorter)
+    inputs, given = [], []
+    for place, (inner, operand) in enumerate(zip(body.inputs, operands, strict=True)):
+        if place in live or (place >= len(numbers) and inner.index in used):
+            inputs.append(inner)
+            given.append(operand)
+    loop = Loop(shorter._replace(inputs=tuple(inputs)), limit, tuple(_chosen(numbers, live)))
+    return _like(symbol, [loop, *given])
+
+
+def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
+    """A branch with the wanted outputs."""
+    (body, numbers), truth, *operands = symbol.operands
+    places = _places(numbers, wanted)
+    shorter = pruned(body.inputs, body.operations, _chosen(body.outputs, places))
+    used = _used(shorter)
+    arguments = [
+        (inner, operand)
+        for inner, operand in zip(body.inputs, operands[len(numbers) :], strict=True)
+        if inner.index in used
+    ]
+    branch = Branch(
+        shorter._replace(inputs=tuple(inner for inner, _ in arguments)), tuple(_chosen(numbers, places))
+    )
+    given = [operand for _, operand in arguments]
+    return _like(symbol, [branch, truth, *_chosen(operands, places), *given])
+
+
+def _places(numbers: Sequence[int], wanted: Iterable[int]) -> set[int]:
+    """Where results are among those that an earlier pruning has left, by their numbers."""
+    return {numbers.index(number) for number in wanted}
+
+
+def _chosen(entries: Sequence[Any], places: Iterable[int]) -> list[Any]:
+    return [entries[place] for place in sorted(places)]
+
+
+def _used(listing: Listing) -> set[int]:
+    """Values that a program reads or returns."""
+    operands = (operand for symbol in listing.operations for operand in symbol.operands)
+    return {operand.index for operand in (*operands, *listing.outputs) if isinstance(operand, Symbol)}
+
+
+def _like(symbol: Symbol, operands: Sequence[Any]) -> Symbol:
+    return Symbol(symbol.tape, symbol.index, symbol.operation, tuple(operands), symbol.kind)

@@ -1,0 +1,99 @@
+"""Programs recorded from a computation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any
+
+from vsacli.compute.tracing.constant_folding import simplified
+from vsacli.compute.tracing.dead_code import Branch, Listing, Loop, pruned
+from vsacli.compute.tracing.operations import COMMUTATIVE, kind_of, kind_of_result
+from vsacli.compute.tracing.symbol import Kind, Operand, Symbol, Table
+
+
+class Tape:
+    """Operations in the order in which they were carried out, each distinct one once."""
+
+    def __init__(self) -> None:
+        self._symbols: dict[Hashable, Symbol] = {}
+        self._inputs: list[Symbol] = []
+
+    def inputs(self, count: int) -> list[Symbol]:
+        """New real variables, which a program receives in this order."""
+        return [self.input(Kind.REAL) for _ in range(count)]
+
+    def input(self, kind: Kind) -> Symbol:
+        """A new variable."""
+        symbol = self._new("input", (), kind)
+        self._inputs.append(symbol)
+        return symbol
+
+    def record(self, operation: str, *operands: Operand | Table) -> Operand:
+        """The result of an operation on symbols and constants, named as the function of NumPy.
+
+        Beyond these there are `bits(truth, mask)`, the mask where true, else 0; and `take(table, index)`.
+        """
+        plain = tuple(map(_plain, operands))
+        simple = simplified(operation, plain)
+        if simple is not None:
+            return simple
+        return self._symbols.get(_key(operation, plain)) or self._new(
+            operation, plain, kind_of_result(operation, plain)
+        )
+
+    def record_loop(
+        self, body: Listing, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
+    ) -> list[Symbol]:
+        """The state after the repetition of a program that was recorded on a tape of its own."""
+        loop = Loop(body, limit, tuple(range(len(state))))
+        return self._record_nested("loop", body.outputs[:-1], (loop, *state, *constants))
+
+    def record_branch(
+        self, truth: Operand, body: Listing, arguments: Sequence[Operand], otherwise: Sequence[Operand]
+    ) -> list[Symbol]:
+        """What a program returns where a truth value holds, and the other values elsewhere."""
+        branch = Branch(body, tuple(range(len(otherwise))))
+        return self._record_nested("branch", body.outputs, (branch, truth, *otherwise, *arguments))
+
+    def _record_nested(
+        self, operation: str, outputs: Sequence[Operand], operands: tuple[Any, ...]
+    ) -> list[Symbol]:
+        nested = self._new(operation, operands, Kind.REAL)
+        return [self._new("item", (nested, number), kind_of(output)) for number, output in enumerate(outputs)]
+
+    def _new(self, operation: str, operands: tuple[Any, ...], kind: Kind) -> Symbol:
+        if any(isinstance(operand, Symbol) and operand.tape is not self for operand in operands):
+            raise ValueError("a value of another program is none of this one; pass it as an argument")
+        symbol = Symbol(self, len(self._symbols), operation, operands, kind)
+        fresh = operation in {"input", "loop", "branch"}
+        self._symbols[symbol if fresh else _key(operation, operands)] = symbol
+        return symbol
+
+    def listing(self, outputs: Sequence[Operand]) -> Listing:
+        """What computes these outputs from the inputs."""
+        operations = [symbol for symbol in self._symbols.values() if symbol.operation != "input"]
+        return pruned(self._inputs, operations, outputs)
+
+
+def record(function: Callable[[list[Symbol]], Sequence[Operand]], kinds: Sequence[Kind]) -> Listing:
+    """What a function of symbols of these kinds does, on a tape of its own."""
+    tape = Tape()
+    return tape.listing(function([tape.input(kind) for kind in kinds]))
+
+
+def _plain(operand: Any) -> Any:
+    """Constants as Python's own numbers."""
+    return operand if isinstance(operand, Symbol | Table | int) else float(operand)
+
+
+def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:
+    """Symbols by their number, constants as they are written: exactly, and integers apart from floats."""
+    names = [
+        operand.index
+        if isinstance(operand, Symbol)
+        else operand
+        if isinstance(operand, Table)
+        else repr(operand)
+        for operand in operands
+    ]
+    return (operation, *(sorted(names, key=str) if operation in COMMUTATIVE else names))

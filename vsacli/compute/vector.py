@@ -1,0 +1,156 @@
+"""3-vectors of arbitrary scalars with + - *, in which exact zeros and ones cost nothing.
+
+A component is a number, a NumPy row of samples, a complex number, a fraction or a symbol. The Python integers
+0, 1 and -1 stand for exact constants: products and sums with them are folded instead of computed, so that one
+text serves every geometry without a branch on a value.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+Scalar = Any
+"""Anything with + - * among its kind and with Python integers."""
+
+
+def exact(number: float) -> Scalar:
+    """The number, as a Python integer if it is one of the constants that fold."""
+    return int(number) if number in (0, 1, -1) else number
+
+
+def trigonometric(function: Callable[[float], float], angle: float) -> Scalar:
+    """Cosine or sine of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
+    number = function(angle)
+    return 0 if abs(number) <= sys.float_info.epsilon * max(1.0, abs(angle)) else exact(number)
+
+
+def add(a: Scalar, b: Scalar) -> Scalar:
+    """The sum a + b."""
+    if type(a) is int and a == 0:
+        return b
+    if type(b) is int and b == 0:
+        return a
+    return a + b
+
+
+def sub(a: Scalar, b: Scalar) -> Scalar:
+    """The difference a - b."""
+    if type(b) is int and b == 0:
+        return a
+    if type(a) is int and a == 0:
+        return -b
+    return a - b
+
+
+def mul(a: Scalar, b: Scalar) -> Scalar:
+    """The product a b."""
+    if type(a) is int:
+        return _times_integer(a, b)
+    if type(b) is int:
+        return _times_integer(b, a)
+    return a * b
+
+
+def _times_integer(factor: int, a: Scalar) -> Scalar:
+    if factor == 0:
+        return 0
+    if factor == 1:
+        return a
+    return -a if factor == -1 else factor * a
+
+
+class Vector(NamedTuple):
+    """Components in one frame; `+` and `-` act on vectors, `*` takes a scalar on its right."""
+
+    x: Scalar
+    y: Scalar
+    z: Scalar
+
+    def __add__(self, other: Vector) -> Vector:  # type: ignore[override]
+        return Vector(add(self.x, other.x), add(self.y, other.y), add(self.z, other.z))
+
+    def __sub__(self, other: Vector) -> Vector:
+        return Vector(sub(self.x, other.x), sub(self.y, other.y), sub(self.z, other.z))
+
+    def __mul__(self, factor: Scalar) -> Vector:
+        return Vector(mul(self.x, factor), mul(self.y, factor), mul(self.z, factor))
+
+    def dot(self, other: Vector) -> Scalar:
+        """Inner product."""
+        return add(add(mul(self.x, other.x), mul(self.y, other.y)), mul(self.z, other.z))
+
+
+ZERO = Vector(0, 0, 0)
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product a x b."""
+    return Vector(
+        sub(mul(a.y, b.z), mul(a.z, b.y)),
+        sub(mul(a.z, b.x), mul(a.x, b.z)),
+        sub(mul(a.x, b.y), mul(a.y, b.x)),
+    )
+
+
+class SymmetricTensor(NamedTuple):
+    """Six entries of a symmetric 3x3 tensor."""
+
+    xx: Scalar
+    yy: Scalar
+    zz: Scalar
+    xy: Scalar
+    xz: Scalar
+    yz: Scalar
+
+    def times(self, v: Vector) -> Vector:
+        """The tensor applied to a vector."""
+        return Vector(
+            add(add(mul(self.xx, v.x), mul(self.xy, v.y)), mul(self.xz, v.z)),
+            add(add(mul(self.xy, v.x), mul(self.yy, v.y)), mul(self.yz, v.z)),
+            add(add(mul(self.xz, v.x), mul(self.yz, v.y)), mul(self.zz, v.z)),
+        )
+
+
+class Rotation(NamedTuple):
+    """R = Rz(theta) Rx(alpha) of a Denavit-Hartenberg row: frame-k components to frame k-1."""
+
+    cos_theta: Scalar
+    sin_theta: Scalar
+    cos_alpha: Scalar
+    sin_alpha: Scalar
+
+    def apply(self, v: Vector) -> Vector:
+        """R v."""
+        y = sub(mul(self.cos_alpha, v.y), mul(self.sin_alpha, v.z))
+        return Vector(
+            sub(mul(self.cos_theta, v.x), mul(self.sin_theta, y)),
+            add(mul(self.sin_theta, v.x), mul(self.cos_theta, y)),
+            add(mul(self.sin_alpha, v.y), mul(self.cos_alpha, v.z)),
+        )
+
+    def undo(self, v: Vector) -> Vector:
+        """R^T v."""
+        y = sub(mul(self.cos_theta, v.y), mul(self.sin_theta, v.x))
+        return Vector(
+            add(mul(self.cos_theta, v.x), mul(self.sin_theta, v.y)),
+            add(mul(self.cos_alpha, y), mul(self.sin_alpha, v.z)),
+            sub(mul(self.cos_alpha, v.z), mul(self.sin_alpha, y)),
+        )
+
+
+class Matrix(NamedTuple):
+    """A 3x3 matrix, by its rows."""
+
+    x: Vector
+    y: Vector
+    z: Vector
+
+    def times(self, v: Vector) -> Vector:
+        """The matrix applied to a vector."""
+        return Vector(self.x.dot(v), self.y.dot(v), self.z.dot(v))
+
+    def transposed(self) -> Matrix:
+        """Its transpose, which is the inverse of a rotation."""
+        return Matrix(*(Vector(*column) for column in zip(self.x, self.y, self.z, strict=True)))

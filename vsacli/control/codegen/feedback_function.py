@@ -1,0 +1,146 @@
+"""The generated controller: feedback linearization from the measured state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.reach import limit_flags
+from vsacli.base.flags import Flag
+from vsacli.control.codegen.interface import Array, Function, Rows, Structure
+from vsacli.control.codegen.robot_functions import command_structure, variable_array
+from vsacli.control.feedback_linearization import control_law, position_order
+from vsacli.control.gains import STIFFNESS_ORDER, Gains
+from vsacli.control.linear_control import Integral
+from vsacli.dynamics.forward import Plant
+from vsacli.dynamics.limits import limit_checks
+from vsacli.robot.model import Robot
+from vsacli.trajectory.motion import Motion
+
+Arrays = Mapping[str, Any]
+"""Arrays of numbers or of symbols by name."""
+
+
+class _Gains(NamedTuple):
+    """Gains that are known only when the controller runs; as `vsacli.control.gains.Gains`."""
+
+    position: Any
+    stiffness: Any
+    position_integral: Any
+    stiffness_integral: Any
+
+
+def feedback_linearization_function(robot: Robot) -> Function:
+    """(32)-(35), (60), (69)-(74).
+
+    Raises:
+        InputError: the robot mixes rigid joints with others, for which there is no such law.
+    """
+    law = _Law(robot)
+    return Function(
+        name="feedback_linearization",
+        meaning=(
+            "Motor torques that make the errors of position and stiffness decay as the gains say; returns "
+            "the flags of all joints, 0 if all is well. Without integral action, let its gains be 0."
+        ),
+        arguments=law.arguments,
+        result=Structure(
+            "control",
+            "What the controller wants; NaN at a joint whose decoupling matrix is singular.",
+            (variable_array(robot, "tau_motor"), variable_array(robot, "flags")),
+        ),
+        compute=law,
+        flagged=True,
+    )
+
+
+class _Law:
+    """The control law on rows of all its arguments.
+
+    Attributes:
+        arguments: what it reads.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._plant = Plant(robot)
+        joints, order = (len(robot.joints),), position_order(robot, self._plant)
+        self.arguments = (
+            ("state", Structure("state", "Measured state.", _state_arrays(robot))),
+            ("reference", command_structure(robot)),
+            (
+                "gains",
+                Structure(
+                    "gains",
+                    "Gains of (32): the poles are the roots of s^r + K_{r-1} s^(r-1) + ... + K0.",
+                    (
+                        Array("position", (*joints, order), "K0, K1, ..., 1/s^(r-k)"),
+                        Array(
+                            "stiffness", (*joints, STIFFNESS_ORDER), "the same for the stiffness, 1/s^(2-k)"
+                        ),
+                        Array("position_integral", joints, "gain of the integral of the position error"),
+                        Array("stiffness_integral", joints, "gain of the integral of the stiffness error"),
+                    ),
+                ),
+            ),
+            (
+                "integral",
+                Structure(
+                    "integral",
+                    "Time integrals of the errors, command minus measurement.",
+                    (Array("q", joints, "of the position"), Array("stiffness", joints, "of the stiffness")),
+                ),
+            ),
+        )
+
+    def __call__(self, rows: Rows) -> list[Any]:
+        """Rows of the torques of the motors, then of the flags."""
+        state, reference, gains, integral = self._unpacked(rows)
+        drivetrain = self._plant.drivetrain
+        law: Any = control_law(self._plant, cast("Gains", _Gains(**gains)))
+        theta, dtheta = (
+            drivetrain.of_motors(state[name])[..., drivetrain.sprung] for name in ("theta", "dtheta")
+        )
+        command = Motion(np.zeros(1), **reference)
+        torque = law.torque(state["q"], state["dq"], theta, dtheta, command, Integral(**integral))
+        tau_motor = np.full_like(state["theta"], np.nan)
+        tau_motor[drivetrain.present] = torque
+        values = {**state, "phi": state["theta"] - state["q"][:, None], "tau_motor": tau_motor}
+        flags = [self._flags(joint, values) for joint in range(len(self._robot.joints))]
+        return [*tau_motor.ravel(), *flags]
+
+    def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
+        """The arrays of each argument by name."""
+        entries, start = np.concatenate(rows), 0
+        for _, structure in self.arguments:
+            arrays = {}
+            for array in structure.arrays:
+                size = len(list(array.entries))
+                arrays[array.name] = entries[start : start + size].reshape(*array.shape)
+                start += size
+            yield arrays
+
+    def _flags(self, index: int, values: Arrays) -> Any:
+        """What is wrong with a joint: no torque, or a limit that state or torque break."""
+        joint = self._robot.joints[index]
+        flags = np.isnan(values["tau_motor"][index, 0]).astype(np.uint16) * np.uint16(Flag.SINGULAR)
+        for check in limit_checks(joint):
+            if check.variable in values:
+                of_joint = values[check.variable][index]
+                flags = flags | limit_flags(
+                    check, of_joint if check.motor is None else of_joint[check.motor - 1]
+                )
+        return flags
+
+
+def _state_arrays(robot: Robot) -> tuple[Array, ...]:
+    motors = (len(robot.joints), SIDES)
+    return (
+        Array("q", motors[:1], "joint position, rad (m)"),
+        Array("dq", motors[:1], "joint velocity, rad/s (m/s)"),
+        Array("theta", motors, "motor position, joint side of the gear, rad (m)"),
+        Array("dtheta", motors, "motor velocity, joint side of the gear, rad/s (m/s)"),
+    )

@@ -1,0 +1,81 @@
+"""The header of the generated code: structures with units, bits, functions."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+
+from vsacli.base.flags import Flag
+from vsacli.control.codegen.interface import Array, Function, Structure
+from vsacli.control.codegen.scalar import WIDTH, signature
+from vsacli.robot.model import Robot
+
+
+def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precision: str, head: str) -> str:
+    """The header file; arguments as of `vsacli.control.codegen.scalar.source_text`."""
+    guard = f"{prefix.upper()}_H"
+    parts = [
+        head,
+        f"#ifndef {guard}\n#define {guard}",
+        '#ifdef __cplusplus\nextern "C" {\n#endif',
+        _joints(prefix, robot),
+        "\n".join(_flags(prefix)),
+        *(_structure(prefix, structure, precision) for structure in structures(functions)),
+        *(_declaration(prefix, function) for function in functions),
+        "#ifdef __cplusplus\n}\n#endif",
+        "#endif",
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def structures(functions: Sequence[Function]) -> list[Structure]:
+    """Each structure that the functions use, once."""
+    used = [
+        structure
+        for function in functions
+        for structure in (*(argument for _, argument in function.arguments), function.result)
+    ]
+    return list(dict.fromkeys(used))
+
+
+def _joints(prefix: str, robot: Robot) -> str:
+    names = ", ".join(
+        f"{index} {joint.name} ({joint.type}, {joint.actuator_type})"
+        for index, joint in enumerate(robot.joints)
+    )
+    text = (
+        f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN. SI units; "
+        "signs, frames and gravity as in the robot file; nothing acts on the end effector. Functions keep "
+        "nothing between calls."
+    )
+    return f"{comment(text)}\nenum {{ {prefix.upper()}_JOINTS = {len(robot.joints)} }};"
+
+
+def _flags(prefix: str) -> Iterator[str]:
+    yield "/* Bits of flags: what is wrong with a joint. */"
+    yield "enum {"
+    for flag in Flag:
+        yield f"    {prefix.upper()}_{flag.name} = {flag.value}, /* {flag.meaning} */"
+    yield "};"
+
+
+def _structure(prefix: str, structure: Structure, precision: str) -> str:
+    members = [_member(array, precision) for array in structure.arrays]
+    return "\n".join(
+        [comment(structure.meaning), "typedef struct {", *members, f"}} {prefix}_{structure.name};"]
+    )
+
+
+def _member(array: Array, precision: str) -> str:
+    shape = "".join(f"[{size}]" for size in array.shape)
+    return f"    {'unsigned' if array.bits else precision} {array.name}{shape}; /* {array.meaning} */"
+
+
+def _declaration(prefix: str, function: Function) -> str:
+    return f"{comment(function.meaning)}\n{signature(prefix, function)};"
+
+
+def comment(text: str) -> str:
+    """A comment, in as many lines as it takes."""
+    lines = textwrap.wrap(text, WIDTH - 6)
+    return "/* " + "\n   ".join(lines) + " */"

@@ -1,0 +1,88 @@
+"""What a generated function takes and gives: one declaration for header, source and self-test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from vsacli.compute.tracing import Listing, Tape, TracedArray, cells_of
+
+Rows = Sequence[Any]
+
+
+@dataclass(frozen=True)
+class Array:
+    """An array of a structure.
+
+    Attributes:
+        name: as in C.
+        shape: of the array.
+        meaning: what it holds, with its unit.
+        bits: whether the entries are fields of bits, else numbers.
+    """
+
+    name: str
+    shape: tuple[int, ...]
+    meaning: str
+    bits: bool = False
+
+    @property
+    def entries(self) -> Iterator[str]:
+        """Each entry as written in C, e.g. `theta[0][1]`."""
+        for index in product(*map(range, self.shape)):
+            yield self.name + "".join(f"[{number}]" for number in index)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A struct of arrays.
+
+    Attributes:
+        name: as in C, without the prefix of the robot.
+        meaning: what it is.
+        arrays: its members.
+    """
+
+    name: str
+    meaning: str
+    arrays: tuple[Array, ...]
+
+    @property
+    def entries(self) -> Iterator[str]:
+        """Each entry of each array as written in C."""
+        return (entry for array in self.arrays for entry in array.entries)
+
+    @property
+    def size(self) -> int:
+        """Number of entries."""
+        return len(list(self.entries))
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function to generate.
+
+    Attributes:
+        name: as in C, without the prefix of the robot.
+        meaning: what it computes, for the header.
+        arguments: structures that it reads, by the names of the arguments.
+        result: structure that it fills.
+        compute: from rows of samples of all entries of the arguments to rows of the entries of the result.
+        flagged: whether it returns the bits of all joints.
+    """
+
+    name: str
+    meaning: str
+    arguments: tuple[tuple[str, Structure], ...]
+    result: Structure
+    compute: Callable[[Rows], Rows]
+    flagged: bool
+
+    def record(self) -> Listing:
+        """The operations on one sample."""
+        tape = Tape()
+        count = sum(structure.size for _, structure in self.arguments)
+        rows = [TracedArray(tape, [symbol]) for symbol in tape.inputs(count)]
+        return tape.listing([cells_of(row).item() for row in self.compute(rows)])

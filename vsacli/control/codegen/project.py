@@ -1,0 +1,98 @@
+"""Everything that `vsacli codegen` writes: header, source, self-test, Makefile, README."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+from vsacli import __version__
+from vsacli.base.atomic_files import check_target, reporting_storage_errors, write_text
+from vsacli.base.errors import InputError, StorageError
+from vsacli.control.codegen.feedback_function import feedback_linearization_function
+from vsacli.control.codegen.header import comment, header_text
+from vsacli.control.codegen.interface import Function
+from vsacli.control.codegen.readme import makefile_text, readme_text
+from vsacli.control.codegen.reference_vectors import Reference
+from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
+from vsacli.control.codegen.scalar import source_text
+from vsacli.control.codegen.self_test import self_test_text
+from vsacli.robot.model import Robot
+
+
+class Project(NamedTuple):
+    """Generated code.
+
+    Attributes:
+        files: texts by file name.
+        omitted: the functions that there are not, with the reason; a sentence each.
+    """
+
+    files: dict[str, str]
+    omitted: list[str]
+
+
+def generate(robot: Robot, precision: str = "double") -> Project:
+    """C99 for a robot: link torques, inverse dynamics, feedback linearization.
+
+    Args:
+        robot: the robot.
+        precision: type of the numbers, one of `vsacli.control.codegen.scalar.PRECISIONS`.
+
+    Raises:
+        InputError: something of the robot has no evaluation in a bounded number of operations.
+    """
+    functions, omitted = _functions(robot)
+    prefix = prefix_of(robot)
+    head = comment(
+        f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
+    )
+    try:
+        files = {
+            f"{prefix}.h": header_text(prefix, robot, functions, precision, head),
+            f"{prefix}.c": source_text(prefix, functions, precision, head),
+            f"{prefix}_test.c": self_test_text(prefix, functions, Reference(robot), precision, head),
+            "Makefile": makefile_text(prefix),
+            "README.md": readme_text(prefix, robot, functions, precision, omitted),
+        }
+    except NotImplementedError as error:
+        raise InputError.one(f"no C code can be made of {robot.name}: {error}") from error
+    return Project(files, omitted)
+
+
+def _functions(robot: Robot) -> tuple[list[Function], list[str]]:
+    functions, omitted = [link_torques_function(robot), inverse_dynamics_function(robot)], []
+    try:
+        functions.append(feedback_linearization_function(robot))
+    except InputError as error:
+        omitted.append(f"no feedback_linearization: {error}")
+    return functions, omitted
+
+
+def prefix_of(robot: Robot) -> str:
+    """What the names in C begin with: the robot's, in lower case, of letters that C allows."""
+    name = re.sub(r"\W+", "_", robot.name.lower(), flags=re.ASCII).strip("_")
+    return name if re.match(r"[a-z]", name) else f"robot_{name}".rstrip("_")
+
+
+def write(project: Project, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
+    """Write the files into a folder, which is made if need be; their paths.
+
+    Raises:
+        StorageError: `folder` is a file, a file exists and `overwrite` is false, or the disk fails.
+    """
+    paths = [Path(folder) / name for name in project.files]
+    if Path(folder).exists():
+        if not Path(folder).is_dir():
+            raise StorageError(folder, "is a file; name a folder for the code")
+        for path in paths:
+            check_target(path, overwrite=overwrite)
+    with reporting_storage_errors(folder):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    for path, text in zip(paths, project.files.values(), strict=True):
+        write_text(path, text, overwrite=overwrite)
+    return paths
+
+
+def _plural(joints: int) -> str:
+    return f"{joints} joint" if joints == 1 else f"{joints} joints"

@@ -1,0 +1,87 @@
+"""The functions that are generated for a robot: link torques and inverse dynamics."""
+
+from __future__ import annotations
+
+from vsacli.base.variables import VARIABLES
+from vsacli.control.codegen.interface import Array, Function, Rows, Structure
+from vsacli.dynamics.inverse import STIFFNESS_NAMES, TORQUES, InverseDynamics
+from vsacli.dynamics.link_torques import MOTION_NAMES, LinkTorques
+from vsacli.robot.model import Robot
+
+DRIVE_NAMES = (
+    "tau_e",
+    "phi",
+    "theta",
+    "dtheta",
+    "ddtheta",
+    "tau_motor",
+    "stiffness_lower",
+    "stiffness_upper",
+    "flags",
+)
+"""Variables that the generated inverse dynamics gives."""
+
+
+def motion_structure(robot: Robot) -> Structure:
+    """Position and its derivatives."""
+    return Structure("motion", "Motion of the joints.", _arrays(robot, MOTION_NAMES))
+
+
+def command_structure(robot: Robot) -> Structure:
+    """Motion and stiffness."""
+    meaning = "Commanded motion and stiffness; only antagonistic joints read a stiffness."
+    return Structure("command", meaning, _arrays(robot, (*MOTION_NAMES, *STIFFNESS_NAMES)))
+
+
+def link_torques_function(robot: Robot) -> Function:
+    """(36)-(60)."""
+    return Function(
+        name="link_torques",
+        meaning="Torques that the links demand of the joints, and their first two derivatives.",
+        arguments=(("motion", motion_structure(robot)),),
+        result=Structure("torques", "Torques of the joints.", _arrays(robot, TORQUES)),
+        compute=LinkTorques(robot),
+        flagged=False,
+    )
+
+
+def inverse_dynamics_function(robot: Robot) -> Function:
+    """(36)-(74)."""
+    kernel = InverseDynamics(robot)
+
+    def compute(rows: Rows) -> Rows:
+        computed = iter(kernel(rows))
+        by_name = {
+            name: [next(computed) for _ in range(_size(shape))] for name, shape in kernel.shapes.items()
+        }
+        return [row for name in DRIVE_NAMES for row in by_name[name]]
+
+    return Function(
+        name="inverse_dynamics",
+        meaning="Motor torques that execute a command; returns the flags of all joints, 0 if all is well.",
+        arguments=(("command", command_structure(robot)),),
+        result=Structure(
+            "drive",
+            "What the motors have to do; NaN where a flag says it cannot be.",
+            _arrays(robot, DRIVE_NAMES),
+        ),
+        compute=compute,
+        flagged=True,
+    )
+
+
+def _arrays(robot: Robot, names: tuple[str, ...]) -> tuple[Array, ...]:
+    return tuple(variable_array(robot, name) for name in names)
+
+
+def variable_array(robot: Robot, name: str) -> Array:
+    """The array of a result variable."""
+    variable = VARIABLES[name]
+    motors = (2,) if "motor" in variable.dims else ()
+    units = dict.fromkeys(variable.quantity.unit(joint_type) for joint_type in robot.joint_types)
+    meaning = ", ".join([variable.long_name, *([] if name == "flags" else [" or ".join(units)])])
+    return Array(name, (len(robot.joints), *motors), meaning, bits=name == "flags")
+
+
+def _size(shape: tuple[int, ...]) -> int:
+    return shape[0] * (shape[1] if len(shape) > 1 else 1)

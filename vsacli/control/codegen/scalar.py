@@ -1,0 +1,176 @@
+"""Recorded programs as C99 for one sample at a time."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from vsacli.compute.tracing import Kind, Listing, Symbol
+from vsacli.compute.tracing.c_dialect import Dialect, digits
+from vsacli.compute.tracing.c_text import Writer, table_declarations, table_names
+from vsacli.control.codegen.interface import Function
+
+PRECISIONS = ("double", "float")
+
+WIDTH = 110
+"""Characters of a line, at most, but for comments behind code."""
+
+_OPERATORS = {"and": " && ", "or": " || "}
+
+HELPERS = {
+    "maximum": "{type} maximum({type} a, {type} b) {{ return a >= b || a != a ? a : b; }}",
+    "minimum": "{type} minimum({type} a, {type} b) {{ return a <= b || a != a ? a : b; }}",
+    "maximum_index": "int maximum_index(int a, int b) {{ return a >= b ? a : b; }}",
+    "minimum_index": "int minimum_index(int a, int b) {{ return a <= b ? a : b; }}",
+    "search": """/* Number of increasing nodes that x is not below. */
+static inline int search(const {type} *nodes, int count, {type} x)
+{{
+    int low = 0, high = count;
+    while (low < high) {{
+        const int middle = (low + high) / 2;
+        if (x < nodes[middle])
+            high = middle;
+        else
+            low = middle + 1;
+    }}
+    return low;
+}}""",
+}
+"""Functions beyond math.h; of the two sides of a comparison, maximum and minimum let NaN pass."""
+
+
+class Scalar(Dialect):
+    """Plain C99.
+
+    Args:
+        precision: one of `PRECISIONS`.
+    """
+
+    def __init__(self, precision: str) -> None:
+        types = {Kind.REAL: precision, Kind.TRUTH: "int", Kind.BITS: "unsigned", Kind.INDEX: "int"}
+        super().__init__(types, precision)
+        self._suffix = "f" if precision == "float" else ""
+
+    def real(self, number: float) -> str:
+        """As of `Dialect`."""
+        if not self._suffix:
+            return digits(number)
+        text = digits(_in_range(number))
+        if "N" in text:
+            return text
+        return text.replace(")", "f)") if text.endswith(")") else f"{text}f"
+
+    def integer(self, number: int) -> str:
+        """As of `Dialect`."""
+        return str(number)
+
+    def truth(self, value: bool) -> str:
+        """As of `Dialect`."""
+        return str(int(value))
+
+    def logical(self, operator: str, operands: Sequence[str]) -> str:
+        """As of `Dialect`."""
+        return f"!{operands[0]}" if operator == "not" else _OPERATORS[operator].join(operands)
+
+    def where(self, _kind: Kind, truth: str, a: str, b: str) -> str:
+        """As of `Dialect`."""
+        return f"{truth} ? {a} : {b}"
+
+    def masked(self, truth: str, mask: str) -> str:
+        """As of `Dialect`."""
+        return f"{truth} ? {mask}u : 0u"
+
+    def function(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
+        """As of `Dialect`."""
+        if name == "take":
+            return f"{operands[0]}[{operands[1]}]"
+        if name == "search":
+            table, value = operands
+            return f"search({table}, (int)(sizeof {table} / sizeof {table}[0]), {value})"
+        if name in HELPERS:
+            called = f"{name}_index" if kind is Kind.INDEX else name
+        else:
+            called = f"{name}{self._suffix}"
+        return f"{called}({', '.join(operands)})"
+
+    def any(self, truth: str) -> str:
+        """As of `Dialect`."""
+        return truth
+
+    def replaced(self, _kind: Kind, _truth: str, new: str, _old: str) -> str:
+        """As of `Dialect`."""
+        return new
+
+
+def _in_range(number: float) -> float:
+    """What stands for a number among those of single precision: no number but zero becomes zero."""
+    limits = np.finfo(np.float32)
+    if number and abs(number) < limits.tiny:
+        return math.copysign(float(limits.tiny), number)
+    return math.copysign(math.inf, number) if abs(number) > limits.max else number
+
+
+def source_text(prefix: str, functions: Sequence[Function], precision: str, head: str) -> str:
+    """The source file.
+
+    Args:
+        prefix: what the names of the robot begin with.
+        functions: what it defines.
+        precision: one of `PRECISIONS`.
+        head: the comment at its beginning.
+    """
+    dialect = Scalar(precision)
+    listings = [function.record() for function in functions]
+    tables = table_names(listings)
+    writer = Writer(dialect, tables)
+    bodies = [
+        "\n".join(_definition(prefix, function, listing, writer))
+        for function, listing in zip(functions, listings, strict=True)
+    ]
+    declarations = list(table_declarations(tables, dialect))
+    used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
+    helpers = [_helper(name, precision) for name in HELPERS if name in used]
+    parts = [head, f'#include "{prefix}.h"\n\n#include <math.h>', "\n".join(declarations), *helpers, *bodies]
+    return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def _helper(name: str, precision: str) -> str:
+    text = HELPERS[name].format(type=precision)
+    return text if text.startswith("/*") else f"static inline {text}"
+
+
+def signature(prefix: str, function: Function) -> str:
+    """The head of a function; each argument in a line of its own if they do not fit into one."""
+    arguments = [f"const {prefix}_{structure.name} *{name}" for name, structure in function.arguments]
+    result = f"{prefix}_{function.result.name} *{function.result.name}"
+    returned = "unsigned" if function.flagged else "void"
+    lines = [f"{returned} {prefix}_{function.name}({', '.join([*arguments, result])})"]
+    if len(lines[0]) > WIDTH:
+        lines = [f"{returned} {prefix}_{function.name}(", ",\n    ".join([*arguments, result]) + ")"]
+    return "\n    ".join(lines)
+
+
+def _definition(prefix: str, function: Function, listing: Listing, writer: Writer) -> Iterator[str]:
+    entries = [f"{name}->{entry}" for name, structure in function.arguments for entry in structure.entries]
+    names = {symbol.index: entry for symbol, entry in zip(listing.inputs, entries, strict=True)}
+    yield f"{signature(prefix, function)}\n{{"
+    depth = 1
+    for line in writer.statements(listing, names):
+        depth -= line == "}"
+        yield "    " * depth + line
+        depth += line.endswith("{")
+    flags = []
+    outputs = iter(listing.outputs)
+    for array in function.result.arrays:
+        for entry in array.entries:
+            output = next(outputs)
+            kind = Kind.BITS if array.bits else Kind.REAL
+            value = writer.value(output, kind, names)
+            yield f"    {function.result.name}->{entry} = {value};"
+            flags += [value] if array.bits and isinstance(output, Symbol) else []
+    if function.flagged:
+        yield f"    return {' | '.join(flags) or '0u'};"
+    yield "}"

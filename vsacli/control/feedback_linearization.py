@@ -1,0 +1,95 @@
+"""Feedback linearization: motor torques from the measured state, without root finding."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.control.computed_torque import ComputedTorque
+from vsacli.control.decoupling import Decoupling
+from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, Gains
+from vsacli.control.linear_control import Integral
+from vsacli.dynamics.forward import Plant, State
+from vsacli.robot.model import Robot
+from vsacli.trajectory.motion import Motion
+
+
+def feedback_linearization(
+    robot: Robot, state: State, reference: Motion, gains: Gains, integral: Integral | None = None
+) -> FloatArray:
+    """Motor torques that make the errors obey the linear dynamics (33), as long as A is regular.
+
+    A control loop keeps a `FeedbackLinearization`, which prepares the robot once.
+
+    Args:
+        robot: either all of its joints have springs, elastic and antagonistic ones mixed at will, or none
+            has, which gives the computed torque (3).
+        state: measured state, at one instant or over samples.
+        reference: commanded motion and stiffness, arrays ([samples,] joints), and the wrench that acts.
+        gains: of the linear control (32).
+        integral: of the errors, if the gains ask for integral action; zero if None.
+
+    Returns:
+        tau_motor, ([samples,] joints, 2), N m (N), joint side of the gear; NaN where there is no motor, and
+        at a joint whose A is singular.
+
+    Raises:
+        InputError: the robot mixes rigid joints with others, the gains are not for it, or shapes do not fit.
+    """
+    frame = None if reference.wrench is None else reference.wrench.frame
+    return FeedbackLinearization(robot, gains, frame)(state, reference, integral)
+
+
+class FeedbackLinearization:
+    """The control law for a robot, gains, and the frame of the wrench that acts on it (None if none does).
+
+    Attributes:
+        plant: the model that the law believes in.
+        law: what computes the torques of `plant`'s motors.
+    """
+
+    def __init__(self, robot: Robot, gains: Gains, frame: str | None = None) -> None:
+        self.plant = Plant(robot, frame)
+        gains.check_fit(len(robot.joints), position_order(robot, self.plant))
+        self.law = control_law(self.plant, gains)
+
+    def __call__(self, state: State, reference: Motion, integral: Integral | None = None) -> FloatArray:
+        """Motor torques, ([samples,] joints, 2); see `feedback_linearization`."""
+        unpacked = self.plant.unpacked(state)
+        zero = np.zeros_like(unpacked[0])
+        torque = self.law.torque(*unpacked, reference, integral or Integral(zero, zero))
+        return self.plant.drivetrain.of_joints(torque)
+
+
+def position_order(robot: Robot, plant: Plant) -> int:
+    """Order of the error dynamics (33a) of a robot's position.
+
+    Raises:
+        InputError: the robot mixes rigid joints with others, for which there is no such law.
+    """
+    sprung = plant.drivetrain.sprung
+    if sprung.any() and not sprung.all():
+        raise InputError.one(_mixed(robot, plant))
+    return POSITION_ORDER if sprung.all() else RIGID_ORDER
+
+
+def control_law(plant: Plant, gains: Gains) -> Decoupling | ComputedTorque:
+    """The law for a robot all of whose joints, or none, have springs."""
+    return Decoupling(plant, gains) if plant.drivetrain.sprung.all() else ComputedTorque(plant, gains)
+
+
+def _mixed(robot: Robot, plant: Plant) -> str:
+    drivetrain = plant.drivetrain
+    rigid, sprung = (
+        list(dict.fromkeys(robot.joint_names[joint] for joint in drivetrain.joint[with_spring]))
+        for with_spring in (~drivetrain.sprung, drivetrain.sprung)
+    )
+    return (
+        f"feedback linearization needs springs at all joints or at none: {_are(rigid)} rigid, "
+        f"{_are(sprung)} not; give rigid joints an elastic actuator, or use the controller feedforward"
+    )
+
+
+def _are(names: list[str]) -> str:
+    return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"

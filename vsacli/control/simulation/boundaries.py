@@ -1,0 +1,96 @@
+"""Boundaries of the states in which a run can go on."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.flags import Flag
+from vsacli.control.simulation.closed_loop import ClosedLoop
+from vsacli.control.simulation.ending import Ending
+
+NEARLY_SINGULAR = 1e-4
+"""Share of its first value to which det A of a joint may fall: near zero, the torques of a linearizing
+controller are without bound."""
+
+
+class Boundary(ABC):
+    """A function of time and state that falls below zero where a run must end: an event of `solve_ivp`."""
+
+    terminal = True
+    direction = -1.0
+
+    reason: str
+    flag: Flag
+    joints: IndexArray
+
+    def __init__(self, loop: ClosedLoop) -> None:
+        self._plant = loop.plant
+        self._packing = loop.packing
+
+    @abstractmethod
+    def distances(self, phi: FloatArray) -> FloatArray:
+        """What must stay positive, one number for each of `joints`, from the deflections of all springs."""
+
+    def __call__(self, _time: float, vector: FloatArray) -> float:
+        """The smallest distance."""
+        return float(np.min(self._distances(vector), initial=1.0))
+
+    def ending(self, time: float, vector: FloatArray) -> Ending:
+        """The end of a run here."""
+        return Ending(time, self.reason, self.flag, int(self.joints[np.argmin(self._distances(vector))]))
+
+    def _distances(self, vector: FloatArray) -> FloatArray:
+        phase = self._packing.unpack(vector)
+        return self.distances(self._plant.deflections(phase.q, phase.theta))
+
+
+class Singularity(Boundary):
+    """Where the decoupling matrix of a joint becomes singular."""
+
+    reason = "its decoupling matrix became singular"
+    flag = Flag.SINGULAR
+
+    def __init__(self, loop: ClosedLoop, start: FloatArray) -> None:
+        super().__init__(loop)
+        drivetrain = loop.plant.drivetrain
+        self.joints = drivetrain.spring_joint[drivetrain.first]
+        self._first_value = self._determinant(loop.plant.deflections(*loop.packing.unpack(start)[:3:2]))
+
+    def distances(self, phi: FloatArray) -> FloatArray:
+        """Det A as a share of its first value, above `NEARLY_SINGULAR`."""
+        shares: FloatArray = self._determinant(phi) / self._first_value - NEARLY_SINGULAR
+        return shares
+
+    def _determinant(self, phi: FloatArray) -> FloatArray:
+        drivetrain = self._plant.drivetrain
+        return drivetrain.decoupling_determinant(drivetrain.springs(phi))
+
+
+class SpringRange(Boundary):
+    """Where a spring leaves the range of its law: a tendon goes slack, a table ends."""
+
+    reason = "a spring left the range of its law"
+    flag = Flag.INFEASIBLE
+
+    def __init__(self, loop: ClosedLoop) -> None:
+        super().__init__(loop)
+        self._lowest, self._highest = loop.plant.drivetrain.domain
+        self.joints = loop.plant.drivetrain.spring_joint
+
+    def distances(self, phi: FloatArray) -> FloatArray:
+        """Deflection to the nearer end of the law."""
+        distances: FloatArray = np.fmin(phi - self._lowest, self._highest - phi)
+        return distances
+
+
+def boundaries(loop: ClosedLoop, start: FloatArray) -> Iterator[Boundary]:
+    """Those that a robot can reach; `start` is the first state vector."""
+    drivetrain = loop.plant.drivetrain
+    if drivetrain.first.size:
+        yield Singularity(loop, start)
+    if np.isfinite(drivetrain.domain).any():
+        yield SpringRange(loop)

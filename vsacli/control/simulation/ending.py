@@ -1,0 +1,30 @@
+"""What ends a run before its time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from vsacli.base.flags import Flag
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Why a run ended early.
+
+    Attributes:
+        time: when, s.
+        reason: what happened, as part of a sentence.
+        flag: what marks the last step of the joint to blame.
+        joint: its index; None, like the flag, if there is none.
+    """
+
+    time: float
+    reason: str
+    flag: Flag | None = None
+    joint: int | None = None
+
+    def described(self, joint_names: Sequence[str]) -> str:
+        """The end as a sentence."""
+        place = "" if self.joint is None else f"{joint_names[self.joint]}: "
+        return f"{place}{self.reason}; ended at t = {self.time:.6g} s"

@@ -1,0 +1,129 @@
+"""Every variable of a run, from the states it went through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import Drivetrain
+from vsacli.actuators.reach import limit_flags
+from vsacli.base.arrays import FlagArray, FloatArray
+from vsacli.base.simulation_variables import COMMANDED, ERRORS, actual, error
+from vsacli.control.simulation.closed_loop import ClosedLoop
+from vsacli.control.simulation.ending import Ending
+from vsacli.control.simulation.integrator import Course
+from vsacli.dynamics.limits import limit_checks
+from vsacli.robot.model import Robot
+
+
+@dataclass(frozen=True, kw_only=True)
+class History:
+    """What happened, (samples, joints) or (samples, joints, 2); see `SIMULATION_VARIABLES`.
+
+    NaN where a joint does not have the variable: motor 2 of an elastic joint, the stiffness of a rigid one.
+    """
+
+    time: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    stiffness: FloatArray
+    dstiffness: FloatArray
+    tau_motor: FloatArray
+    q_actual: FloatArray
+    dq_actual: FloatArray
+    ddq_actual: FloatArray
+    stiffness_actual: FloatArray
+    dstiffness_actual: FloatArray
+    tau_e_actual: FloatArray
+    phi_actual: FloatArray
+    dphi_actual: FloatArray
+    theta_actual: FloatArray
+    dtheta_actual: FloatArray
+    tau_spring_actual: FloatArray
+    tau_motor_actual: FloatArray
+    elastic_energy_actual: FloatArray
+    motor_power_actual: FloatArray
+    motor_energy_actual: FloatArray
+    det_A_actual: FloatArray  # noqa: N815  (the published name)
+    q_error: FloatArray
+    dq_error: FloatArray
+    stiffness_error: FloatArray
+    dstiffness_error: FloatArray
+    flags: FlagArray
+
+
+def history(robot: Robot, loop: ClosedLoop, course: Course) -> History:
+    """Evaluate every variable along a course."""
+    reference = loop.reference(course.time)
+    commanded = {name: getattr(reference, name) for name in COMMANDED}
+    found = _actual(loop, course)
+    paired = loop.plant.drivetrain.present.all(axis=1)
+    for name in ("stiffness", "dstiffness"):  # elsewhere there is none to command
+        commanded[name] = np.where(paired, commanded[name], found[name])
+    demand = loop.plant.drivetrain.of_joints(course.demand)
+    return History(
+        time=course.time,
+        **commanded,
+        tau_motor=demand,
+        **{actual(name): values for name, values in found.items()},
+        **{error(name): found[name] - commanded[name] for name in ERRORS},
+        flags=_flags(robot, {**found, "tau_motor": demand}, course.ending),
+    )
+
+
+def _actual(loop: ClosedLoop, course: Course) -> dict[str, FloatArray]:
+    plant, drivetrain = loop.plant, loop.plant.drivetrain
+    phase, torque = loop.packing.unpack(course.states), loop.applied(course.demand)
+    ddq, _ = loop.accelerations(course.time, phase, course.demand)
+    phi, dphi = plant.deflections(phase.q, phase.theta), plant.deflections(phase.dq, phase.dtheta)
+    springs = drivetrain.springs(phi)
+    tau_e = plant.link_torque(phase.dq, ddq, springs.tau, torque)
+    still = np.zeros_like(phase.q)
+    theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)
+    tau_motor = drivetrain.of_joints(torque)
+    return {
+        "q": phase.q,
+        "dq": phase.dq,
+        "ddq": ddq,
+        "stiffness": np.where(drivetrain.rigid, np.nan, drivetrain.joint_sum(springs.sigma)),  # (11)
+        "dstiffness": np.where(drivetrain.rigid, np.nan, drivetrain.joint_sum(springs.zeta * dphi)),  # (18)
+        "tau_e": tau_e,
+        "phi": drivetrain.merged(phi, still),
+        "dphi": drivetrain.merged(dphi, still),
+        "theta": theta,
+        "dtheta": dtheta,
+        "tau_spring": drivetrain.merged(springs.tau, tau_e),
+        "tau_motor": tau_motor,
+        "elastic_energy": drivetrain.energy(phi),
+        "motor_power": tau_motor * dtheta,
+        "motor_energy": _work(theta, tau_motor, held=course.held),
+        "det_A": _by_joint(drivetrain, drivetrain.decoupling_determinant(springs)),
+    }
+
+
+def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
+    """Of motors up to each step, (samples, ...); the torque is held between steps, or linear."""
+    given = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
+    return np.cumsum(np.concatenate((0 * torque[:1], given * np.diff(theta, axis=0))), axis=0)
+
+
+def _by_joint(drivetrain: Drivetrain, of_pairs: FloatArray) -> FloatArray:
+    """(samples, joints) from (samples, pairs), NaN at joints that are none."""
+    values = np.full((len(of_pairs), len(drivetrain.present)), np.nan)
+    values[:, drivetrain.spring_joint[drivetrain.first]] = of_pairs
+    return values
+
+
+def _flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:
+    """Limits exceeded by what was, or was asked of the motors; at the last step, what ended the run."""
+    flags = np.zeros(values["q"].shape, dtype=np.uint16)
+    for index, joint in enumerate(robot.joints):
+        for check in limit_checks(joint):
+            of_joint = values[check.variable][:, index]
+            found = of_joint if check.motor is None else of_joint[:, check.motor - 1]
+            flags[:, index] |= limit_flags(check, found)
+    if ending is not None and ending.joint is not None and ending.flag is not None:
+        flags[-1, ending.joint] |= np.uint16(ending.flag)
+    return flags

@@ -1,0 +1,89 @@
+"""A model that differs from the robot, as an identified one does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.rigid import Rigid
+from vsacli.base.errors import InputError
+from vsacli.documents.fields import Number, declared
+from vsacli.robot.model import Inertia, Joint, Link, Robot
+
+
+def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
+    """The robot with every dynamic parameter wrong by a random relative error.
+
+    Masses, centres of mass, inertia tensors, dampings, motor inertias and the constants of the springs are
+    each multiplied by 1 + relative u with u uniform in [-1, 1]; a tensor as a whole, so that it remains one
+    of a body. Geometry, gravity, limits and measured tables stay as they are.
+
+    Args:
+        robot: the true one.
+        relative: largest relative error, from 0 to below 1.
+        seed: of the random numbers, so that a run can be repeated.
+
+    Raises:
+        InputError: the error is not in that range, or a spring cannot have the constant it leads to.
+    """
+    if not 0 <= relative < 1:
+        raise InputError.one(f"the relative error of the model must lie between 0 and 1, not {relative:g}")
+    if seed < 0:
+        raise InputError.one(f"the seed must be zero or positive, not {seed}")
+    wrong = _Wrong(relative, np.random.default_rng(seed))
+    return replace(robot, joints=tuple(wrong.joint(joint) for joint in robot.joints))
+
+
+class _Wrong:
+    """Draws the errors, in the order of the joints."""
+
+    def __init__(self, relative: float, random: np.random.Generator) -> None:
+        self._relative = relative
+        self._random = random
+
+    def joint(self, joint: Joint) -> Joint:
+        actuator = self._actuator(joint.actuator)
+        return replace(
+            joint, link=self._link(joint.link), damping=self._number(joint.damping), actuator=actuator
+        )
+
+    def _number(self, value: float) -> float:
+        return value * (1 + self._relative * float(self._random.uniform(-1, 1)))
+
+    def _link(self, link: Link) -> Link:
+        x, y, z = map(self._number, link.com)
+        return replace(link, mass=self._number(link.mass), com=(x, y, z), inertia=self._inertia(link.inertia))
+
+    def _inertia(self, inertia: Inertia) -> Inertia:
+        factor = self._number(1.0)
+        return replace(inertia, **{name: factor * getattr(inertia, name) for name in declared(Inertia)})
+
+    def _actuator(self, actuator: Any) -> Any:
+        match actuator:
+            case Antagonistic(motor=(motor_1, motor_2), spring=(spring_1, spring_2)):
+                motors = self._motor(motor_1), self._motor(motor_2)
+                return replace(
+                    actuator, motor=motors, spring=(self._spring(spring_1), self._spring(spring_2))
+                )
+            case Elastic(motor=motor, stiffness=stiffness):
+                return replace(actuator, motor=self._motor(motor), stiffness=self._number(stiffness))
+            case Rigid(motor=motor):
+                return replace(actuator, motor=self._motor(motor))
+        raise TypeError(f"{type(actuator).__name__} is no actuator")
+
+    def _motor(self, motor: Motor) -> Motor:
+        return replace(motor, inertia=self._number(motor.inertia), damping=self._number(motor.damping))
+
+    def _spring(self, spring: SpringLaw) -> SpringLaw:
+        constants = [
+            name
+            for name, (field, _) in declared(type(spring)).items()
+            if isinstance(field.kind, Number) and name != "max_deflection"
+        ]
+        return replace(spring, **{name: self._number(getattr(spring, name)) for name in constants})

@@ -1,0 +1,243 @@
+"""The verdict on a simulation: one object, rendered as text and as JSON, and stored in the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vsacli.actuators.reach import excess, has
+from vsacli.analysis.report import VERDICTS, Worst
+from vsacli.base.arrays import FloatArray, by_joint
+from vsacli.base.flags import LIMITS, Flag
+from vsacli.base.json_values import Plain, finite, number, pair
+from vsacli.base.simulation_variables import SIMULATION_VARIABLES, actual
+from vsacli.control.simulation.history import History
+from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
+from vsacli.dynamics.limits import limit_checks
+from vsacli.robot.model import Joint, Robot
+
+FORMAT = "vsacli-simulation-report/1"
+
+_VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Of an actual value from the command: the largest, when (s), and the last; NaN if there is none."""
+
+    peak: float
+    time: float
+    final: float
+
+    @classmethod
+    def of(cls, time: FloatArray, error: FloatArray) -> Deviation:
+        """From errors, (samples,), at times."""
+        if np.isnan(error).all():
+            return cls(np.nan, np.nan, np.nan)
+        worst = int(np.nanargmax(np.abs(error)))
+        return cls(float(abs(error[worst])), float(time[worst]), float(error[-1]))
+
+    def as_json(self) -> dict[str, float]:
+        """Plain values."""
+        return vars(self)
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> Deviation:
+        """From what `as_json` gave, `finite`."""
+        return cls(*(number(plain[name]) for name in ("peak", "time", "final")))
+
+
+@dataclass(frozen=True)
+class JointTracking:
+    """What a simulation found at one joint.
+
+    Attributes:
+        name: of the joint.
+        type: "revolute" or "prismatic".
+        q: deviation of the position, rad (m).
+        stiffness: deviation of the stiffness, N m/rad (N/m).
+        peak_tau_motor: largest |torque| that motors 1 and 2 gave, N m (N).
+        steps_over_limit: how many steps have a limit exceeded.
+        worst: the worst excess of each limit, by its name.
+        energy: work of the motors, elastic energy, co-contraction.
+    """
+
+    name: str
+    type: str
+    q: Deviation
+    stiffness: Deviation
+    peak_tau_motor: tuple[float, float]
+    steps_over_limit: int
+    worst: dict[str, Worst]
+    energy: JointEnergy
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values under the published keys."""
+        return {
+            "name": self.name,
+            "type": self.type,
+            "q_error": self.q.as_json(),
+            "stiffness_error": self.stiffness.as_json(),
+            "peak": {"tau_motor": list(self.peak_tau_motor)},
+            "steps": {"over_limit": self.steps_over_limit},
+            "worst": {name: worst.as_json() for name, worst in self.worst.items()},
+            "energy": self.energy.as_json(),
+        }
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> JointTracking:
+        """From what `as_json` gave, `finite`."""
+        return cls(
+            name=plain["name"],
+            type=plain["type"],
+            q=Deviation.from_json(plain["q_error"]),
+            stiffness=Deviation.from_json(plain["stiffness_error"]),
+            peak_tau_motor=pair(plain["peak"]["tau_motor"]),
+            steps_over_limit=plain["steps"]["over_limit"],
+            worst={kind: Worst.from_json(kind, worst) for kind, worst in plain["worst"].items()},
+            energy=JointEnergy.from_json(plain["energy"]),
+        )
+
+
+def joint_trackings(robot: Robot, history: History) -> tuple[JointTracking, ...]:
+    """What a history says about each joint."""
+    energies = enumerate(_energies(robot, history))
+    return tuple(_tracking(robot.joints[index], index, history, energy) for index, energy in energies)
+
+
+def _energies(robot: Robot, history: History) -> list[JointEnergy]:
+    time, work, power, tau_spring, elastic_energy = (
+        _led(getattr(history, name))
+        for name in ("time", *map(actual, ("motor_energy", "motor_power", "tau_spring", "elastic_energy")))
+    )
+    meter = EnergyMeter()
+    meter.add(Flow(np.diff(time), np.diff(work), power, tau_spring, elastic_energy))
+    return meter.report(robot)
+
+
+def _led(values: FloatArray) -> FloatArray:
+    """(..., samples + 1) from (samples, ...), the first step twice: a run may end with it."""
+    rows = by_joint(values)
+    return np.concatenate((rows[..., :1], rows), axis=-1)
+
+
+def _tracking(joint: Joint, index: int, history: History, energy: JointEnergy) -> JointTracking:
+    flags = history.flags[:, index]
+    first, second = np.fmax.reduce(np.abs(history.tau_motor_actual[:, index]), axis=0).tolist()
+    return JointTracking(
+        name=joint.name,
+        type=joint.type,
+        q=Deviation.of(history.time, history.q_error[:, index]),
+        stiffness=Deviation.of(history.time, history.stiffness_error[:, index]),
+        peak_tau_motor=(first, second),
+        steps_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
+        worst=_worst(joint, index, history),
+        energy=energy,
+    )
+
+
+def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
+    """The worst excess of each limit of a joint; of either motor."""
+    worst: dict[str, Worst] = {}
+    most: dict[str, float] = {}
+    for check in limit_checks(joint):
+        name = check.variable if check.variable == "tau_motor" else actual(check.variable)
+        values = getattr(history, name)[:, index]
+        values = values if check.motor is None else values[:, check.motor - 1]
+        hit = has(history.flags[:, index], check.flag)
+        over = np.where(hit, np.nan_to_num(excess(values, check.range), nan=-np.inf), -np.inf)
+        step, label = int(over.argmax()), check.flag.label
+        if over[step] > most.get(label, 0.0):
+            value, (lower, upper) = float(values[step]), check.range
+            bound = lower if value < lower else upper
+            unit = SIMULATION_VARIABLES[name].quantity.unit(joint.type)
+            worst[label] = Worst(label, float(history.time[step]), value, bound, unit, check.motor)
+            most[label] = float(over[step])
+    return worst
+
+
+def verdict_on(history: History, *, complete: bool) -> str:
+    """The worst of `VERDICTS` that a flag of any step speaks for, or "diverged" if none explains the end."""
+    flags = Flag(int(np.bitwise_or.reduce(history.flags, axis=None)))
+    applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
+    worst = next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
+    return worst if complete or worst not in ("ok", "over_limit") else "diverged"
+
+
+@dataclass(frozen=True)
+class SimulationReport:
+    """The verdict on a simulation.
+
+    Attributes:
+        robot: name of the robot.
+        trajectory: name of the trajectory.
+        controller: in words, as typed.
+        samples: steps stored.
+        duration: time from the first to the last step of the trajectory, s.
+        verdict: the worst of `VERDICTS` that applies, or "diverged"; see `verdict_on`.
+        ending: why it ended early, as a sentence; None if it did not.
+        evaluations: of the equations of motion.
+        warnings: why the inputs may not be what was meant.
+        notes: how they were understood, where that is not obvious.
+        joints: one report a joint.
+        with_full_state: deviation of q of each joint in the same run when the controller knows the full state
+            at every instant; empty unless positions alone are measured.
+    """
+
+    robot: str
+    trajectory: str
+    controller: str
+    samples: int
+    duration: float
+    verdict: str
+    ending: str | None
+    evaluations: int
+    joints: tuple[JointTracking, ...]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    with_full_state: tuple[Deviation, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run reached the end of the trajectory."""
+        return self.ending is None
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain values for `json.dumps`; numbers that are not finite become None."""
+        plain: dict[str, Any] = finite(
+            {
+                "format": FORMAT,
+                "verdict": self.verdict,
+                "robot": self.robot,
+                "trajectory": self.trajectory,
+                "controller": self.controller,
+                "samples": self.samples,
+                "duration": self.duration,
+                "complete": self.complete,
+                "ending": self.ending,
+                "evaluations": self.evaluations,
+                "warnings": list(self.warnings),
+                "notes": list(self.notes),
+                "joints": [joint.as_json() for joint in self.joints],
+                "with_full_state": [deviation.as_json() for deviation in self.with_full_state],
+            }
+        )
+        return plain
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> SimulationReport:
+        """From what `as_json` gave, as a simulation file holds it.
+
+        Raises:
+            LookupError, TypeError, AttributeError, ValueError: it is no such report.
+        """
+        as_they_are = ("robot", "trajectory", "controller", "samples", "duration", "verdict", "ending")
+        return cls(
+            **{name: plain[name] for name in (*as_they_are, "evaluations")},
+            warnings=tuple(plain["warnings"]),
+            notes=tuple(plain.get("notes", ())),
+            joints=tuple(map(JointTracking.from_json, plain["joints"])),
+            with_full_state=tuple(map(Deviation.from_json, plain["with_full_state"])),
+        )

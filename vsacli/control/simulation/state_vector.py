@@ -1,0 +1,39 @@
+"""The state of a simulated robot as one vector."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import Drivetrain
+from vsacli.base.arrays import FloatArray
+from vsacli.control.linear_control import Integral
+
+
+class Phase(NamedTuple):
+    """Full state, ([samples,] joints) and ([samples,] springs), and the integrals of the errors."""
+
+    q: FloatArray
+    dq: FloatArray
+    theta: FloatArray
+    dtheta: FloatArray
+    integral: Integral
+
+
+class Packing:
+    """How a `Phase` lies in a vector."""
+
+    def __init__(self, drivetrain: Drivetrain) -> None:
+        joints, springs = len(drivetrain.present), int(drivetrain.sprung.sum())
+        ends = np.cumsum([joints, joints, springs, springs, joints, joints]).tolist()
+        self._parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+
+    def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
+        """The vector of a state at which nothing is integrated yet."""
+        return np.concatenate((q, dq, theta, dtheta, np.zeros_like(q), np.zeros_like(q)))
+
+    def unpack(self, vector: FloatArray) -> Phase:
+        """The parts of vectors (..., entries), as views."""
+        q, dq, theta, dtheta, *integral = (vector[..., part] for part in self._parts)
+        return Phase(q, dq, theta, dtheta, Integral(*integral))

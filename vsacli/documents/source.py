@@ -1,0 +1,120 @@
+"""Input files as they were read, kept for the provenance of a result."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from vsacli.base.did_you_mean import nearest
+from vsacli.base.errors import InputError
+
+MAX_DOCUMENT_BYTES = 1_000_000
+"""Size up to which a text document is read, and up to which the text of any input is kept."""
+
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+"""How an HDF5 file begins, which is what results are."""
+
+
+class Source(NamedTuple):
+    """A file that was read: its path as given, SHA-256 in hex, and its text (None if too large to keep)."""
+
+    path: str
+    sha256: str
+    text: str | None
+
+
+def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTES) -> tuple[Source, str]:
+    """Read a text document whole.
+
+    Args:
+        path: the file, named in errors exactly as it is given here.
+        max_bytes: size beyond which the file is refused without being read.
+
+    Returns:
+        The record of the file, and its text without a byte order mark.
+
+    Raises:
+        InputError: a file that is missing, no regular file, unreadable, empty, too large or not UTF-8.
+    """
+    name = os.fspath(path)
+    check_input_file(name, max_bytes)
+    with _refusing(name), open(name, "rb") as file:
+        content = file.read(max_bytes + 1)
+    if len(content) > max_bytes:  # grew since its size was looked up
+        raise _too_large(name, len(content), max_bytes)
+    if not content.strip():
+        raise InputError.one("the file is empty", name)
+    text = decode_utf8(content, name)
+    return Source(name, hashlib.sha256(content).hexdigest(), text), text
+
+
+def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize) -> None:
+    """Refuse, before it is opened, what is no regular file of at most `max_bytes`.
+
+    Raises:
+        InputError: saying what stands at the path instead.
+    """
+    name = os.fspath(path)
+    with _refusing(name):
+        status = os.stat(name)
+    if stat.S_ISDIR(status.st_mode):
+        raise InputError.one("is a directory, expected a file", name)
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError.one("is no regular file (a device, pipe or socket)", name)
+    if status.st_size > max_bytes:
+        with _refusing(name), open(name, "rb") as file:
+            start = file.read(len(HDF5_SIGNATURE))
+        _refuse_hdf5(start, name)
+        raise _too_large(name, status.st_size, max_bytes)
+
+
+def decode_utf8(content: bytes, name: str) -> str:
+    """The text of a file's content, without a byte order mark.
+
+    Raises:
+        InputError: naming the first byte that is not UTF-8.
+    """
+    _refuse_hdf5(content, name)
+    try:
+        return content.decode("utf-8").removeprefix("\ufeff")
+    except UnicodeDecodeError as error:
+        byte = content[error.start]
+        line = content.count(b"\n", 0, error.start) + 1
+        problem = f"the file is not UTF-8 text (byte 0x{byte:02x} at offset {error.start}); save it as UTF-8"
+        raise InputError.one(problem, name, line) from None
+
+
+def _refuse_hdf5(content: bytes, name: str) -> None:
+    if content.startswith(HDF5_SIGNATURE):
+        raise InputError.one("is an HDF5 file, such as a result; expected text", name)
+
+
+@contextmanager
+def _refusing(name: str) -> Iterator[None]:
+    try:
+        yield
+    except FileNotFoundError:
+        raise InputError.one(f"no such file{_sibling(name)}", name) from None
+    except OSError as error:
+        raise InputError.one(f"cannot be read: {error.strerror}", name) from None
+    except ValueError:
+        raise InputError.one("the path holds a NUL character", name) from None
+
+
+def _sibling(name: str) -> str:
+    path = Path(name)
+    if not path.parent.is_dir():
+        return f"; there is no folder {str(path.parent)!r} either"
+    near = nearest(path.name, (entry.name for entry in path.parent.iterdir()))
+    return f"; did you mean {str(path.with_name(near))!r}?" if near else ""
+
+
+def _too_large(name: str, size: int, max_bytes: int) -> InputError:
+    return InputError.one(f"the file has {size:,} bytes, more than the {max_bytes:,} allowed here", name)

@@ -1,0 +1,1 @@
+"""Equations (36)-(74) over blocks of samples, and the forward dynamics."""

@@ -1,0 +1,102 @@
+"""What the actuator of a joint has to do for it, whatever its kind."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators import antagonistic, elastic, rigid
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.drivetrain import SIDES, motors_and_springs
+from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.reach import NEAR_SINGULAR, limit_flags
+from vsacli.actuators.rigid import Rigid
+from vsacli.actuators.transmission import Command, Transmission
+from vsacli.base.arrays import FlagArray, FloatArray
+from vsacli.dynamics.limits import limit_checks
+from vsacli.robot.model import Joint
+
+
+class Drive(NamedTuple):
+    """Stiffness, motor motion and motor torques of a joint; (2, samples) for the motors, else (samples,).
+
+    The names are those of the result variables. Where a step is infeasible everything of the motors is NaN,
+    where it is singular what needs the inverse of the decoupling matrix is. What the actuator does not have
+    is NaN throughout.
+    """
+
+    stiffness: FloatArray
+    dstiffness: FloatArray
+    ddstiffness: FloatArray
+    phi: FloatArray
+    dphi: FloatArray
+    theta: FloatArray
+    dtheta: FloatArray
+    ddtheta: FloatArray
+    tau_spring: FloatArray
+    tau_motor: FloatArray
+    elastic_energy: FloatArray
+    motor_power: FloatArray
+    det_A: FloatArray  # noqa: N815  (the published name)
+    stiffness_lower: FloatArray
+    stiffness_upper: FloatArray
+    flags: FlagArray
+
+
+def drive(
+    joint: Joint,
+    command: Command,
+    near_singular: float = NEAR_SINGULAR,
+    followed: FloatArray | None = None,
+) -> Drive:
+    """Motor motion and motor torques of a joint, (61)-(74).
+
+    Args:
+        joint: the joint with its actuator.
+        command: commanded motion and stiffness, and the elastic torque with its two derivatives.
+        near_singular: margin below which a step is near-singular.
+        followed: deflections of an antagonistic joint to use instead of the root of (14), (2, samples); a
+            step where they are NaN is infeasible.
+    """
+    transmission = _transmit(joint, command, near_singular, followed)
+    dtheta = transmission.dphi + command.dq  # (69)
+    motors = [motor for motor, _ in motors_and_springs(joint.actuator)]
+    inertia = _by_motor([motor.inertia for motor in motors])
+    damping = _by_motor([motor.damping for motor in motors])
+    tau_motor = inertia * transmission.ddtheta + damping * dtheta + transmission.tau_spring  # (73)-(74)
+    driven = Drive(
+        **transmission._asdict(),
+        theta=transmission.phi + command.q,  # (69)
+        dtheta=dtheta,
+        tau_motor=tau_motor,
+        motor_power=tau_motor * dtheta,
+    )
+    return driven._replace(flags=driven.flags | _limit_flags(joint, command, driven))
+
+
+def _transmit(
+    joint: Joint, command: Command, near_singular: float, followed: FloatArray | None
+) -> Transmission:
+    match joint.actuator:
+        case Antagonistic() as actuator:
+            return antagonistic.transmit(actuator, command, near_singular, followed)
+        case Elastic() as actuator:
+            return elastic.transmit(actuator, command)
+        case Rigid():
+            return rigid.transmit(command)
+
+
+def _by_motor(values: list[float]) -> FloatArray:
+    """(2, 1), NaN for a motor there is not."""
+    return np.array([*values, *[math.nan] * (SIDES - len(values))])[:, None]
+
+
+def _limit_flags(joint: Joint, command: Command, driven: Drive) -> FlagArray:
+    values = {**command._asdict(), **driven._asdict()}
+    flags = np.zeros_like(driven.flags)
+    for check in limit_checks(joint):
+        of_joint = values[check.variable]
+        flags = flags | limit_flags(check, of_joint if check.motor is None else of_joint[check.motor - 1])
+    return flags

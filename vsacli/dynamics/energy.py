@@ -1,0 +1,242 @@
+"""Energy over a run: work of the motors, elastic energy, and what it takes to hold a stiffness."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import SIDES, motors_and_springs
+from vsacli.base.arrays import FloatArray, by_joint, over_time
+from vsacli.base.json_values import Plain, number
+from vsacli.base.variables import Block
+from vsacli.robot.model import Robot
+
+
+class JointEnergy(NamedTuple):
+    """Energy of a joint over a run; but for the peak, NaN if the torques of a step do not exist.
+
+    The torques of two springs split: tau_1^2 + tau_2^2 = tau_e^2/2 + (tau_1 - tau_2)^2/2. The first part
+    is the least with which two motors carry the load, half of it each. The second, co-contraction, moves
+    nothing: it is what the stiffness takes.
+
+    Attributes:
+        elastic_peak: largest energy in the springs, J, over the steps where it exists.
+        spent: integral of the positive part of each motor's power, summed over the motors, J.
+        recovered: that of the negative part, J; spent - recovered is the work of the motors.
+        co_contraction: root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN with a single motor.
+        load: that of tau_e/2, likewise.
+    """
+
+    elastic_peak: float
+    spent: float
+    recovered: float
+    co_contraction: float
+    load: float
+
+    @property
+    def co_contraction_share(self) -> float:
+        """Share of the co-contraction in the time integral of tau_1^2 + tau_2^2; NaN if that is zero."""
+        squared = self.co_contraction**2 + self.load**2
+        return self.co_contraction**2 / squared if squared else math.nan
+
+    def as_json(self) -> dict[str, float]:
+        """Plain values under the published keys."""
+        return {**self._asdict(), "co_contraction_share": self.co_contraction_share}
+
+    @classmethod
+    def from_json(cls, plain: Plain) -> JointEnergy:
+        """From what `as_json` gave, with None for NaN."""
+        return cls(*(number(plain[name]) for name in cls._fields))
+
+
+class Flow(NamedTuple):
+    """Energy that flows over consecutive steps; of the motors (joints, 2, ...), NaN where there is none.
+
+    Attributes:
+        intervals: lengths of time between the steps, (samples - 1,), s.
+        work: of each motor in each interval, (joints, 2, samples - 1), J.
+        motor_power: (joints, 2, samples), W.
+        tau_spring: (joints, 2, samples), N m (N).
+        elastic_energy: (joints, samples), J.
+    """
+
+    intervals: FloatArray
+    work: FloatArray
+    motor_power: FloatArray
+    tau_spring: FloatArray
+    elastic_energy: FloatArray
+
+
+class EnergyMeter:
+    """Sums up energy; `add` what flows, each time from the last step of the time before, then `report`.
+
+    Sums run from step to step, so that they do not depend on how the steps are divided.
+    """
+
+    def __init__(self) -> None:
+        self._work, self._spent = _Sum(), _Sum()
+        self._duration, self._load, self._co_contraction = _Sum(), _Sum(), _Sum()
+        self._peak: FloatArray | float = math.nan
+
+    def add(self, flow: Flow) -> FloatArray:
+        """Merge a flow; returns the work of each motor up to the end of each interval, in its place."""
+        intervals = flow.intervals
+        self._duration.add(intervals.copy())
+        self._peak = np.fmax(self._peak, np.fmax.reduce(flow.elastic_energy, axis=-1))
+        tau_1, tau_2 = flow.tau_spring[:, 0], flow.tau_spring[:, 1]
+        for total, effort in ((self._load, tau_1 + tau_2), (self._co_contraction, tau_1 - tau_2)):
+            effort *= effort
+            total.add(intervals / 8 * (effort[:, 1:] + effort[:, :-1]))
+        self._spent.add(positive_part(intervals, flow.motor_power, flow.work))
+        return self._work.add(flow.work)
+
+    def report(self, robot: Robot) -> list[JointEnergy]:
+        """What was found of each joint of a robot; something must have been added."""
+        there = [
+            [side < len(motors_and_springs(joint.actuator)) for side in range(SIDES)]
+            for joint in robot.joints
+        ]
+        work, spent = (np.sum(total.value, axis=1, where=there) for total in (self._work, self._spent))
+        duration = float(self._duration.value)
+        efforts = [_mean_root(total.value, duration) for total in (self._co_contraction, self._load)]
+        found = np.array((self._peak, spent, spent - work, *efforts))
+        return [JointEnergy(*of_joint) for of_joint in found.T.tolist()]
+
+
+class RunEnergy:
+    """The energy of a run of the inverse dynamics; `add` its blocks in order, then ask for the `report`."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._inertia, self._damping = _motor_constants(robot)
+        self._meter = EnergyMeter()
+        self._last: _Rows | None = None
+
+    def add(self, block: Block) -> FloatArray:
+        """Merge a block; returns the variable `motor_energy` at its steps, (samples, joints, 2)."""
+        rows = self._rows(block)
+        joined = rows.after(rows.at(0) if self._last is None else self._last)
+        self._last = rows.at(-1)
+        intervals = np.diff(joined.time)
+        work = integrals(intervals, joined.passed_on, joined.rate)
+        work += np.diff(joined.kinetic)
+        flow = Flow(intervals, work, joined.motor_power, joined.tau_spring, joined.elastic_energy)
+        return over_time(self._meter.add(flow))
+
+    def _rows(self, block: Block) -> _Rows:
+        dtheta, ddtheta, tau_spring = map(by_joint, (block.dtheta, block.ddtheta, block.tau_spring))
+        torque = self._damping * dtheta
+        torque += tau_spring
+        rate = self._damping * ddtheta
+        rate += spring_rates(self._robot, block)
+        rate *= dtheta
+        rate += torque * ddtheta
+        torque *= dtheta
+        return _Rows(
+            time=block.time,
+            kinetic=self._inertia / 2 * dtheta**2,
+            passed_on=torque,
+            rate=rate,
+            motor_power=by_joint(block.motor_power),
+            tau_spring=tau_spring,
+            elastic_energy=by_joint(block.elastic_energy),
+        )
+
+    def report(self) -> list[JointEnergy]:
+        """What was found of each joint; at least one block must have been added."""
+        return self._meter.report(self._robot)
+
+
+class _Rows(NamedTuple):
+    """What the work of motors follows from: B theta'^2/2, and the power passed on or lost, with its rate."""
+
+    time: FloatArray
+    kinetic: FloatArray
+    passed_on: FloatArray
+    rate: FloatArray
+    motor_power: FloatArray
+    tau_spring: FloatArray
+    elastic_energy: FloatArray
+
+    def at(self, step: int) -> _Rows:
+        """One step, the last if -1."""
+        return _Rows(*(values[..., [step]] for values in self))
+
+    def after(self, step: _Rows) -> _Rows:
+        """The same with a step before."""
+        pairs = zip(step, self, strict=True)
+        return _Rows(*(np.concatenate((one, rest), axis=-1) for one, rest in pairs))
+
+
+def spring_rates(robot: Robot, block: Block) -> FloatArray:
+    """Rates of tau_spring, (joints, 2, samples): sigma_k phi_k', or tau_e' where there is no spring."""
+    phi, dphi, dtau_e = map(by_joint, (block.phi, block.dphi, block.dtau_e))
+    rates = np.full_like(phi, np.nan)
+    for index, joint in enumerate(robot.joints):
+        for side, (_, law) in enumerate(motors_and_springs(joint.actuator)):
+            motor = index, side
+            rates[motor] = dtau_e[index] if law is None else law.stiffness(phi[motor]) * dphi[motor]
+    return rates
+
+
+class _Sum:
+    """A running sum along the last axis."""
+
+    def __init__(self) -> None:
+        self.value: FloatArray | float = 0.0
+
+    def add(self, pieces: FloatArray) -> FloatArray:
+        """The sum up to each of the pieces, in their place."""
+        pieces[..., 0] += self.value
+        np.add.accumulate(pieces, axis=-1, out=pieces)
+        self.value = pieces[..., -1].copy()
+        return pieces
+
+
+def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> FloatArray:
+    """Time integral over each interval, by the cubic with the values and rates at its ends; error O(h^5).
+
+    Args:
+        intervals: lengths h, (samples - 1,), s.
+        values: of the integrand, (..., samples).
+        rates: its derivative, likewise.
+    """
+    integral: FloatArray = rates[..., :-1] - rates[..., 1:]
+    integral *= intervals / 6
+    integral += values[..., 1:]
+    integral += values[..., :-1]
+    integral *= intervals / 2
+    return integral
+
+
+def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) -> FloatArray:
+    """Time integral of the positive part of a power over each interval.
+
+    Args:
+        intervals: lengths h, (samples - 1,), s.
+        power: (..., samples); where it changes its sign in an interval it is taken for linear, error O(h^3).
+        work: its integral over each interval, (..., samples - 1).
+    """
+    positive: FloatArray = np.maximum(work, 0.0)
+    before, after = power[..., :-1], power[..., 1:]
+    turns = before * after < 0
+    if turns.any():
+        low, high = np.minimum(before, after)[turns], np.maximum(before, after)[turns]
+        positive[turns] = np.broadcast_to(intervals, turns.shape)[turns] / 2 * high**2 / (high - low)
+    return positive
+
+
+def _motor_constants(robot: Robot) -> FloatArray:
+    """Inertia and damping of the motors, (2, joints, 2, 1), NaN where there is none."""
+    constants = np.full((2, len(robot.joints), SIDES, 1), np.nan)
+    for index, joint in enumerate(robot.joints):
+        for side, (motor, _) in enumerate(motors_and_springs(joint.actuator)):
+            constants[:, index, side, 0] = motor.inertia, motor.damping
+    return constants
+
+
+def _mean_root(integral: FloatArray | float, duration: float) -> FloatArray:
+    """Root of the mean over time; NaN if no time has passed."""
+    return np.sqrt(np.asarray(integral) / duration) if duration else np.full_like(integral, np.nan)

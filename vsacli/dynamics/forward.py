@@ -1,0 +1,173 @@
+"""Forward dynamics: the motion that follows from motor torques, for any mixture of actuators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from vsacli.actuators.drivetrain import Drivetrain
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.wrench import Wrench
+from vsacli.dynamics.rigid_body import chain_of
+from vsacli.robot.model import Robot
+
+
+@dataclass(frozen=True)
+class State:
+    """Full state of a robot, at one instant or over samples; SI units.
+
+    Attributes:
+        q, dq: position and velocity of the joints, ([samples,] joints).
+        theta, dtheta: position and velocity of the motors, joint side of the gear, ([samples,] joints, 2);
+            ignored where there is no motor, and at a rigid drive, whose motor moves with the joint.
+    """
+
+    q: FloatArray
+    dq: FloatArray
+    theta: FloatArray
+    dtheta: FloatArray
+
+
+class Rates(NamedTuple):
+    """Time derivatives of the four parts of a `State`, of the same shapes; NaN where there is no motor."""
+
+    dq: FloatArray
+    ddq: FloatArray
+    dtheta: FloatArray
+    ddtheta: FloatArray
+
+
+def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
+    """Mass matrix M(q) of the links, without rotors, ([samples,] joints, joints).
+
+    Args:
+        robot: the chain.
+        q: joint positions, ([samples,] joints), rad (m).
+
+    Raises:
+        InputError: q has another shape.
+    """
+    return chain_of(robot).mass_matrix(checked_shape("q", q, len(robot.joints)))
+
+
+def state_derivative(
+    robot: Robot, state: State, tau_motor: npt.ArrayLike, wrench: Wrench | None = None
+) -> Rates:
+    """Time derivative of the full state under motor torques: (5) solved for q'' and theta''.
+
+    Args:
+        robot: the robot.
+        state: its state, at one instant or over samples.
+        tau_motor: torque of each motor, ([samples,] joints, 2), N m (N), joint side of the gear.
+        wrench: what the environment exerts on the end effector meanwhile, arrays ([samples,] 6).
+
+    Raises:
+        InputError: shapes that do not fit, or a mass matrix that is not positive definite.
+    """
+    plant = Plant(robot, None if wrench is None else wrench.frame)
+    q, dq, theta, dtheta = plant.unpacked(state)
+    torque = plant.drivetrain.of_motors(checked_shape("tau_motor", tau_motor, len(robot.joints), 2))
+    ddq, ddtheta = plant.accelerations(q, dq, theta, dtheta, torque, wrench)
+    merged = plant.drivetrain.merged
+    return Rates(dq, ddq, merged(dtheta, dq), merged(ddtheta, ddq))
+
+
+class Plant:
+    """A robot prepared for fast evaluation of its equations of motion.
+
+    Args:
+        robot: the robot.
+        frame: of the wrench at the end effector; None if there is none.
+
+    Attributes:
+        chain: its links and joints.
+        drivetrain: its motors and springs.
+    """
+
+    def __init__(self, robot: Robot, frame: str | None = None) -> None:
+        self.drivetrain = Drivetrain(robot.actuators)
+        self.chain = chain_of(robot, frame)
+        self._rigid_inertia = self.drivetrain.rigid_sum(self.drivetrain.inertia)
+        self._rigid_damping = self.drivetrain.rigid_sum(self.drivetrain.damping)
+        self._inertia = self.drivetrain.inertia[self.drivetrain.sprung]
+        self._damping = self.drivetrain.damping[self.drivetrain.sprung]
+
+    def unpacked(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """q, q' of the joints and theta, theta' of the motors with springs.
+
+        Raises:
+            InputError: a part has another shape than the robot's.
+        """
+        joints = len(self.drivetrain.present)
+        q, dq = checked_shape("q", state.q, joints), checked_shape("dq", state.dq, joints)
+        sprung = self.drivetrain.sprung
+        theta, dtheta = (
+            self.drivetrain.of_motors(checked_shape(name, values, joints, 2))[..., sprung]
+            for name, values in (("theta", state.theta), ("dtheta", state.dtheta))
+        )
+        if len({part.shape[:-1] for part in (q, dq, theta, dtheta)}) > 1:
+            raise InputError.one("q, dq, theta, dtheta must have the same number of samples")
+        return q, dq, theta, dtheta
+
+    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Deflection theta - q of each spring, or its rate from the rates."""
+        return theta - q[..., self.drivetrain.spring_joint]
+
+    def accelerations(
+        self,
+        q: FloatArray,
+        dq: FloatArray,
+        theta: FloatArray,
+        dtheta: FloatArray,
+        torque: FloatArray,
+        wrench: Wrench | None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Accelerations of the joints (..., joints) and of the motors with springs (..., springs), by (5).
+
+        Args:
+            q: position of the joints, (..., joints).
+            dq: their velocity.
+            theta: position of the motors with springs, (..., springs).
+            dtheta: their velocity.
+            torque: of all motors, (..., motors).
+            wrench: what the environment exerts, if the plant was made for one.
+        """
+        spring = self.drivetrain.torque(self.deflections(q, theta))
+        matrix = self.chain.mass_matrix(q) + np.diag(self._rigid_inertia)
+        drive = self.drivetrain.joint_sum(spring) + self.drivetrain.rigid_sum(torque)
+        ddq = self.chain.solve(matrix, drive - self.chain.bias(q, dq, wrench) - self._rigid_damping * dq)
+        ddtheta = (torque[..., self.drivetrain.sprung] - self._damping * dtheta - spring) / self._inertia
+        return ddq, ddtheta
+
+    def link_torque(
+        self, dq: FloatArray, ddq: FloatArray, spring: FloatArray, torque: FloatArray
+    ) -> FloatArray:
+        """tau_e (6), (..., joints); of a rigid drive what its motor leaves after moving itself.
+
+        Args:
+            dq: velocity of the joints, (..., joints).
+            ddq: their acceleration.
+            spring: torque of the springs, (..., springs).
+            torque: of all motors, (..., motors).
+        """
+        of_rotors = self._rigid_inertia * ddq + self._rigid_damping * dq
+        return self.drivetrain.joint_sum(spring) + self.drivetrain.rigid_sum(torque) - of_rotors
+
+
+def checked_shape(name: str, array: npt.ArrayLike, *shape: int) -> FloatArray:
+    """The array as float64, if it has this shape, or one axis of samples before it.
+
+    Raises:
+        InputError: it has another shape.
+    """
+    values = np.asarray(array, dtype=np.float64)
+    if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1:
+        expected = ", ".join(map(str, shape))
+        raise InputError.one(
+            f"{name} must have the shape ({expected}) or (samples, {expected}), not {values.shape}"
+        )
+    return values

@@ -1,0 +1,9 @@
+"""Deflections that follow the root of the first step: (19)-(20) integrated, instead of (14) solved anew.
+
+Buondonno & De Luca (2016), III-B, who warn of the drift.
+"""
+
+from vsacli.dynamics.integrated_deflections.follow import Following, follow
+from vsacli.dynamics.integrated_deflections.task import Stop
+
+__all__ = ["Following", "Stop", "follow"]

@@ -1,0 +1,103 @@
+"""What is asked of the joints at any time, and whether deflections can be followed there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from vsacli.actuators.antagonistic import (
+    Antagonistic,
+    decoupling_determinant,
+    deflection_rates,
+    solve_deflections,
+)
+from vsacli.actuators.reach import has, reach_flags
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import Flag
+from vsacli.dynamics.inverse import command_of, elastic_torques
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+REASONS = (
+    "",
+    "its decoupling matrix becomes singular",
+    "its stiffness leaves the range that its springs can reach",
+    "the integration cannot go on",
+)
+FOLLOWED, SINGULAR, UNREACHABLE, STALLED = range(len(REASONS))
+
+
+@dataclass(frozen=True)
+class Stop:
+    """From when on, s, the deflections of a joint cannot be followed, and why."""
+
+    time: float
+    reason: str
+
+
+class Task:
+    """A robot and what it is asked to do; deflections are (joints, 2, samples).
+
+    Attributes:
+        trajectory: what it is asked to do.
+        joints: the antagonistic joints, which alone have deflections to follow.
+    """
+
+    def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
+        self.trajectory = trajectory
+        self._robot = robot
+        self._actuators = {
+            index: joint.actuator
+            for index, joint in enumerate(robot.joints)
+            if isinstance(joint.actuator, Antagonistic)
+        }
+        self.joints = tuple(self._actuators)
+
+    def roots(self, joints: tuple[int, ...], time: FloatArray) -> FloatArray:
+        """Roots of (14) of some joints."""
+        return np.stack(
+            [
+                solve_deflections(actuator, command.tau_e, command.stiffness).deflections
+                for actuator, command in self._commands(joints, time)
+            ]
+        )
+
+    def rates(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> FloatArray:
+        """Rates of the deflections of some joints, (19)."""
+        return np.stack(
+            [
+                deflection_rates(actuator, of_joint, command.dtau_e, command.dstiffness)
+                for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
+            ]
+        )
+
+    def hindrances(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> npt.NDArray[np.intp]:
+        """Why the deflections of some joints cannot be followed there: indices into `REASONS`."""
+        return np.stack(
+            [
+                _hindrances(actuator, command, of_joint)
+                for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
+            ]
+        )
+
+    def _commands(self, joints: tuple[int, ...], time: FloatArray) -> Iterator[tuple[Antagonistic, Command]]:
+        """What is asked of some joints, from one pass of the recursion."""
+        motion = self.trajectory.at(time)
+        commanded = {**motion.variables(), **elastic_torques(self._robot, motion)}
+        for joint in joints:
+            yield self._actuators[joint], command_of(joint, commanded)
+
+
+def _hindrances(actuator: Antagonistic, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
+    """Singular is, too, where det A has another sign than on the joint's branch: it was zero on the way."""
+    solution = solve_deflections(actuator, command.tau_e, command.stiffness)
+    flags = reach_flags(command.stiffness, solution)
+    here, on_branch = (
+        np.sign(decoupling_determinant(actuator, each)) for each in (phi, solution.deflections)
+    )
+    singular = has(flags, Flag.SINGULAR) | (here != on_branch)
+    return np.where(has(flags, Flag.INFEASIBLE), UNREACHABLE, np.where(singular, SINGULAR, FOLLOWED))

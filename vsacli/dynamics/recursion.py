@@ -1,0 +1,319 @@
+"""The recursion of Buondonno & De Luca (2016), (36)-(60): link torques and their first two derivatives.
+
+Written once, on vectors of arbitrary scalars: floats, NumPy rows of samples, complex numbers, fractions,
+symbols. Given cos and sin of each joint angle (and the offset d of prismatic joints) it is a polynomial.
+
+Every quantity of frame k is a derivative taken in the base frame, written in components of frame k.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from vsacli.compute.vector import ZERO, Rotation, Scalar, SymmetricTensor, Vector, add, cross, mul
+
+Z0 = Vector(0, 0, 1)
+
+
+class LinkConstants(NamedTuple):
+    """What the recursion needs of a joint and its link; scalars of any kind.
+
+    Attributes:
+        revolute: kind of the joint.
+        a: length of the Denavit-Hartenberg row.
+        cos_alpha: cosine of its twist.
+        sin_alpha: sine of its twist.
+        mass: mass of the augmented link.
+        com: its centre of mass, in the link frame.
+        inertia: its tensor about the centre of mass, link axes.
+        damping: viscous damping D of the joint.
+    """
+
+    revolute: bool
+    a: Scalar
+    cos_alpha: Scalar
+    sin_alpha: Scalar
+    mass: Scalar
+    com: Vector
+    inertia: SymmetricTensor
+    damping: Scalar
+
+
+class JointState(NamedTuple):
+    """Pose and motion of a joint: cos and sin of its angle, its offset d, and q', q'', q''', q''''."""
+
+    cos: Scalar
+    sin: Scalar
+    d: Scalar
+    rates: tuple[Scalar, Scalar, Scalar, Scalar]
+
+
+class TorqueDerivatives(NamedTuple):
+    """Torque (force) of a joint, and its first and second time derivative."""
+
+    tau: Scalar
+    dtau: Scalar
+    ddtau: Scalar
+
+
+class TipLoad(NamedTuple):
+    """What the end effector exerts on the environment, at a point fixed to the last link.
+
+    Attributes:
+        force: its components and their first and second derivatives.
+        moment: likewise, about that point.
+        point: from the origin of frame N, in frame N.
+        in_base: whether the components are along the axes of frame 0, else of frame N.
+    """
+
+    force: Sequence[Vector]
+    moment: Sequence[Vector]
+    point: Vector
+    in_base: bool
+
+
+class _Angular(NamedTuple):
+    """Angular velocity, acceleration, jerk and snap of a frame."""
+
+    omega: Vector
+    gamma: Vector
+    iota: Vector
+    varsigma: Vector
+
+
+class _Frame(NamedTuple):
+    """Motion of a link frame: angular, and acceleration, jerk and snap of its origin."""
+
+    angular: _Angular
+    a: Vector
+    j: Vector
+    s: Vector
+
+
+class _PointRates(NamedTuple):
+    """First to fourth derivative of the position of a point fixed in a frame, from the frame's origin."""
+
+    first: Vector
+    second: Vector
+    third: Vector
+    fourth: Vector
+
+
+class _Slide(NamedTuple):
+    """What the sliding of a prismatic joint adds to p', and to (40), (42), (44)."""
+
+    dp: Vector
+    a: Vector
+    j: Vector
+    s: Vector
+
+
+_NO_SLIDE = _Slide(ZERO, ZERO, ZERO, ZERO)
+
+
+class _Body(NamedTuple):
+    """What the backward pass needs of link k."""
+
+    rotation: Rotation
+    z: Vector
+    frame: _Frame
+    p: tuple[Vector, Vector, Vector]
+    c: tuple[Vector, Vector, Vector]
+    force: tuple[Vector, Vector, Vector]
+    moment: tuple[Vector, Vector, Vector]
+
+
+class _Reaction(NamedTuple):
+    """Force f and moment n of link k-1 on link k, with their derivatives f', f'', n', n''.
+
+    Beyond the last link, of that link on the environment.
+    """
+
+    f: tuple[Vector, Vector, Vector]
+    n: tuple[Vector, Vector, Vector]
+
+
+_NO_REACTION = _Reaction((ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO))
+
+
+def recursion(
+    links: Sequence[LinkConstants],
+    states: Sequence[JointState],
+    gravity: Vector,
+    tip: TipLoad | None = None,
+) -> list[TorqueDerivatives]:
+    """Run (36)-(60) once over a chain.
+
+    Args:
+        links: constants of each joint and link, base to tip.
+        states: pose and motion of each joint, in the same order.
+        gravity: gravity acceleration in frame 0, m/s^2.
+        tip: what the end effector exerts on the environment, if anything; N and N m per s^k.
+
+    Returns:
+        tau_e, tau_e', tau_e'' of each joint, base to tip; N m (N at a prismatic joint) per s^k.
+    """
+    frame = _Frame(_Angular(ZERO, ZERO, ZERO, ZERO), a=ZERO - gravity, j=ZERO, s=ZERO)
+    bodies = []
+    for link, state in zip(links, states, strict=True):
+        body = _forward(link, state, frame)
+        frame = body.frame
+        bodies.append(body)
+
+    torques = []
+    reaction = _NO_REACTION if tip is None else _tip_reaction(tip, bodies)
+    for link, state, body in zip(reversed(links), reversed(states), reversed(bodies), strict=True):
+        reaction = _backward(body, reaction)
+        torques.append(_project(link, state, body, reaction))
+        reaction = _in_previous_frame(body.rotation, reaction)
+    return torques[::-1]
+
+
+def _forward(link: LinkConstants, state: JointState, previous: _Frame) -> _Body:
+    turning, sliding = (state.rates, (0, 0, 0, 0)) if link.revolute else ((0, 0, 0, 0), state.rates)
+    rotation = Rotation(state.cos, state.sin, link.cos_alpha, link.sin_alpha)
+    z = Vector(0, link.sin_alpha, link.cos_alpha)
+    p = Vector(link.a, mul(state.d, link.sin_alpha), mul(state.d, link.cos_alpha))
+
+    angular = _angular_motion(rotation, turning, previous.angular)
+    v_p = _fixed_point(angular, p)
+    slide = _slide(angular, sliding, z) if not link.revolute else _NO_SLIDE
+    frame = _Frame(
+        angular,
+        a=rotation.undo(previous.a) + v_p.second + slide.a,  # (40)
+        j=rotation.undo(previous.j) + v_p.third + slide.j,  # (42)
+        s=rotation.undo(previous.s) + v_p.fourth + slide.s,  # (44)
+    )
+    v_c = _fixed_point(angular, link.com)
+    a_c, j_c, s_c = frame.a + v_c.second, frame.j + v_c.third, frame.s + v_c.fourth  # (41) (43) (45)
+    return _Body(
+        rotation=rotation,
+        z=z,
+        frame=frame,
+        p=(p, v_p.first + slide.dp, v_p.second + slide.a),
+        c=(link.com, v_c.first, v_c.second),
+        force=(a_c * link.mass, j_c * link.mass, s_c * link.mass),  # (46)-(48)
+        moment=_euler(link.inertia, angular),
+    )
+
+
+def _angular_motion(rotation: Rotation, turning: Sequence[Scalar], previous: _Angular) -> _Angular:
+    w, g, i, s = previous
+    t1z, t2z, t3z, t4z = (Z0 * rate for rate in turning)
+    w_t1z, g_t1z = cross(w, t1z), cross(g, t1z)
+    ww_t1z = cross(w, w_t1z)
+    return _Angular(
+        omega=rotation.undo(w + t1z),  # (36)
+        gamma=rotation.undo(g + t2z + w_t1z),  # (37)
+        iota=rotation.undo(i + t3z + g_t1z + cross(w, t2z * 2 + w_t1z)),  # (38)
+        varsigma=rotation.undo(  # (39)
+            s + t4z + cross(g, t2z) * 3 + cross(w, t3z + cross(w, t2z)) * 3
+            + cross(g, w_t1z) * 2 + cross(w, ww_t1z + g_t1z) + cross(i, t1z)
+        ),
+    )  # fmt: skip
+
+
+def _fixed_point(angular: _Angular, r: Vector) -> _PointRates:
+    w, g, i, s = angular
+    first = cross(w, r)
+    second = cross(g, r) + cross(w, first)
+    third = cross(i, r) + cross(g, first) * 2 + cross(w, second)
+    fourth = cross(s, r) + cross(i, first) * 3 + cross(g, second) * 3 + cross(w, third)
+    return _PointRates(first, second, third, fourth)
+
+
+def _slide(angular: _Angular, sliding: Sequence[Scalar], z: Vector) -> _Slide:
+    d1, d2, d3, d4 = sliding
+    v_z = _fixed_point(angular, z)
+    return _Slide(
+        dp=z * d1,
+        a=z * d2 + v_z.first * (2 * d1),  # of (40)
+        j=z * d3 + v_z.first * (3 * d2) + v_z.second * (3 * d1),  # of (42)
+        s=z * d4 + v_z.first * (4 * d3) + v_z.second * (6 * d2) + v_z.third * (4 * d1),  # of (44)
+    )
+
+
+def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector, Vector]:
+    w, g, i, s = angular
+    i_w, i_g = inertia.times(w), inertia.times(g)
+    g_w = cross(g, w)
+    moment = i_g + cross(w, i_w)  # (49)
+    dmoment = cross(w, i_g + moment) + inertia.times(g_w + i) + cross(g, i_w)  # (50)
+    ddmoment = (  # (51)
+        cross(g, i_g + moment * 2) + cross(i, i_w)
+        + inertia.times(cross(i, w) * 2 - cross(w, g_w) + s)
+        + cross(w, cross(w, i_g) + inertia.times(i + g_w) * 2 + dmoment)
+    )  # fmt: skip
+    return moment, dmoment, ddmoment
+
+
+def _tip_reaction(tip: TipLoad, bodies: Sequence[_Body]) -> _Reaction:
+    """f+, n+ of the last link and their derivatives, about the origin of frame N."""
+    angular = bodies[-1].frame.angular
+    if tip.in_base:
+        rotations = [body.rotation for body in bodies]
+        f, df, ddf = (_into_last_frame(rotations, vector) for vector in tip.force)
+        m, dm, ddm = (_into_last_frame(rotations, vector) for vector in tip.moment)
+    else:
+        f, df, ddf = _turning(angular, *tip.force)
+        m, dm, ddm = _turning(angular, *tip.moment)
+
+    v_r = _fixed_point(angular, tip.point)
+    r, dr, ddr = tip.point, v_r.first, v_r.second
+    n = m + cross(r, f)
+    dn = dm + cross(dr, f) + cross(r, df)
+    ddn = ddm + cross(ddr, f) + cross(dr, df) * 2 + cross(r, ddf)
+    return _Reaction((f, df, ddf), (n, dn, ddn))
+
+
+def _into_last_frame(rotations: Sequence[Rotation], v: Vector) -> Vector:
+    for rotation in rotations:
+        v = rotation.undo(v)
+    return v
+
+
+def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vector, Vector, Vector]:
+    """Derivatives in the base frame of a vector whose components in a turning frame are u(t)."""
+    w, g = angular.omega, angular.gamma
+    w_u = cross(w, u)
+    return u, du + w_u, ddu + cross(w, du) * 2 + cross(g, u) + cross(w, w_u)
+
+
+def _backward(body: _Body, tip: _Reaction) -> _Reaction:
+    (c, dc, ddc), (p, dp, ddp) = body.c, body.p
+    force, dforce, ddforce = body.force
+    moment, dmoment, ddmoment = body.moment
+
+    f = tip.f[0] + force  # (52)
+    df = tip.f[1] + dforce  # (53)
+    ddf = tip.f[2] + ddforce  # (54)
+    n = tip.n[0] + cross(c, force) + cross(p, f) + moment  # (55)
+    dn = (  # (56)
+        tip.n[1] + cross(dc, force) + cross(c, dforce) + cross(dp, f) + cross(p, df) + dmoment
+    )
+    ddn = (  # (57)
+        tip.n[2] + cross(ddc, force) + cross(dc, dforce) * 2 + cross(c, ddforce)
+        + cross(ddp, f) + cross(dp, df) * 2 + cross(p, ddf) + ddmoment
+    )  # fmt: skip
+    return _Reaction((f, df, ddf), (n, dn, ddn))
+
+
+def _project(link: LinkConstants, state: JointState, body: _Body, reaction: _Reaction) -> TorqueDerivatives:
+    w, g = body.frame.angular.omega, body.frame.angular.gamma
+    x, dx, ddx = reaction.n if link.revolute else reaction.f
+    x_w = cross(x, w)
+    q1, q2, q3, _ = state.rates
+    return TorqueDerivatives(
+        tau=add(x.dot(body.z), mul(link.damping, q1)),  # (58)
+        dtau=add((dx + x_w).dot(body.z), mul(link.damping, q2)),  # (59)
+        ddtau=add(  # (60)
+            (ddx + cross(dx, w) * 2 + cross(x, g) + cross(x_w, w)).dot(body.z), mul(link.damping, q3)
+        ),
+    )
+
+
+def _in_previous_frame(rotation: Rotation, reaction: _Reaction) -> _Reaction:
+    f, df, ddf = (rotation.apply(vector) for vector in reaction.f)
+    n, dn, ddn = (rotation.apply(vector) for vector in reaction.n)
+    return _Reaction((f, df, ddf), (n, dn, ddn))

@@ -1,0 +1,188 @@
+"""The dynamics of the bare chain, solved for motion: M(q), n(q, q'), and the terms of (35) and (60).
+
+Each is a program recorded from the recursion (36)-(60), so that a single sample costs microseconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.rigid import Rigid
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
+from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray
+from vsacli.compute.tracing.linear_solve import solve_positive_definite
+from vsacli.compute.vector import ZERO, Scalar, Vector
+from vsacli.dynamics.link_torques import base_gravity, joint_state, link_constants, tip_load
+from vsacli.dynamics.recursion import TipLoad, TorqueDerivatives, recursion
+from vsacli.robot.model import Limits, Robot
+
+SMALLEST_PIVOT = 1e-12
+"""Pivot of M, relative to the diagonal entry, below which there is no mass but only rounding."""
+
+
+class Chain:
+    """Programs of a chain of joints; get it from `chain_of`.
+
+    Arrays are (joints,) or (samples, joints) throughout. A wrench must be given if and only if the chain was
+    made for one.
+    """
+
+    def __init__(self, robot: Robot, frame: str | None) -> None:
+        self._names = robot.joint_names
+        self._lower = np.tril_indices(len(robot.joints))
+        self._inertia = _inertia_program(robot)
+        self._bias = _torque_program(robot, frame, "tau", orders=1)
+        self._rate = _torque_program(robot, frame, "dtau", orders=2)
+        self._acceleration = _torque_program(robot, frame, "ddtau", orders=4)
+
+    def mass_matrix(self, q: FloatArray) -> FloatArray:
+        """M(q), ([samples,] joints, joints): column k is the recursion's torque at q'' = e_k alone."""
+        row, column = self._lower
+        entries = self._inertia(q)
+        matrix = np.empty_like(q, shape=(*q.shape, q.shape[-1]))
+        matrix[..., row, column] = matrix[..., column, row] = entries
+        return matrix
+
+    def bias(self, q: FloatArray, dq: FloatArray, wrench: Wrench | None) -> FloatArray:
+        """n(q, q') of (34): gravity, centrifugal and Coriolis torques, damping, wrench; N m (N)."""
+        return self._bias(q, dq, *_derivatives(wrench, 0))
+
+    def torque_rate(
+        self, q: FloatArray, dq: FloatArray, ddq: FloatArray, wrench: Wrench | None
+    ) -> FloatArray:
+        """M' q'' + n' of (35): the recursion's tau_e' at q''' = 0."""
+        return self._rate(q, dq, ddq, *_derivatives(wrench, 1))
+
+    def torque_acceleration(
+        self,
+        q: FloatArray,
+        dq: FloatArray,
+        ddq: FloatArray,
+        d3q: FloatArray,
+        d4q: FloatArray,
+        wrench: Wrench | None,
+    ) -> FloatArray:
+        """tau_e'' (60)."""
+        return self._acceleration(q, dq, ddq, d3q, d4q, *_derivatives(wrench, 2))
+
+    def solve(self, matrix: FloatArray, torque: FloatArray) -> FloatArray:
+        """matrix^-1 torque, for M(q) or what rigid drives make of it.
+
+        Args:
+            matrix: ([samples,] joints, joints), symmetric.
+            torque: ([samples,] joints).
+
+        Raises:
+            InputError: the matrix is not positive definite; names the first joint whose leading minor fails.
+                A recorded program gives NaN instead.
+        """
+        if isinstance(matrix, TracedArray):
+            return solve_positive_definite(matrix, torque, SMALLEST_PIVOT)
+        self._check_positive_definite(matrix)
+        return np.asarray(np.linalg.solve(matrix, torque[..., None])[..., 0], dtype=np.float64)
+
+    def _check_positive_definite(self, matrices: FloatArray) -> None:
+        try:
+            pivots = np.diagonal(np.linalg.cholesky(matrices), axis1=-2, axis2=-1) ** 2
+        except np.linalg.LinAlgError:
+            raise self._indefinite(matrices) from None
+        if (pivots <= SMALLEST_PIVOT * np.diagonal(matrices, axis1=-2, axis2=-1)).any():
+            raise self._indefinite(matrices)
+
+    def _indefinite(self, matrices: FloatArray) -> InputError:
+        joint = next(
+            index
+            for index in range(len(self._names))
+            if not _last_pivot(matrices[..., : index + 1, : index + 1]) > SMALLEST_PIVOT
+        )
+        return InputError.one(
+            f"joint {self._names[joint]}: the inertia it moves is not positive (leading minor {joint + 1} of "
+            "the mass matrix), so a torque gives no acceleration; give this link, or one beyond it, mass"
+        )
+
+
+def _derivatives(wrench: Wrench | None, order: int) -> list[FloatArray]:
+    """The wrench and its derivatives up to an order."""
+    return [] if wrench is None else [getattr(wrench, name) for name in WRENCH_NAMES[: order + 1]]
+
+
+def _last_pivot(matrices: FloatArray) -> float:
+    """Smallest last pivot of matrices whose other pivots are positive, relative to their last entry."""
+    factors = np.linalg.solve(matrices[..., :-1, :-1], matrices[..., :-1, -1:])
+    pivots = matrices[..., -1, -1] - (matrices[..., -1:, :-1] @ factors)[..., 0, 0]
+    entries = matrices[..., -1, -1]
+    return float(np.min(np.divide(pivots, entries, out=np.zeros_like(pivots), where=entries > 0)))
+
+
+def chain_of(robot: Robot, frame: str | None = None) -> Chain:
+    """The programs of a robot's links and joints; recorded once for equal chains.
+
+    Args:
+        robot: whose base and tool count, but not its actuators.
+        frame: of the wrench at the end effector, as in `Wrench`; None if there is none.
+    """
+    joints = tuple(replace(joint, actuator=_ANY_DRIVE, limits=Limits()) for joint in robot.joints)
+    return _recorded(
+        Robot(name="", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints), frame
+    )
+
+
+_ANY_DRIVE: Any = Rigid(motor=Motor(inertia=1.0))
+
+
+@lru_cache(maxsize=16)
+def _recorded(robot: Robot, frame: str | None) -> Chain:
+    return Chain(robot, frame)
+
+
+def _inertia_program(robot: Robot) -> Program:
+    """Lower triangle of M, row by row."""
+    tape = Tape()
+    q = tape.inputs(len(robot.joints))
+    numbers = range(len(robot.joints))
+    columns = [
+        _torques(robot, q, [(0, int(joint == moving), 0, 0) for joint in numbers], ZERO, None)
+        for moving in numbers
+    ]
+    lower = [columns[column][row].tau for row in numbers for column in range(row + 1)]
+    return Program(tape.listing(lower))
+
+
+def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -> Program:
+    """An output of the recursion; derivatives of q beyond `orders` are zero."""
+    tape = Tape()
+    joints = len(robot.joints)
+    q = tape.inputs(joints)
+    rates = [tape.inputs(joints) if order < orders else [0] * joints for order in range(4)]
+    tip = None if frame is None else _load(tape, robot, frame, ("tau", "dtau", "ddtau").index(output))
+    torques = _torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), tip)
+    return Program(tape.listing([getattr(torque, output) for torque in torques]))
+
+
+def _load(tape: Tape, robot: Robot, frame: str, order: int) -> TipLoad:
+    """The wrench and its derivatives up to an order as inputs, the others zero."""
+    axes = len(WRENCH_AXES)
+    wrench = [tape.inputs(axes) if derivative <= order else [0] * axes for derivative in range(3)]
+    return tip_load(robot, frame, wrench)
+
+
+def _torques(
+    robot: Robot,
+    q: Sequence[Symbol],
+    rates: Sequence[tuple[Scalar, ...]],
+    gravity: Vector,
+    tip: TipLoad | None,
+) -> list[TorqueDerivatives]:
+    states = [
+        joint_state(joint, position, (d1, d2, d3, d4))
+        for joint, position, (d1, d2, d3, d4) in zip(robot.joints, q, rates, strict=True)
+    ]
+    return recursion([link_constants(joint) for joint in robot.joints], states, gravity, tip)

@@ -1,0 +1,146 @@
+"""The robots and trajectories that come with the package, wherever it is installed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from itertools import takewhile
+from pathlib import Path
+
+from vsacli.base.atomic_files import AtomicFile, check_target, reporting_storage_errors
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError, Problem
+from vsacli.robot.file import load_robot
+from vsacli.robot.model import Robot
+from vsacli.trajectory.file import load_trajectory
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A trajectory that is shipped.
+
+    Attributes:
+        path: its file.
+        robots: names of the robots it is made for.
+        description: what it does, a clause.
+    """
+
+    path: Path
+    robots: tuple[str, ...]
+    description: str
+
+    @property
+    def name(self) -> str:
+        """The stem of its file."""
+        return self.path.stem
+
+
+@dataclass(frozen=True)
+class Example:
+    """A robot that is shipped, with the trajectories made for it."""
+
+    path: Path
+    motions: tuple[Motion, ...]
+
+    @property
+    def name(self) -> str:
+        """The stem of its file."""
+        return self.path.stem
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot itself."""
+        return load_robot(self.path)
+
+    def files(self) -> Iterator[Path]:
+        """Every file it takes, tables of its springs and motions included."""
+        yield from (Path(source.path) for source in self.robot.sources)
+        for motion in self.motions:
+            yield from (Path(source.path) for source in load_trajectory(motion.path, self.robot).sources)
+
+
+def examples(names: Iterable[str] = ()) -> list[Example]:
+    """The robots of these names, by default all, in alphabetical order.
+
+    Raises:
+        InputError: for each name that is no robot's, the nearest one that is.
+    """
+    motions = [_motion(path) for path in sorted((_root() / "trajectories").glob("*.yaml"))]
+    found = {
+        path.stem: Example(path, tuple(motion for motion in motions if path.stem in motion.robots))
+        for path in sorted((_root() / "robots").glob("*.yaml"))
+    }
+    wanted = set(names)
+    if unknown := sorted(wanted - found.keys()):
+        raise InputError(
+            Problem("", 0, f"no example is called {name!r}{did_you_mean(name, found)}") for name in unknown
+        )
+    return [example for name, example in found.items() if not wanted or name in wanted]
+
+
+def copy_examples(names: Iterable[str], folder: str | Path, *, overwrite: bool = False) -> list[Path]:
+    """Copy examples into `robots` and `trajectories` of a folder.
+
+    Args:
+        names: of the robots, copied with their trajectories and the tables these need; if there are none,
+            everything that is shipped is copied, files to import too.
+        folder: where to; it is made if it does not exist.
+        overwrite: whether files there may be replaced.
+
+    Returns:
+        The copies.
+
+    Raises:
+        InputError: as `examples`.
+        StorageError: one of them exists and `overwrite` is false, so that none is copied, or a file cannot be
+            written.
+    """
+    chosen = list(names)
+    sources = [path for example in examples(chosen) for path in example.files()] if chosen else _every_file()
+    copies = {path: Path(folder) / path.relative_to(_root()) for path in sources}
+    _check_targets(list(copies.values()), overwrite)
+    for path, copy in copies.items():
+        with AtomicFile(copy, overwrite=overwrite) as file:
+            with reporting_storage_errors(copy):
+                file.temporary.write_bytes(path.read_bytes())
+            file.publish()
+    return list(copies.values())
+
+
+def opening_comment(path: Path) -> str:
+    """What the comment says with which a YAML file begins, in one line."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return " ".join(line.lstrip("# ") for line in takewhile(lambda line: line.startswith("#"), lines))
+
+
+def _every_file() -> list[Path]:
+    found = (path for folder in ("robots", "trajectories") for path in (_root() / folder).iterdir())
+    return sorted(path for path in found if path.is_file() and not path.name.startswith("."))
+
+
+def _check_targets(copies: Sequence[Path], overwrite: bool) -> None:
+    """Make the folders and refuse, before anything is copied, what cannot be."""
+    for folder in {copy.parent for copy in copies}:
+        with reporting_storage_errors(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+    for copy in copies:
+        check_target(copy, overwrite=overwrite)
+
+
+def _root() -> Path:
+    """The folder of `robots` and `trajectories`: the package, or beside it in a clone of the repository."""
+    package = Path(str(files("vsacli")))
+    return package if (package / "robots").is_dir() else package.parent
+
+
+def _motion(path: Path) -> Motion:
+    """Read the comment with which a trajectory begins, as in "For robots/a.yaml: the arm rises. More words".
+
+    It names all the robots before the first colon.
+    """
+    made_for, _, text = opening_comment(path).partition(": ")
+    robots = tuple(re.findall(r"robots/(\w+)\.yaml", made_for))
+    return Motion(path, robots, text.partition(". ")[0].removesuffix("."))

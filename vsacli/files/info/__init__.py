@@ -1,0 +1,7 @@
+"""What a file holds, as plain values for JSON and as text."""
+
+from vsacli.files.info.describe import describe_file
+from vsacli.files.info.selection import bare, select
+from vsacli.files.info.text import render
+
+__all__ = ["bare", "describe_file", "render", "select"]

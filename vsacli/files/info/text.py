@@ -1,0 +1,172 @@
+"""Descriptions as text: headline, tables, and what is to be known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from vsacli.analysis import report_text
+from vsacli.analysis.report import Report
+from vsacli.analysis.report_text import aligned
+from vsacli.base.units import POSITION, STIFFNESS, TORQUE
+
+Description = Mapping[str, Any]
+
+DIGITS = 5
+MOTION = ("dq", "ddq", "d3q", "d4q")
+
+
+def render(description: Description) -> str:
+    """A description as lines of text, without a final newline."""
+    return "\n".join(_RENDERERS[description["kind"]](description))
+
+
+def _robot(robot: Description) -> Iterator[str]:
+    reach, joints = robot["reach"], robot["joints"]
+    yield f"robot {robot['name']}: {len(joints)} joints, {_short(robot['mass'])} kg"
+    if robot["description"]:
+        yield robot["description"]
+    yield f"gravity {_row(robot['gravity'])} m/s^2 in the base frame"
+    for name in ("base", "tool"):
+        pose = robot[name]
+        yield f"{name} xyz {_row(pose['xyz'])} m, rpy {_row(pose['rpy'])} rad"
+    yield f"reach {_short(reach['found'])} m from the origin of DH frame 0; bound {_short(reach['bound'])} m"
+    yield from ("", *aligned(list(_geometry(joints))))
+    yield from ("", *aligned(list(_masses(joints))))
+    yield from ("", *aligned(list(_drives(joints))), "")
+    yield "static load: the largest torque of gravity that was found, over configurations within the limits"
+    yield "stiffness: reachable without load, and with the static load in either direction"
+    if robot["held_at_zero"]:
+        yield f"without position limits, and held at zero: {', '.join(robot['held_at_zero'])}"
+    yield from report_text.remarks(robot["warnings"], ())
+
+
+def _geometry(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
+    yield "joint", "type", "a [m]", "alpha [rad]", "d [m]", "theta [rad]", "limits"
+    for joint in joints:
+        row = (_short(joint["dh"][name]) for name in ("a", "alpha", "d", "theta"))
+        unit = POSITION.unit(joint["type"])
+        yield joint["name"], joint["type"], *row, _span(joint["limits"]["position"], unit)
+
+
+def _masses(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
+    moments = ("xx", "yy", "zz", "xy", "xz", "yz")
+    yield "joint", "mass [kg]", "com [m]", *(f"{name} [kg m^2]" for name in moments)
+    for joint in joints:
+        link = joint["link"]
+        inertia = (_short(link["inertia"][name]) for name in moments)
+        yield joint["name"], _short(link["mass"]), _row(link["com"]), *inertia
+
+
+def _drives(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
+    yield "joint", "actuator", "springs", "static load", "stiffness", "under load"
+    for joint in joints:
+        kind, actuator, ranges = joint["type"], joint["actuator"], joint["stiffness_range"]
+        unit = STIFFNESS.unit(kind)
+        springs = " ".join(dict.fromkeys(spring["type"] for spring in actuator.get("spring", ())))
+        given = f"{_short(actuator['stiffness'])} {unit}" if "stiffness" in actuator else "-"
+        reachable = (_span(ranges[name], unit) if ranges else given for name in ("unloaded", "loaded"))
+        load = f"{_short(joint['static_load']['torque'])} {TORQUE.unit(kind)}"
+        yield joint["name"], actuator["type"], springs or "-", load, *reachable
+
+
+def _trajectory(trajectory: Description) -> Iterator[str]:
+    yield (
+        f"trajectory {trajectory['name']}: {trajectory['samples']} steps, {_short(trajectory['duration'])} s"
+        f" from t = {_short(trajectory['start'])} s"
+    )
+    rows = [("joint", "q", *(f"peak {name}" for name in MOTION), "stiffness")]
+    rows += [
+        (
+            joint["name"],
+            _range(joint["q"]),
+            *(_short(joint[name]["peak"]) for name in MOTION),
+            _range(joint["stiffness"]),
+        )
+        for joint in trajectory["joints"]
+    ]
+    yield from aligned(rows)
+    yield f"units: q {POSITION}, its k-th derivative per s^k; stiffness {STIFFNESS}"
+    if "wrench" in trajectory:
+        yield from _wrench(trajectory["wrench"])
+    yield from report_text.remarks(trajectory["warnings"], trajectory["notes"])
+
+
+def _wrench(wrench: Description) -> Iterator[str]:
+    axes = [axis for axis in wrench if axis != "frame"]
+    ranges = ", ".join(f"{axis} {_range(wrench[axis]['wrench'])}" for axis in axes)
+    yield f"wrench along the axes of {wrench['frame']}, N and N m: {ranges}"
+
+
+def _result(result: Description) -> Iterator[str]:
+    whole = "" if result["complete"] else ", ended early"
+    yield f"{result['kind']} of {result['robot']}, {result['trajectory']}: {result['samples']} steps{whole}"
+    yield f"verdict {result['verdict']}"
+    source = result["provenance"]
+    versions = ", ".join(f"{name} {version}" for name, version in source["versions"].items())
+    yield f"created {source['created']} by {source['generated_by']} ({versions})"
+    yield f"command line: {source['command_line']}"
+    yield from (f"input {each['path']}, SHA-256 {each['sha256']}" for each in source["inputs"])
+    rows = [("joint", "type", "actuator")]
+    rows += [(joint["name"], joint["type"], joint["actuator"]) for joint in result["joints"]]
+    yield from ("", *aligned(rows), "")
+    yield from _left(
+        [
+            (each["name"], ", ".join(each["dims"]), each["units"], each["meaning"])
+            for each in result["variables"]
+        ]
+    )
+    yield from ("", _report(result["kind"], result["report"]))
+
+
+def _report(kind: str, report: Description) -> str:
+    """What the command that made the file printed."""
+    from vsacli.control.simulation import simulation_text as simulation_text
+    from vsacli.control.simulation.simulation_report import SimulationReport
+
+    try:
+        if kind == "simulation":
+            return simulation_text.render(SimulationReport.from_json(report))
+        return report_text.render(Report.from_json(report))
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError):
+        return "its report has another form than this version writes; --json shows it"
+
+
+def _left(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """A table with all its columns to the left."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
+def _row(values: Iterable[float]) -> str:
+    return " ".join(map(_short, values))
+
+
+def _short(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.{DIGITS}g}"
+
+
+def _range(ends: Mapping[str, float]) -> str:
+    low, high = ends["min"], ends["max"]
+    return _short(low) if math.isnan(low) or low == high else f"{_short(low)} to {_short(high)}"
+
+
+def _span(ends: Sequence[float], unit: str) -> str:
+    low, high = ends
+    if math.isnan(low) or low > high:
+        return "none"
+    if math.isinf(low) and math.isinf(high):
+        return "-"
+    if math.isinf(high):
+        return f"from {_short(low)} {unit}"
+    return f"to {_short(high)} {unit}" if math.isinf(low) else f"{_short(low)} to {_short(high)} {unit}"
+
+
+_RENDERERS: dict[str, Callable[[Description], Iterator[str]]] = {
+    "robot": _robot,
+    "trajectory": _trajectory,
+    "result": _result,
+    "simulation": _result,
+}

@@ -1,0 +1,145 @@
+"""A robot in place of the one that a trajectory is for, made of what the trajectory says about its joints."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.kinds import Actuator
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.rigid import Rigid
+from vsacli.base import units
+from vsacli.documents import tree
+from vsacli.documents.fields import IDENTIFIER
+from vsacli.documents.reading import survey_document
+from vsacli.documents.table import read_table
+from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
+from vsacli.trajectory.file import OF_ANY_ROBOT
+
+MOST_JOINTS = 1000
+_POSITION, _STIFFNESS = ".q", ".stiffness"
+
+
+class StandIn(NamedTuple):
+    """A robot, and whether its joints are surely in the order of the lists in the trajectory."""
+
+    robot: Robot
+    ordered: bool
+
+
+def stand_in(path: str | os.PathLike[str]) -> StandIn:
+    """A robot of revolute joints that a trajectory would fit if it fits any.
+
+    Names and number of the joints are those that the file speaks of; one joint if it says nothing. Joints
+    without stiffness are elastic, all rigid if there is no stiffness at all.
+
+    Raises:
+        InputError: the file, or a CSV file that it names, cannot be read.
+    """
+    if Path(path).suffix.lower() == ".csv":
+        columns = read_table(path).columns
+        names = _of_columns(columns) or _numbered(1)
+        return StandIn(_robot(names, _with_stiffness(columns, names)), ordered=True)
+    root, survey = survey_document(path, OF_ANY_ROBOT)
+    folder = Path(path).parent
+    columns = tuple(column for file in _tables(root) for column in read_table(folder / file).columns)
+    positions, stiffnesses = (
+        [node for quantity, node in survey if quantity == wanted]
+        for wanted in (units.POSITION, units.STIFFNESS)
+    )
+    names = _of_columns(columns) or _of_nodes(positions, stiffnesses)
+    if "stiffness" not in root.entries:
+        stiffened: tuple[str, ...] = ()
+    else:
+        stiffened = _stiffened(stiffnesses, names) if stiffnesses else _with_stiffness(columns, names)
+    ordered = bool(columns or _keys(positions)) or not _keys(stiffnesses)
+    return StandIn(_robot(names, stiffened), ordered)
+
+
+def _tables(root: tree.Mapping) -> Iterator[str]:
+    """Names of the CSV files of a document, each once."""
+    files = {}
+    for key in ("position", "stiffness"):
+        match root.entries.get(key):
+            case tree.Mapping(entries={"type": tree.Scalar(text="csv"), "file": tree.Scalar(text=file)}):
+                files[file] = key
+    return iter(files)
+
+
+def _of_columns(columns: Iterable[str]) -> tuple[str, ...]:
+    """Names of joints from the columns of their positions, `<joint>.q` or `q1`, with or without a unit."""
+    bare = [column.partition("[")[0].strip() for column in columns]
+    named = _names(column.removesuffix(_POSITION) for column in bare if column.endswith(_POSITION))
+    numbered = sum(1 for column in bare if column[:1] == "q" and column[1:].isdecimal())
+    return named or _numbered(numbered)
+
+
+def _with_stiffness(columns: Iterable[str], names: Sequence[str]) -> tuple[str, ...]:
+    bare = {column.partition("[")[0].strip() for column in columns}
+    return tuple(name for name in names if f"{name}{_STIFFNESS}" in bare) or tuple(names)
+
+
+def _of_nodes(positions: Sequence[tree.Node], stiffnesses: Sequence[tree.Node]) -> tuple[str, ...]:
+    """Names of joints from values per joint: keys of mappings, and as many as the longest list has."""
+    named = _keys(positions)
+    if named:
+        return named
+    count = max((len(node.items) for node in positions if isinstance(node, tree.Sequence)), default=1)
+    named = _keys(stiffnesses)
+    spare = (name for name in _numbered(count + len(named)) if name not in named)
+    return (*named, *islice(spare, max(count - len(named), 0)))
+
+
+def _keys(nodes: Sequence[tree.Node]) -> tuple[str, ...]:
+    keys = [key for node in nodes if isinstance(node, tree.Mapping) for key in node.entries]
+    return _names(keys)
+
+
+def _names(words: Iterable[str]) -> tuple[str, ...]:
+    """Those of the words that may be names of joints, each once."""
+    return tuple(dict.fromkeys(word for word in words if IDENTIFIER.fullmatch(word)))[:MOST_JOINTS]
+
+
+def _numbered(count: int) -> tuple[str, ...]:
+    return tuple(f"joint_{number}" for number in range(1, min(count, MOST_JOINTS) + 1))
+
+
+def _stiffened(nodes: Sequence[tree.Node], names: Sequence[str]) -> tuple[str, ...]:
+    """The joints to which values per joint give a stiffness."""
+    for node in nodes:
+        match node:
+            case tree.Mapping(entries=entries):
+                return tuple(name for name in names if name in entries)
+            case tree.Sequence(items=items) if len(items) == len(names):
+                given = [not (isinstance(item, tree.Scalar) and item.is_null) for item in items]
+                return tuple(name for name, has in zip(names, given, strict=True) if has)
+    return tuple(names)
+
+
+def _robot(names: Sequence[str], stiffened: Sequence[str]) -> Robot:
+    return Robot(name="stand-in", joints=tuple(_joint(name, _actuator(name, stiffened)) for name in names))
+
+
+def _actuator(name: str, stiffened: Sequence[str]) -> Actuator:
+    motor = Motor(inertia=1.0)
+    if not stiffened:
+        return Rigid(motor=motor)
+    if name in stiffened:
+        return Antagonistic(motor=(motor, motor), spring=(Cubic(k=1.0, k_c=1.0),) * 2)
+    return Elastic(motor=motor, stiffness=1.0)
+
+
+def _joint(name: str, actuator: Actuator) -> Joint:
+    return Joint(
+        name=name,
+        type="revolute",
+        dh=DenavitHartenberg(a=1.0, alpha=0.0),
+        link=Link(mass=1.0, com=(0.0, 0.0, 0.0), inertia=Inertia(xx=1.0, yy=1.0, zz=1.0)),
+        actuator=actuator,
+    )

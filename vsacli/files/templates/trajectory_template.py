@@ -1,0 +1,114 @@
+"""A trajectory file to begin with: a motion within reach, whose torques start without a step."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from vsacli.files.info.robot_info import stiffness_ranges
+from vsacli.files.info.workspace import static_load
+from vsacli.files.templates.commented import document
+from vsacli.robot.model import Joint, Robot
+from vsacli.trajectory.file import DEFAULT_RATE, FORMAT, OF_ANY_ROBOT
+
+DURATION = 4.0
+POSITION_DEGREE = 9
+STIFFNESS_DEGREE = 5
+"""With these, the motors' acceleration vanishes at both ends, and so does the step of their torques."""
+
+HEAD = (
+    "A trajectory to begin with. Degrees 9 and 5 are the smallest whose motor torques start and end without",
+    "a step. What stands commented out is optional.",
+)
+
+ANGLE = math.radians(30)
+STROKE = 0.1
+PEAK_RATE = 2.5
+"""Peak velocity of the motion, relative to its mean, rounded up."""
+
+SHARE_OF_LIMIT = 0.5
+"""Share of a range or limit that the motion uses."""
+
+SOFT, STIFF = 1.15, 1.35
+"""Stiffness relative to the smallest reachable one, where nothing bounds it from above."""
+
+Values = dict[str, Any]
+
+
+def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory") -> str:
+    """The text of a trajectory file.
+
+    Args:
+        robot: the robot that is to execute it, whose limits and springs decide on the numbers; without one
+            they are those of `robot_template` with revolute joints.
+        name: of the trajectory.
+    """
+    if robot is None:
+        position: Values = {"start": 0, "end": "30 deg"}
+        stiffness: Values = {"start": 1500, "end": 2000}
+    else:
+        position, stiffness = _position(robot), _stiffness(robot)
+    values: Values = {
+        "name": name,
+        "duration": DURATION,
+        "rate": DEFAULT_RATE,
+        "position": {"type": "polynomial", "degree": POSITION_DEGREE, **position},
+    }
+    if stiffness:
+        values["stiffness"] = {"type": "polynomial", "degree": STIFFNESS_DEGREE, **stiffness}
+    return document(FORMAT, OF_ANY_ROBOT, values, HEAD)
+
+
+def _position(robot: Robot) -> Values:
+    ways = {joint.name: _way(joint) for joint in robot.joints}
+    return {
+        end: {joint.name: _written(joint, ways[joint.name][index]) for joint in robot.joints}
+        for index, end in enumerate(("start", "end"))
+    }
+
+
+def _written(joint: Joint, position: float) -> str:
+    return f"{math.degrees(position):.3g} deg" if joint.is_revolute else f"{position:.3g}"
+
+
+def _way(joint: Joint) -> tuple[float, float]:
+    """From where to where a joint moves: near zero, well within its limits."""
+    low, high = joint.limits.position
+    slowest = min(abs(bound) for bound in joint.limits.velocity)
+    length = min(
+        ANGLE if joint.is_revolute else STROKE,
+        SHARE_OF_LIMIT * (high - low),
+        SHARE_OF_LIMIT * slowest * DURATION / PEAK_RATE,
+    )
+    start = min(max(0.0, low), high - length)
+    return start, start + length
+
+
+def _stiffness(robot: Robot) -> Values:
+    loads = static_load(robot).values
+    chosen = {
+        joint.name: _stiffnesses(joint, float(load))
+        for joint, load in zip(robot.joints, loads, strict=True)
+        if joint.name not in robot.without_stiffness
+    }
+    if not chosen:
+        return {}
+    return {
+        "start": {name: _rounded(start) for name, (start, _) in chosen.items()},
+        "end": {name: _rounded(end) for name, (_, end) in chosen.items()},
+    }
+
+
+def _stiffnesses(joint: Joint, load: float) -> tuple[float, float]:
+    """Two that are reachable while the joint carries its load; if none is, while it carries nothing."""
+    ranges = stiffness_ranges(joint, load)
+    lower, upper = ranges["loaded"] if ranges["loaded"][0] < ranges["loaded"][1] else ranges["unloaded"]
+    lower, upper = max(lower, joint.limits.stiffness[0]), min(upper, joint.limits.stiffness[1])
+    soft, stiff = SOFT * lower, STIFF * lower
+    if stiff > upper:
+        soft, stiff = lower + (upper - lower) / 3, lower + (upper - lower) * 2 / 3
+    return soft, stiff
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.3g}")

@@ -1,0 +1,160 @@
+"""Checking files of any kind, each as the command that reads it would."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+from vsacli.actuators.laws.table import MeasuredSpring
+from vsacli.base.errors import InputError, Problem
+from vsacli.control.poles import FORMAT, PolesFile, load_gains
+from vsacli.documents.reading import read_document
+from vsacli.documents.table import read_table
+from vsacli.files.kinds import FileKind, recognise
+from vsacli.files.placeholder_robot import stand_in
+from vsacli.files.validation.finding import Checked, failed, usable
+from vsacli.results.store.simulation import open_stored
+from vsacli.robot.file import load_robot
+from vsacli.robot.model import Robot
+from vsacli.robot.urdf.reader import read_urdf
+from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.trajectory import Trajectory
+
+BLOCK = 8192
+MOST_SHOWN = 3
+SPRING_COLUMNS = {"deflection", "torque"}
+WITHOUT_ROBOT = "no usable robot is among the files, so joint names, units and limits are not checked"
+
+Robots = Mapping[str, Robot]
+"""Robots by the paths of their files."""
+
+
+def check_files(paths: Sequence[str]) -> list[Checked]:
+    """Check files; trajectories and poles must fit one of the robots among them.
+
+    Raises:
+        StorageError: a result file cannot be read for a reason that is not its own.
+    """
+    kinds = {path: _kind(path) for path in paths}
+    robots: dict[str, Robot] = {}
+    checked: dict[str, Checked] = {}
+    for path, kind in sorted(kinds.items(), key=lambda item: item[1] is not FileKind.ROBOT):
+        checked[path] = kind if isinstance(kind, Checked) else _checked(path, kind, robots)
+    return [checked[path] for path in kinds]
+
+
+def _kind(path: str) -> FileKind | Checked:
+    try:
+        return recognise(path)
+    except InputError as error:
+        return failed(path, error)
+
+
+def _checked(path: str, kind: FileKind, robots: dict[str, Robot]) -> Checked:
+    """Check a file; a robot that can be used joins the others."""
+    try:
+        if kind is FileKind.ROBOT:
+            robots[path] = load_robot(path)
+        return _CHECKS[kind](path, robots)
+    except InputError as error:
+        return failed(path, error)
+
+
+def _robot(path: str, robots: Robots) -> Checked:
+    robot = robots[path]
+    return usable(path, f"robot {robot.name}, {_count(len(robot.joints), 'joint')}", robot.warnings)
+
+
+def _trajectory(path: str, robots: Robots) -> Checked:
+    if not robots:
+        return _described(path, load_trajectory(path, stand_in(path).robot), WITHOUT_ROBOT)
+    return _described(path, *_fitting(path, lambda robot: load_trajectory(path, robot), robots))
+
+
+def _described(path: str, trajectory: Trajectory, note: str) -> Checked:
+    steps = f"{_count(trajectory.samples, 'step')} over {trajectory.duration:g} s"
+    return usable(
+        path, f"trajectory {trajectory.name}, {steps}", trajectory.warnings, [*trajectory.notes, note]
+    )
+
+
+def _poles(path: str, robots: Robots) -> Checked:
+    document, _ = read_document(path, PolesFile, FORMAT)
+    summary = f"poles of {_count(len(document.joints), 'joint')}"
+    if not robots:
+        return usable(path, summary, notes=[WITHOUT_ROBOT])
+    _, note = _fitting(path, lambda robot: _gains(path, robot), robots)
+    return usable(path, summary, notes=[note])
+
+
+def _gains(path: str, robot: Robot) -> Any:
+    """Gains with or without integral action, which takes one more pole."""
+    try:
+        return load_gains(path, robot, integral=False)
+    except InputError:
+        return load_gains(path, robot, integral=True)
+
+
+def _fitting(path: str, read: Callable[[Robot], Any], robots: Robots) -> tuple[Any, str]:
+    """What is read for the first robot that it fits, and a note on the robots that it fits.
+
+    Raises:
+        InputError: it fits none; the problems are those with the robot that it fits best.
+    """
+    fitting: dict[str, Any] = {}
+    errors: dict[str, InputError] = {}
+    for robot_path, robot in robots.items():
+        try:
+            fitting[robot_path] = read(robot)
+        except InputError as error:
+            errors[robot_path] = error
+    if not fitting:
+        best = min(errors, key=lambda robot_path: len(errors[robot_path].problems))
+        raise InputError([*errors[best].problems, *_misfit(path, len(errors), best)])
+    shown = ", ".join([*fitting][:MOST_SHOWN]) + (", ..." if len(fitting) > MOST_SHOWN else "")
+    return next(iter(fitting.values())), f"fits {len(fitting)} of {_count(len(robots), 'robot')}: {shown}"
+
+
+def _misfit(path: str, robots: int, best: str) -> Iterator[Problem]:
+    if robots > 1:
+        message = f"fits none of the {robots} robots; the problems above are those with {best}"
+        yield Problem(path, 0, message)
+
+
+def _table(path: str, robots: Robots) -> Checked:
+    table = read_table(path)
+    if set(table.columns) != SPRING_COLUMNS:
+        return _trajectory(path, robots)
+    spring = MeasuredSpring(file=table)
+    return usable(path, f"spring of {_count(len(table.values), 'row')}", spring.notes)
+
+
+def _urdf(path: str, _: Robots) -> Checked:
+    urdf = read_urdf(path)
+    return usable(path, f"URDF of {urdf.name}, {_count(len(urdf.joints), 'joint')}")
+
+
+def _stored(path: str, _: Robots) -> Checked:
+    """Read every value once: damage inside the file shows only then."""
+    with open_stored(path) as result:
+        for name in result.variables:
+            for start in range(0, result.samples, BLOCK):
+                result.read(name, start, start + BLOCK)
+        result.provenance()
+        names = f"{result.robot_name}, {result.trajectory_name}"
+        return usable(path, f"{result.kind} of {names}, {_count(result.samples, 'step')}, {result.verdict}")
+
+
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+_CHECKS: dict[FileKind, Callable[[str, Robots], Checked]] = {
+    FileKind.ROBOT: _robot,
+    FileKind.TRAJECTORY: _trajectory,
+    FileKind.POLES: _poles,
+    FileKind.TABLE: _table,
+    FileKind.URDF: _urdf,
+    FileKind.RESULT: _stored,
+    FileKind.SIMULATION: _stored,
+}

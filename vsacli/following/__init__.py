@@ -1,9 +1,0 @@
-"""Deflections that follow the root of the first step: (19)-(20) integrated, instead of (14) solved anew.
-
-Buondonno & De Luca (2016), III-B, who warn of the drift.
-"""
-
-from vsacli.following.follow import Following, follow
-from vsacli.following.task import Stop
-
-__all__ = ["Following", "Stop", "follow"]

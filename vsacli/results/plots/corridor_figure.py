@@ -1,0 +1,96 @@
+"""Stiffness of each joint inside what its load allows, one panel per joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.gridspec import SubplotSpec
+from matplotlib.patches import Patch
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.units import STIFFNESS
+from vsacli.base.variables import VARIABLES, existing
+from vsacli.results.plots.curves import Curves, Failures, read_curves
+from vsacli.results.plots.drawing import draw_bands, draw_curve
+from vsacli.results.plots.panels import add_title, joint_panels
+from vsacli.results.plots.style import line_style
+from vsacli.results.store.reader import StoredResult
+
+MOST_ROWS = 5
+BOUNDS = ("stiffness_lower", "stiffness_upper")
+
+REACH = 0.25
+"""How far from the command a bound may lie to be shown, relative to the command."""
+
+MARGIN = 0.06
+"""Free space above and below, relative to what is shown."""
+
+_AREA: dict[str, Any] = {"facecolor": "#8fc1ec", "alpha": 0.4, "linewidth": 0, "zorder": 0.8}
+_EDGE: dict[str, Any] = {"color": "#6f9fc8", "linewidth": 0.9, "zorder": 1}
+
+
+def compliant_joints(actuators: Sequence[str]) -> list[int]:
+    """The joints that have a stiffness, by the types of their actuators."""
+    there = existing(VARIABLES["stiffness"], actuators)
+    return [joint for joint, [has_stiffness] in enumerate(there) if has_stiffness]
+
+
+def draw_corridors(place: SubplotSpec, result: StoredResult, failures: Failures) -> list[Artist]:
+    """Draw one panel per joint with a stiffness, of which there is one; returns what a legend shows."""
+    bounds = [name for name in BOUNDS if set(BOUNDS) <= set(result.variables)]
+    joints = compliant_joints(result.actuators)
+    curves = read_curves(result, ["stiffness", *bounds])
+    panels = joint_panels(place, failures.time, np.ones((len(joints), 1), dtype=bool), MOST_ROWS)[:, 0]
+    handles: list[Artist] = []
+    for joint, axes in zip(joints, panels, strict=True):
+        handles += _draw_stiffness(axes, curves[joint], joint)
+        handles += draw_bands(axes, failures.time, *failures.among([joint]))
+        add_title(axes, result.joint_names[joint])
+        axes.set_ylabel(rf"$\sigma$ [{STIFFNESS.unit(result.joint_types[joint])}]")
+    return handles
+
+
+def _draw_stiffness(axes: Axes, curves: Curves, joint: int) -> list[Artist]:
+    command, *bounds = curves.values
+    bottom, top = visible_range(command, *bounds)
+    axes.set_ylim(bottom, top)
+    draw_curve(axes, curves.time, command, joint, line_style(joint))
+    if not bounds:
+        return []
+    lower, upper = bounds
+    carried = ~np.isnan(lower)
+    if not carried.any():
+        return []
+    axes.fill_between(curves.time, np.maximum(lower, bottom), np.minimum(upper, top), carried, **_AREA)
+    for bound in bounds:
+        axes.plot(curves.time, np.where(np.isinf(bound), np.nan, bound), **_EDGE)
+    return [Patch(**_AREA, label="reachable")]
+
+
+def visible_range(command: FloatArray, *bounds: FloatArray) -> tuple[float, float]:
+    """Lower and upper end of a stiffness axis.
+
+    It holds the whole command, every bound the command violates, and the bounds near it; bounds far off, or
+    infinite, do not squeeze the command into a line.
+
+    Args:
+        command: (points,), N m/rad (N/m); may hold NaN.
+        bounds: nothing, or lower and upper end of the corridor, each (points,); may hold NaN and infinities.
+    """
+    command = command[np.isfinite(command)]
+    if not command.size:
+        return (0.0, 1.0)
+    low, high = command.min(), command.max()
+    reach = max(high - low, REACH * abs(high))
+    shown = [command]
+    for bound, nearer, end in zip(
+        bounds, (np.maximum, np.minimum), (low - reach, high + reach), strict=False
+    ):
+        shown.append(nearer(bound[np.isfinite(bound)], end))
+    values = np.concatenate(shown)
+    margin = MARGIN * np.ptp(values) or reach
+    return (float(values.min() - margin), float(values.max() + margin))

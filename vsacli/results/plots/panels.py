@@ -1,0 +1,118 @@
+"""Panels, labels, legend and title of a figure, for any number of joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.units import TIME
+from vsacli.results.plots.style import shortened
+from vsacli.results.store.reader import StoredResult
+
+PANEL_WIDTH = 3.0
+"""Inches: with fonts of 10 pt, two panels side by side stay readable in one column of a paper."""
+
+JOINTS_PER_PANEL = 7
+TITLE_LENGTH = 70
+
+_INCHES_PER_CHARACTER = 0.07
+_INCHES_PER_HANDLE = 0.7
+
+AxesGrid = npt.NDArray[Any]
+"""Panels in rows and columns."""
+
+
+def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
+    """Joints that share a panel: of one type, hence one unit, and evenly split where they are many."""
+    groups: list[list[int]] = []
+    for joint_type in dict.fromkeys(joint_types):
+        joints = [joint for joint, other in enumerate(joint_types) if other == joint_type]
+        panels = math.ceil(len(joints) / JOINTS_PER_PANEL)
+        groups += [part.tolist() for part in np.array_split(joints, panels)]
+    return groups
+
+
+def folding(joints: int, most_rows: int) -> tuple[int, int]:
+    """Rows, and how often to begin beside them, for one row of panels per joint."""
+    folds = math.ceil(joints / most_rows)
+    return math.ceil(joints / folds), folds
+
+
+def joint_panels(place: SubplotSpec, time: FloatArray, present: BoolArray, most_rows: int) -> AxesGrid:
+    """Panels of each joint, (joints, columns), with a common time axis from column to column.
+
+    Args:
+        place: where they go.
+        time: what the time axes span, ascending, s.
+        present: (joints, columns), which panels there are, one joint below the other; others are removed.
+        most_rows: joints below each other before the next begins beside them.
+    """
+    joints, columns = present.shape
+    rows, folds = folding(joints, most_rows)
+    grid = place.subgridspec(rows, folds * columns).subplots(squeeze=False)
+    panels = grid.reshape(rows, folds, columns).swapaxes(0, 1).reshape(-1, columns)
+    for unused in panels[joints:].flat:
+        unused.remove()
+    for first in range(0, joints, rows):
+        fold = slice(first, min(first + rows, joints))
+        share_time(panels[fold], present[fold], time)
+    return panels[:joints]
+
+
+def share_time(panels: AxesGrid, present: BoolArray, time: FloatArray) -> None:
+    """Remove the panels that are not present; those of each column share a time axis over this span."""
+    for unused in panels[~present]:
+        unused.remove()
+    for column, there in zip(panels.T, present.T, strict=True):
+        if there.any():
+            _share_time(column[there], time)
+
+
+def _share_time(column: Sequence[Axes], time: FloatArray) -> None:
+    """Let panels, top to bottom, share a time axis, labelled below the last."""
+    for axes in column[:-1]:
+        axes.sharex(column[-1])
+        axes.tick_params(labelbottom=False)
+    column[-1].set_xlabel(f"time [{TIME}]")
+    if time[-1] > time[0]:
+        column[-1].set_xlim(time[0], time[-1])
+
+
+def add_title(axes: Axes, title: str) -> None:
+    """The title of a panel, at its left and taken literally."""
+    axes.set_title(shortened(title), loc="left", parse_math=False)
+
+
+def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
+    """Add the title and, below all panels, one legend with each label once in as many columns as fit."""
+    figure.suptitle(shortened(title, TITLE_LENGTH), fontsize=11, parse_math=False)
+    by_label = {str(handle.get_label()): handle for handle in handles}
+    labels = [shortened(label) for label in by_label]
+    width = _INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * max(map(len, labels))
+    rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
+    columns = math.ceil(len(labels) / rows)
+    legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+    return figure
+
+
+def result_title(result: StoredResult) -> str:
+    """Robot and trajectory, once if they are called alike, and where an incomplete run ended."""
+    ending = "" if result.complete else f" (stopped at {result.time[-1]:.4g} s)"
+    return ", ".join(dict.fromkeys((result.robot_name, result.trajectory_name))) + ending
+
+
+def missing_variables(figure: str, variables: Sequence[str]) -> str:
+    """The sentence for a figure that cannot be drawn."""
+    needed = " and ".join(variables)
+    return f"figure {figure} needs {needed}, which this result was written without (--variables)"

@@ -1,0 +1,228 @@
+"""Reading a result file, or a file of another format in the same layout."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import h5py
+import numpy as np
+
+from vsacli.base.arrays import FlagArray, FloatArray
+from vsacli.base.errors import InputError, StorageError
+from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
+from vsacli.documents.source import HDF5_SIGNATURE
+from vsacli.results.store.damage import bounded, check_heaps, own_dataset, reporting_damage
+from vsacli.results.store.schema import FORMAT, row_shape, storage_type
+
+EXPECTED = "expected a result file, as invdyn or simulate writes it"
+GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
+
+
+class StoredResult:
+    """An open result file; a context manager that closes it. A subclass reads another format.
+
+    Attributes:
+        kind: what the file is called in sentences.
+        command: what writes such files.
+        path: the file, as given.
+        attributes: the root attributes, e.g. `created`, `command_line`, `versions`.
+        robot_name, trajectory_name, verdict: as in the report.
+        complete: False if the run was ended at an infeasible step.
+        joint_names, joint_types: base to tip; "revolute" or "prismatic".
+        actuators: of each joint, "antagonistic", "elastic" or "rigid".
+        gear_ratio: (joints, 2), of the motors; NaN where the robot file gives none.
+        variables: names of the variables the file holds, in declared order, without `time`.
+        samples: number of steps stored.
+        time: (samples,) in s.
+        report: the report of the run, as in `--json`.
+    """
+
+    format = FORMAT
+    kind = "result"
+    command = "invdyn"
+    declared: Mapping[str, Variable] = VARIABLES
+    _to_get = "run invdyn again without --variables, or with {} among them"
+
+    @classmethod
+    def open(cls, path: str | Path) -> Self:
+        """Open a file.
+
+        Raises:
+            InputError: there is no such file, or it is not a complete file of the format this version reads.
+            StorageError: the operating system refuses to read it, or another program is writing it.
+        """
+        return open_one_of(path, cls)
+
+    def __init__(self, path: str | Path, file: h5py.File) -> None:
+        self.path = Path(path)
+        self._file = file
+        with reporting_damage(path):
+            self.attributes: dict[str, Any] = dict(file.attrs)
+            self.robot_name = str(file.attrs["robot_name"])
+            self.trajectory_name = str(file.attrs["trajectory_name"])
+            self.verdict = str(file.attrs["verdict"])
+            self.complete = bool(file.attrs["complete"])
+            self.joint_names = self._labels("joint")
+            self.joint_types = self._labels("joint_type")
+            self.actuators = self._labels("inputs/robot/joints/actuator_type")
+            self.gear_ratio = self._gear_ratios()
+            self.variables = tuple(
+                name for name, variable in self.declared.items() if variable.dims and name in file
+            )
+            self.time: FloatArray = self._bounded("time")[...]
+            self.samples = len(self.time)
+            self.report = self._json("report/json")
+            self._check_shapes()
+
+    def _bounded(self, name: str) -> h5py.Dataset:
+        return bounded(own_dataset(self._file, name))
+
+    def _labels(self, name: str) -> tuple[str, ...]:
+        return tuple(self._bounded(name).asstr()[...])
+
+    def _gear_ratios(self) -> FloatArray:
+        """The stored ones, which have no second axis if no joint has two motors."""
+        ratios = np.full((len(self.actuators), len(MOTORS)), np.nan)
+        if GEAR_RATIO in self._file:
+            stored = self._bounded(GEAR_RATIO)
+            ratios.T[: 1 if stored.ndim == 1 else len(MOTORS)] = stored[...].T
+        return ratios
+
+    def _json(self, name: str) -> dict[str, Any]:
+        content = json.loads(own_dataset(self._file, name).asstr()[()])
+        if not isinstance(content, dict):
+            raise ValueError(f"{name} is no JSON object")
+        return content
+
+    def _check_shapes(self) -> None:
+        """Refuse what does not fit together, so that every variable can be read piece by piece."""
+        joints = len(self.joint_names)
+        if {len(self.joint_types), len(self.actuators)} != {joints} or self.time.ndim != 1:
+            raise ValueError("joints and times do not fit together")
+        for name in self.variables:
+            dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name])
+            shape = (self.samples, *row_shape(self.declared[name], joints))
+            if dataset.shape != shape or dataset.dtype != expected:
+                raise ValueError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")
+
+    def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
+        """Steps start..stop-1 of a variable, (steps, joints) or (steps, joints, 2), in its declared units.
+
+        Raises:
+            InputError: there is no such variable, the file does not hold it, or the file is damaged.
+        """
+        select_variables([name], self.declared)
+        if name not in self._file:
+            raise InputError.one(f"holds no {name}; {self._to_get.format(name)}", self.path)
+        with reporting_damage(self.path):
+            values: FloatArray | FlagArray = self._file[name][start:stop]
+        return values
+
+    def provenance(self) -> dict[str, Any]:
+        """Who made the file, when, with which versions, and path and SHA-256 of each file that was read.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        with reporting_damage(self.path):
+            groups = [group for name, group in self._file["inputs"].items() if name.startswith("file_")]
+            return {
+                **{name: str(self.attributes[name]) for name in ("created", "generated_by", "command_line")},
+                "versions": json.loads(self.attributes["versions"]),
+                "inputs": [{name: str(group.attrs[name]) for name in ("path", "sha256")} for group in groups],
+            }
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+_Stored = TypeVar("_Stored", bound=StoredResult)
+
+
+def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
+    """Open a file of one of these kinds, whichever it is.
+
+    Raises:
+        InputError, StorageError: as `StoredResult.open`.
+    """
+    _check_signature(path)
+    with contextlib.ExitStack() as stack:
+        with reporting_damage(path):
+            check_heaps(path)
+            file = stack.enter_context(h5py.File(path, "r"))
+            found = _format(file)
+        kind = next((kind for kind in kinds if kind.format == found), None)
+        if kind is None:
+            raise InputError.one(_foreign(found, kinds), path)
+        stored = kind(path, file)
+        stack.pop_all()
+    return stored
+
+
+def open_result(path: str | Path) -> StoredResult:
+    """Open a result file of `invdyn`; see `StoredResult.open`."""
+    return StoredResult.open(path)
+
+
+def stored_format(path: str | Path) -> str | None:
+    """The attribute `format` of an HDF5 file; None if it has none.
+
+    Raises:
+        InputError, StorageError: as `StoredResult.open`.
+    """
+    _check_signature(path)
+    with reporting_damage(path):
+        check_heaps(path)
+        with h5py.File(path, "r") as file:
+            return _format(file)
+
+
+def _format(file: h5py.File) -> str | None:
+    found = file.attrs.get("format")
+    return found if isinstance(found, str) else None
+
+
+def _check_signature(path: str | Path) -> None:
+    """Tell a missing file, a folder and a file of another kind from each other before HDF5 sees them."""
+    if "\0" in str(path):
+        raise InputError.one("the path holds a NUL character", path)
+    try:
+        if Path(path).is_fifo():
+            raise InputError.one(f"is a pipe; {EXPECTED}", path)
+        with Path(path).open("rb") as file:
+            start = file.read(len(HDF5_SIGNATURE))
+    except FileNotFoundError:
+        raise InputError.one(f"there is no such file; {EXPECTED}", path) from None
+    except IsADirectoryError:
+        raise InputError.one(f"is a folder; {EXPECTED}", path) from None
+    except OSError as error:
+        raise StorageError(path, f"cannot be read: {error.strerror}") from error
+    if start != HDF5_SIGNATURE:
+        kind = "is empty" if not start else "is not an HDF5 file"
+        raise InputError.one(f"{kind}; {EXPECTED}", path)
+
+
+def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:
+    if found is None or not found.startswith("vsacli-"):
+        expected = " or ".join(repr(kind.format) for kind in kinds)
+        return f"is an HDF5 file, but no result file: it has no attribute format = {expected}"
+    word = found.partition("/")[0].removeprefix("vsacli-")
+    for kind in kinds:
+        if word == kind.kind:
+            return f"has the format {found}, but this version reads {kind.format}; run {kind.command} again"
+    expected = " or ".join(f"a {kind.kind} ({kind.format})" for kind in kinds)
+    return f"is a {word} ({found}), expected {expected}"

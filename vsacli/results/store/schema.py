@@ -1,0 +1,69 @@
+"""Layout of the result file, as far as the declarations of its variables do not say."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import h5py
+import numpy as np
+
+from vsacli.base.flags import Flag
+from vsacli.base.units import Quantity, WrenchQuantity
+from vsacli.base.variables import MOTORS, Variable
+from vsacli.base.wrench import WRENCH_AXES
+
+FORMAT = "vsacli-result/1"
+CHUNK_BYTES = 2**20
+TEXT = h5py.string_dtype("utf-8")
+
+
+def unit_attributes(quantity: Quantity, joint_types: tuple[str, ...]) -> dict[str, str]:
+    """`units`; if the robot's joints differ in it, or forces and moments do, one more attribute for each."""
+    if isinstance(quantity, WrenchQuantity):
+        return {
+            "units": "see wrench_axis",
+            "units_force": quantity.prismatic,
+            "units_moment": quantity.revolute,
+        }
+    found = sorted({quantity.unit(joint_type) for joint_type in joint_types})
+    if len(found) == 1:
+        return {"units": found[0]}
+    return {
+        "units": "see joint_type",
+        "units_revolute": quantity.revolute,
+        "units_prismatic": quantity.prismatic,
+    }
+
+
+def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dict[str, Any]:
+    """HDF5 attributes of a variable: units, long_name, equation, and CF's for coordinates and flags."""
+    attributes: dict[str, Any] = unit_attributes(variable.quantity, joint_types)
+    attributes |= {"long_name": variable.long_name, "equation": variable.equation}
+    if "joint" in variable.dims:
+        attributes["coordinates"] = "joint_type"
+    if variable.name == "flags":
+        attributes["flag_masks"] = np.array([int(flag) for flag in Flag], dtype=np.uint16)
+        attributes["flag_meanings"] = " ".join(flag.label for flag in Flag)
+    return attributes
+
+
+def storage_type(variable: Variable) -> np.dtype[Any]:
+    """Little-endian type of a variable in the file."""
+    return np.dtype("<u2") if variable.name == "flags" else np.dtype("<f8")
+
+
+def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
+    """Lengths of the axes after time."""
+    lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
+    return tuple(lengths[dim] for dim in variable.dims)
+
+
+def chunk_rows(samples: int, row_bytes: int) -> int:
+    """Samples in a chunk: the largest power of two within CHUNK_BYTES, or all samples if they are fewer."""
+    rows = max(1, CHUNK_BYTES // row_bytes)
+    return min(samples, 1 << (rows.bit_length() - 1))
+
+
+def storable(text: str) -> str:
+    """Text as HDF5 can hold it: bytes that are not UTF-8 (in a path, say) and NUL become escapes."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8").replace("\0", "\\0")

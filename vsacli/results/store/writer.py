@@ -1,0 +1,189 @@
+"""Writing the result file, block by block."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+import h5py
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.atomic_files import AtomicFile, check_free_space, reporting_storage_errors, storage_error
+from vsacli.base.errors import InputError
+from vsacli.base.variables import VARIABLES, Variable, select_variables
+from vsacli.base.wrench import WRENCH_NAMES
+from vsacli.results.store.interrupts import interrupts_deferred
+from vsacli.results.store.layout import create_layout, row_bytes
+from vsacli.results.store.quickly import write_rows
+from vsacli.results.store.schema import FORMAT, TEXT, storable
+from vsacli.results.store.sink import Sink
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+CHUNKS_AT_HAND = 11
+"""Chunks of a variable that HDF5 finds in its cache: few, since samples are written in order."""
+
+
+class Samples(Protocol):
+    """Consecutive steps: times, and an array for each variable under its name."""
+
+    @property
+    def time(self) -> FloatArray:
+        """Times, (samples,), s."""
+
+
+class ResultWriter:
+    """Context manager that writes a result file, which exists only after `finish`.
+
+    A subclass writes another format: other variables in the same layout.
+
+    HDF5 crashes if an exception crosses its code. So its file is a `Sink`, which raises none, and Ctrl-C
+    waits until a block is written.
+
+    Args:
+        path: the file to write.
+        robot: the robot of the run, stored as resolved arrays.
+        trajectory: gives the name, the number of samples, and the files that were read.
+        variables: names of the variables to store, all there are by default; the coordinates always are.
+        overwrite: whether an existing file may be replaced.
+        command_line: what the user typed, for the record.
+
+    Raises:
+        InputError: a name in `variables` is none, or of a wrench the trajectory does not have.
+    """
+
+    _format = FORMAT
+
+    def __init__(
+        self,
+        path: str | Path,
+        robot: Robot,
+        trajectory: Trajectory,
+        variables: Iterable[str] | None = None,
+        *,
+        overwrite: bool = False,
+        command_line: str = "",
+    ) -> None:
+        self.path = Path(path)
+        self._robot = robot
+        self._trajectory = trajectory
+        self._variables = self._selected(variables, trajectory)
+        self._overwrite = overwrite
+        self._command_line = command_line
+        self._written = 0
+
+    def __enter__(self) -> Self:
+        """Create the temporary file, with everything but samples and report.
+
+        Raises:
+            StorageError: the target must not be replaced, cannot be written, or does not fit its disk.
+        """
+        self._cleanup = ExitStack()
+        try:
+            with interrupts_deferred():
+                self._create()
+        except BaseException:
+            self._discard()
+            raise
+        return self
+
+    def write(self, block: Samples) -> None:
+        """Append a block of steps.
+
+        Raises:
+            StorageError: the disk is full or fails.
+        """
+        with self._hdf5():
+            self._append(block)
+
+    def finish(self, report: Mapping[str, Any]) -> None:
+        """Store the report and give the file its name; it holds the steps written so far.
+
+        Args:
+            report: the report as JSON-ready data; `verdict` and `complete` also become root attributes.
+
+        Raises:
+            StorageError: the disk is full or fails, or the name has been taken meanwhile.
+        """
+        with self._hdf5():
+            self._complete(report)
+            self._file.close()
+            self._sink.close()
+        self._file_to_be.publish()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._discard()
+
+    def _discard(self) -> None:
+        """Close what is open and remove the temporary file, unless it has got its name."""
+        with interrupts_deferred():
+            self._cleanup.close()
+
+    @contextmanager
+    def _hdf5(self) -> Iterator[None]:
+        """Around any use of HDF5; an error of the disk counts more than what HDF5 makes of it."""
+        with interrupts_deferred():
+            try:
+                yield
+            except Exception:
+                if self._sink.error is None:
+                    raise
+            if self._sink.error is not None:
+                raise storage_error(self.path, self._sink.error) from self._sink.error
+
+    def _create(self) -> None:
+        self._file_to_be = self._cleanup.enter_context(AtomicFile(self.path, overwrite=self._overwrite))
+        check_free_space(self.path, self._size())
+        with reporting_storage_errors(self.path):
+            raw = self._file_to_be.temporary.open("r+b", buffering=0)
+        self._sink = self._cleanup.enter_context(Sink(raw))
+        with self._hdf5():
+            file = h5py.File(
+                self._sink,
+                "w",
+                libver=("earliest", "v110"),
+                track_order=True,
+                rdcc_nslots=CHUNKS_AT_HAND,
+            )
+            self._file = self._cleanup.enter_context(file)
+            self._stored = create_layout(
+                file, self._format, self._robot, self._trajectory, self._variables, self._command_line
+            )
+
+    def _append(self, block: Samples) -> None:
+        for name, dataset in self._stored.items():
+            write_rows(dataset, self._written, getattr(block, name))
+        self._written += len(block.time)
+
+    def _complete(self, report: Mapping[str, Any]) -> None:
+        if self._written < self._trajectory.samples:
+            for dataset in self._stored.values():
+                dataset.resize(self._written, axis=0)
+        text = storable(json.dumps(report, ensure_ascii=False, allow_nan=False))
+        self._file.create_group("report").create_dataset("json", data=text, dtype=TEXT)
+        self._file.attrs["verdict"] = report["verdict"]
+        self._file.attrs["complete"] = int(report["complete"])
+
+    def _size(self) -> int:
+        """Bytes of all samples, flags before compression."""
+        stored = (VARIABLES["time"], *self._variables)
+        row = sum(row_bytes(variable, len(self._robot.joints)) for variable in stored)
+        return self._trajectory.samples * row
+
+    @staticmethod
+    def _selected(names: Iterable[str] | None, trajectory: Trajectory) -> tuple[Variable, ...]:
+        """The variables of these names, or all that a run along the trajectory has."""
+        absent = WRENCH_NAMES if trajectory.wrench is None else ()
+        if names is None:
+            return select_variables(name for name in VARIABLES if name not in absent)
+        selected = select_variables(names)
+        for variable in selected:
+            if variable.name in absent:
+                raise InputError.one(f"there is no {variable.name}: the trajectory has no wrench")
+        return selected

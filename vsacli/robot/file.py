@@ -1,0 +1,50 @@
+"""Robot files: `vsacli-robot/1`."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from dataclasses import dataclass
+
+from vsacli.base.errors import InputError
+from vsacli.documents.fields import choice, declared
+from vsacli.documents.reading import read_document
+from vsacli.robot.model import Robot
+
+FORMAT = "vsacli-robot/1"
+
+
+@dataclass(frozen=True)
+class RobotFile(Robot):
+    """The content of a robot file: rows and link frames are of the convention that it names."""
+
+    convention: str = choice(
+        ("standard", "modified"),
+        "Denavit-Hartenberg convention of all rows and link frames; a modified row i holds a_{i-1}, "
+        "alpha_{i-1}, d_i, theta_i",
+        default="standard",
+    )
+
+    def robot(self) -> Robot:
+        """The robot, with standard rows and link frames whatever the convention of the file."""
+        robot = Robot(**{name: getattr(self, name) for name in declared(Robot)}, sources=self.sources)
+        if self.convention == "standard":
+            return robot
+        from vsacli.robot.modified_dh import as_standard
+
+        return as_standard(robot)
+
+
+def load_robot(path: str | os.PathLike[str]) -> Robot:
+    """Read a robot from a YAML file.
+
+    Raises:
+        InputError: with every problem of the file, each with its line.
+    """
+    document, source = read_document(path, RobotFile, FORMAT)
+    try:
+        robot = document.robot()
+    except InputError as error:
+        reason = f"its modified rows have no standard ones: {error}"
+        raise InputError.one(reason, source.path) from None
+    return dataclasses.replace(robot, sources=(source, *robot.spring_sources))

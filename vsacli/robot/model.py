@@ -1,0 +1,241 @@
+"""The robot: a Denavit-Hartenberg chain of links, each joint with its motors and springs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.kinds import ACTUATORS, Actuator
+from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.rigid import Rigid
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import FieldProblem
+from vsacli.documents.fields import (
+    NON_NEGATIVE,
+    Items,
+    OneOf,
+    Record,
+    check_fields,
+    choice,
+    interval,
+    number,
+    text,
+    value,
+    vector,
+)
+from vsacli.documents.source import Source
+
+UNBOUNDED = (-math.inf, math.inf)
+INERTIA_ROUNDING = 1e-12
+"""Relative size below which a negative eigenvalue of an inertia tensor is rounding of its entries."""
+
+
+@dataclass(frozen=True)
+class DenavitHartenberg:
+    """Standard Denavit-Hartenberg row: frame i-1 to frame i is Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
+
+    a: float = number(units.LENGTH, "distance of the axes z_{i-1} and z_i, along x_i")
+    alpha: float = number(units.ANGLE, "angle from z_{i-1} to z_i, about x_i")
+    d: float = number(
+        units.LENGTH, "offset along z_{i-1}; the variable of a prismatic joint adds to it", default=0.0
+    )
+    theta: float = number(
+        units.ANGLE, "angle about z_{i-1}; the variable of a revolute joint adds to it", default=0.0
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a frame lies in another, as the `origin` of URDF: its origin there, then fixed-axis rotations."""
+
+    xyz: tuple[float, float, float] = vector(
+        3, units.LENGTH, "position of its origin", default=(0.0, 0.0, 0.0)
+    )
+    rpy: tuple[float, float, float] = vector(
+        3,
+        units.ANGLE,
+        "roll, pitch, yaw: turned about the fixed x, then y, then z axis, Rz(yaw) Ry(pitch) Rx(roll)",
+        default=(0.0, 0.0, 0.0),
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Central inertia tensor; entries of the tensor itself, as in URDF: xy = -integral(x y dm)."""
+
+    xx: float = number(units.INERTIA, "moment about the x axis")
+    yy: float = number(units.INERTIA, "moment about the y axis")
+    zz: float = number(units.INERTIA, "moment about the z axis")
+    xy: float = number(units.INERTIA, "tensor entry -integral(x y dm)", default=0.0)
+    xz: float = number(units.INERTIA, "tensor entry -integral(x z dm)", default=0.0)
+    yz: float = number(units.INERTIA, "tensor entry -integral(y z dm)", default=0.0)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        smallest = self.principal_moments[0]
+        if smallest < -INERTIA_ROUNDING * np.abs(self.tensor).max():
+            problem = f"the tensor has the negative eigenvalue {smallest:.4g} kg m^2, which no body has"
+            check_fields(self, FieldProblem((), problem))
+
+    @property
+    def tensor(self) -> FloatArray:
+        """The symmetric 3x3 tensor."""
+        return np.array(
+            [[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]]
+        )
+
+    @property
+    def principal_moments(self) -> FloatArray:
+        """Eigenvalues, ascending."""
+        return np.asarray(np.linalg.eigvalsh(self.tensor), dtype=np.float64)
+
+    def doubts(self) -> Iterator[str]:
+        """What is unusual, though not impossible to compute with."""
+        low, middle, high = self.principal_moments
+        if high == 0:
+            yield "its inertia is zero"
+        elif high - low - middle > INERTIA_ROUNDING * high:
+            excess = high - low - middle
+            sides = f"{high:.4g} > {low:.4g} + {middle:.4g} by {excess:.4g} kg m^2"
+            yield f"its inertia breaks the triangle inequality: {sides}"
+
+
+@dataclass(frozen=True)
+class Link:
+    """The augmented link: the body with the motors mounted on it, without the inertia of their rotors."""
+
+    mass: float = number(units.MASS, "mass of the augmented link", check=NON_NEGATIVE)
+    com: tuple[float, float, float] = vector(3, units.LENGTH, "centre of mass in the link frame (DH frame i)")
+    inertia: Inertia = value(Record(Inertia), "inertia tensor about the centre of mass, link axes")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def doubts(self) -> Iterator[str]:
+        """What is unusual, though not impossible to compute with."""
+        if self.mass == 0:
+            yield "its mass is zero"
+        yield from self.inertia.doubts()
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Ranges of the commanded motion; steps beyond are computed and flagged."""
+
+    position: tuple[float, float] = interval(units.POSITION, "range of the joint position", default=UNBOUNDED)
+    velocity: tuple[float, float] = interval(units.VELOCITY, "range of the joint velocity", default=UNBOUNDED)
+    stiffness: tuple[float, float] = interval(
+        units.STIFFNESS, "range of the joint stiffness", one_sided=True, default=UNBOUNDED
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint with its link and actuator."""
+
+    name: str = text("name of the joint, used in reports and CSV headers", identifier=True)
+    type: str = choice(("revolute", "prismatic"), "kind of joint")
+    dh: DenavitHartenberg = value(Record(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
+    link: Link = value(Record(Link), "the link the joint moves")
+    damping: float = number(
+        units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
+    )
+    actuator: Actuator = value(OneOf(ACTUATORS), "what drives the joint")
+    limits: Limits = value(Record(Limits), "limits of the commanded motion", default=Limits())
+
+    unit_variant = "type"
+
+    def __post_init__(self) -> None:
+        problems = []
+        if isinstance(self.actuator, Rigid) and self.limits.stiffness != UNBOUNDED:
+            reason = "a joint with a rigid actuator has no stiffness to limit; leave it out"
+            problems.append(FieldProblem(("limits", "stiffness"), reason))
+        check_fields(self, *problems)
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether the joint variable is an angle."""
+        return self.type == "revolute"
+
+    @property
+    def actuator_type(self) -> str:
+        """The key of its actuator in `ACTUATORS`."""
+        return next(word for word, actuator in ACTUATORS.items() if isinstance(self.actuator, actuator))
+
+    @property
+    def springs(self) -> tuple[SpringLaw, ...]:
+        """The nonlinear springs of its actuator, once if both are one."""
+        laws = self.actuator.spring if isinstance(self.actuator, Antagonistic) else ()
+        return tuple({id(law): law for law in laws}.values())
+
+    def warnings(self) -> Iterator[str]:
+        """What is doubtful though usable, and what the springs say about themselves."""
+        yield from (f"link of joint {self.name}: {doubt}" for doubt in self.link.doubts())
+        yield from (f"spring of joint {self.name}: {note}" for law in self.springs for note in law.notes)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A serial chain of joints from a fixed base."""
+
+    name: str = text("name of the robot")
+    description: str = text("what the robot is and where its numbers come from", default="")
+    gravity: tuple[float, float, float] = vector(
+        3, units.ACCELERATION, "gravity acceleration in the base frame", default=(0.0, 0.0, -9.81)
+    )
+    base: Pose = value(Record(Pose), "DH frame 0 in the base frame", default=Pose())
+    tool: Pose = value(Record(Pose), "end effector in the last DH frame (frame N)", default=Pose())
+    joints: tuple[Joint, ...] = value(Items(Record(Joint), unique="name"), "joints from the base to the tip")
+    sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, base to tip."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def joint_types(self) -> tuple[str, ...]:
+        """The type of each joint, "revolute" or "prismatic"."""
+        return tuple(joint.type for joint in self.joints)
+
+    @property
+    def actuators(self) -> tuple[Actuator, ...]:
+        """What drives each joint."""
+        return tuple(joint.actuator for joint in self.joints)
+
+    @property
+    def without_stiffness(self) -> dict[str, str]:
+        """The joints for which a trajectory chooses no stiffness, each with the reason, a clause."""
+        return {
+            joint.name: joint.actuator.no_choice
+            for joint in self.joints
+            if not isinstance(joint.actuator, Antagonistic)
+        }
+
+    @property
+    def spring_sources(self) -> tuple[Source, ...]:
+        """Files that springs were read from, each once."""
+        sources = (source for joint in self.joints for law in joint.springs for source in law.sources)
+        return tuple(dict.fromkeys(sources))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Doubtful but usable physics, and what springs say about themselves, one sentence each."""
+        return tuple(warning for joint in self.joints for warning in joint.warnings())

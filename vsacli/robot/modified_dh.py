@@ -1,0 +1,73 @@
+"""Modified Denavit-Hartenberg rows to standard ones, by moving frames: never by relabelling rows.
+
+Row i of the modified convention, a_{i-1}, alpha_{i-1}, d_i, theta_i, leads from frame i-1 to frame i by
+Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i) Tz(d_i), and frame i has its z axis along joint i (J. J. Craig,
+Introduction to Robotics, 3rd ed., 2005, eq. (3.6); W. Khalil, J. Kleinfinger, ICRA 1986).
+
+Regrouped, Rz(theta_i) Tz(d_i) is followed by Tx(a_i) Rx(alpha_i) of the next row: a standard row. What comes
+before the first belongs to the base, and standard frame i is modified frame i moved along and turned about
+their common x axis by a_i and alpha_i; nothing for the last one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from itertools import pairwise
+
+from vsacli.compute.vector import Scalar, Vector, add, exact, mul, sub, trigonometric
+from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Pose, Robot
+
+LAST = DenavitHartenberg(a=0, alpha=0)
+
+
+def as_standard(robot: Robot) -> Robot:
+    """The robot with standard rows and link frames, of one whose rows and link frames are modified ones.
+
+    Zeros and right angles stay exact.
+
+    Raises:
+        InvalidRecordError: a number becomes too large.
+    """
+    rows = (*(joint.dh for joint in robot.joints), LAST)
+    joints = (
+        _standard_joint(joint, row, following)
+        for joint, (row, following) in zip(robot.joints, pairwise(rows), strict=True)
+    )
+    return dataclasses.replace(robot, base=_moved(robot.base, rows[0]), joints=tuple(joints))
+
+
+def _moved(base: Pose, row: DenavitHartenberg) -> Pose:
+    """The pose followed by Rx(alpha) Tx(a); the roll of a pose is turned about its own x axis, too."""
+    roll, pitch, yaw = base.rpy
+    (cp, cy), (sp, sy) = (
+        [trigonometric(function, angle) for angle in (pitch, yaw)] for function in (math.cos, math.sin)
+    )
+    along_x = Vector(mul(cy, cp), mul(sy, cp), sub(0, sp)) * exact(row.a)
+    x, y, z = (float(start + shift) for start, shift in zip(base.xyz, along_x, strict=True))
+    return Pose(xyz=(x, y, z), rpy=(roll + row.alpha, pitch, yaw))
+
+
+def _standard_joint(joint: Joint, row: DenavitHartenberg, following: DenavitHartenberg) -> Joint:
+    dh = DenavitHartenberg(a=following.a, alpha=following.alpha, d=row.d, theta=row.theta)
+    return dataclasses.replace(joint, dh=dh, link=_moved_link(joint.link, following))
+
+
+def _moved_link(link: Link, row: DenavitHartenberg) -> Link:
+    """The link seen from the frame that Tx(a) Rx(alpha) leads to."""
+    c, s = trigonometric(math.cos, row.alpha), trigonometric(math.sin, row.alpha)
+    x, (y, z) = link.com[0] - row.a, _turned(c, s, *link.com[1:])
+    return Link(mass=link.mass, com=(x, y, z), inertia=_turned_inertia(link.inertia, c, s))
+
+
+def _turned(c: Scalar, s: Scalar, y: float, z: float) -> tuple[float, float]:
+    """Components y and z in axes turned about x by the angle of this cosine and sine."""
+    return float(add(mul(c, y), mul(s, z))), float(sub(mul(c, z), mul(s, y)))
+
+
+def _turned_inertia(inertia: Inertia, c: Scalar, s: Scalar) -> Inertia:
+    xy, xz = _turned(c, s, inertia.xy, inertia.xz)
+    yy, zy = _turned(c, s, inertia.yy, inertia.yz)
+    yz, zz = _turned(c, s, inertia.yz, inertia.zz)
+    (new_yy, new_yz), (_, new_zz) = _turned(c, s, yy, yz), _turned(c, s, zy, zz)
+    return Inertia(xx=inertia.xx, yy=new_yy, zz=new_zz, xy=xy, xz=xz, yz=new_yz)

@@ -1,0 +1,234 @@
+"""Reading a URDF file strictly: what it says is either understood or refused with its line."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.documents.problems import Problems
+from vsacli.documents.source import read_source
+from vsacli.documents.tree import quoted
+from vsacli.robot.urdf.link_tree import MOVING, TYPES, Urdf, UrdfJoint, UrdfLimit, UrdfLink, below
+from vsacli.robot.urdf.rigid_motion import Body, pose_matrix
+from vsacli.robot.urdf.xml_tree import Element, parse_xml
+
+MAX_BYTES = 10_000_000
+MAX_LINKS = 1000
+LARGEST = 1e9
+"""Numbers beyond are no length, mass or inertia of a robot, and products of them would overflow."""
+
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_Named = TypeVar("_Named", UrdfLink, UrdfJoint)
+
+
+def read_urdf(path: str | os.PathLike[str]) -> Urdf:
+    """Read a URDF file.
+
+    Raises:
+        InputError: with every problem of the file, each with its line.
+    """
+    source, text = read_source(path, MAX_BYTES)
+    problems = Problems(source.path)
+    root = parse_xml(text, problems)
+    if root.tag != "robot":
+        problems.fail(root.line, f"expected a URDF, which begins with <robot>, found <{root.tag}>")
+    _refuse_macros(root, problems)
+    for link in list(root.all("link"))[MAX_LINKS:]:
+        problems.fail(link.line, f"more than {MAX_LINKS:,} links")
+    reader = _Reader(problems)
+    links = _by_name(map(reader.link, root.all("link")), "link", problems)
+    joints = _by_name(map(reader.joint, root.all("joint")), "joint", problems)
+    name = reader.word(root, "name")
+    if not links:
+        problems.fail(root.line, "the file describes no links")
+    _check_ends(links, joints, problems)
+    problems.check()
+    return Urdf(source.path, name, links, joints, _root(links, joints, problems))
+
+
+def _refuse_macros(root: Element, problems: Problems) -> None:
+    for child in root.children:
+        if child.tag.startswith("xacro:"):
+            how = "expand it first: xacro arm.urdf.xacro > arm.urdf"
+            problems.fail(child.line, f"<{quoted(child.tag)[1:-1]}> belongs to a xacro file; {how}")
+
+
+def _by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[str, _Named]:
+    named: dict[str, _Named] = {}
+    for record in records:
+        if record.name in named:
+            first = named[record.name].line
+            message = (
+                f"the {kind} {quoted(record.name)} stands on line {first} already; each needs its own name"
+            )
+            problems.add(record.line, message)
+        named.setdefault(record.name, record)
+    return named
+
+
+def _check_ends(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
+    """Each joint must have two links that exist, and no link two parents."""
+    parents: dict[str, UrdfJoint] = {}
+    for joint in joints.values():
+        for end in dict.fromkeys((joint.parent, joint.child)):
+            if end and end not in links:
+                message = f"there is no link {quoted(end)}{did_you_mean(end, links)}"
+                problems.add(joint.line, f"joint {quoted(joint.name)}: {message}")
+        other = parents.setdefault(joint.child, joint)
+        if joint.child and other is not joint:
+            both = f"the joints {quoted(other.name)} and {quoted(joint.name)}"
+            message = f"the link {quoted(joint.child)} is the child of {both}; closed loops are not read"
+            problems.add(joint.line, message)
+
+
+def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> str:
+    """The one link without a parent, from which every other hangs."""
+    children = {joint.child for joint in joints.values()}
+    roots = [name for name in links if name not in children]
+    if len(roots) != 1:
+        found = f"{', '.join(map(quoted, roots[:5]))} have no parent" if roots else "every link has a parent"
+        problems.fail(1, f"the links must form one tree, which has one root, but {found}")
+    circles = set(links) - {roots[0]} - {joint.child for joint in below(roots[0], joints.values())}
+    if circles:
+        names = sorted(circles, key=lambda name: links[name].line)
+        message = f"the link {quoted(names[0])} is its own ancestor: the joints form a circle"
+        problems.fail(links[names[0]].line, message)
+    return roots[0]
+
+
+class _Reader:
+    """Reads elements; what is wrong is noted and replaced by something harmless, so that reading goes on."""
+
+    def __init__(self, problems: Problems) -> None:
+        self._problems = problems
+
+    def link(self, element: Element) -> UrdfLink:
+        name = self.word(element, "name")
+        inertial = self._child(element, "inertial")
+        return UrdfLink(name, element.line, None if inertial is None else self._body(inertial))
+
+    def _body(self, inertial: Element) -> Body:
+        mass, inertia = self._child(inertial, "mass"), self._child(inertial, "inertia")
+        if mass is None or inertia is None:
+            missing = "mass" if mass is None else "inertia"
+            self._problems.add(inertial.line, f"inertial: there is no <{missing}> in it")
+            return Body(0.0, np.zeros(3), np.zeros((3, 3)))
+        xx, xy, xz, yy, yz, zz = (self._number(inertia, name) for name in _MOMENTS)
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return Body(self._non_negative(mass, "value"), np.zeros(3), tensor).moved(self._origin(inertial))
+
+    def joint(self, element: Element) -> UrdfJoint:
+        name = self.word(element, "name")
+        kind = self.word(element, "type", "fixed")
+        if kind not in TYPES:
+            self._problems.add(element.line, f"type: unknown word {quoted(kind)}{did_you_mean(kind, TYPES)}")
+        dynamics, mimic = self._child(element, "dynamics"), self._child(element, "mimic")
+        return UrdfJoint(
+            name=name,
+            line=element.line,
+            type=kind,
+            parent=self._end(element, "parent"),
+            child=self._end(element, "child"),
+            placement=self._origin(element),
+            axis=self._axis(element) if kind in MOVING else np.zeros(3),
+            limit=self._limit(element, kind),
+            damping=0.0 if dynamics is None else self._non_negative(dynamics, "damping", 0.0),
+            friction=0.0 if dynamics is None else self._non_negative(dynamics, "friction", 0.0),
+            mimics=None if mimic is None else self.word(mimic, "joint"),
+        )
+
+    def _end(self, joint: Element, tag: str) -> str:
+        end = self._child(joint, tag)
+        if end is None:
+            self._problems.add(joint.line, f"joint: there is no <{tag}> in it")
+            return ""
+        return self.word(end, "link")
+
+    def _axis(self, joint: Element) -> FloatArray:
+        element = self._child(joint, "axis")
+        axis = np.array((1.0, 0.0, 0.0) if element is None else self._vector(element, "xyz"))
+        length = float(np.linalg.norm(axis))
+        if element is not None and not length > 1 / LARGEST:
+            self._problems.add(element.line, f"axis: {axis.tolist()} has no direction")
+            return np.array([1.0, 0.0, 0.0])
+        return axis / length
+
+    def _limit(self, joint: Element, kind: str) -> UrdfLimit:
+        element = self._child(joint, "limit")
+        if element is None:
+            return UrdfLimit()
+        lower, upper = (self._bound(element, name) for name in ("lower", "upper"))
+        velocity, effort = (self._bound(element, name) for name in ("velocity", "effort"))
+        bounds = kind != "continuous" and lower < upper and (lower, upper) != (-LARGEST, LARGEST)
+        return UrdfLimit(
+            position=(lower, upper) if bounds else None,
+            velocity=velocity if 0 < velocity < LARGEST else None,
+            effort=effort if 0 < effort < LARGEST else None,
+        )
+
+    def _bound(self, element: Element, name: str) -> float:
+        """A limit, which may be infinite or, for want of one, very large."""
+        return max(-LARGEST, min(LARGEST, self._float(element, name, 0.0, math.inf)))
+
+    def _origin(self, element: Element) -> FloatArray:
+        origin = self._child(element, "origin")
+        if origin is None:
+            return np.eye(4)
+        return pose_matrix(self._vector(origin, "xyz"), self._vector(origin, "rpy"))
+
+    def _vector(self, element: Element, name: str) -> list[float]:
+        words = element.attributes.get(name, "0 0 0").split()
+        numbers = [self._parsed(element, name, word, LARGEST) for word in words]
+        if len(numbers) != 3:
+            self._problems.add(element.line, f"{name}: expected 3 numbers, found {len(numbers)}")
+            return [0.0, 0.0, 0.0]
+        return numbers
+
+    def _number(self, element: Element, name: str, default: float | None = None) -> float:
+        return self._float(element, name, default, LARGEST)
+
+    def _non_negative(self, element: Element, name: str, default: float | None = None) -> float:
+        number = self._number(element, name, default)
+        if number < 0:
+            self._problems.add(element.line, f"{element.tag}: must be zero or positive, not {number:g}")
+        return abs(number)
+
+    def _float(self, element: Element, name: str, default: float | None, largest: float) -> float:
+        if name in element.attributes:
+            return self._parsed(element, name, element.attributes[name], largest)
+        if default is None:
+            self._problems.add(element.line, f"{element.tag}: there is no attribute {name}")
+        return default or 0.0
+
+    def _parsed(self, element: Element, name: str, word: str, largest: float) -> float:
+        try:
+            number = float(word.replace("_", "?"))
+        except ValueError:
+            number = math.nan
+        if abs(number) <= largest:
+            return number
+        expected = "a number" if math.isinf(largest) else f"a number of at most {largest:g}"
+        self._problems.add(element.line, f"{name}: expected {expected}, found {quoted(word)}")
+        return 0.0
+
+    def word(self, element: Element, name: str, default: str = "") -> str:
+        """An attribute that is shown to people."""
+        word = element.attributes.get(name, "").strip()
+        if not word:
+            self._problems.add(element.line, f"{element.tag}: there is no attribute {name}")
+        elif not word.isprintable():
+            self._problems.add(element.line, f"{name}: {quoted(word)} holds what cannot be printed")
+        return word or default
+
+    def _child(self, element: Element, tag: str) -> Element | None:
+        """The only child of a tag, if there is one."""
+        found = list(element.all(tag))
+        if len(found) > 1:
+            self._problems.add(found[1].line, f"{element.tag}: a second <{tag}>; one is expected")
+        return found[0] if found else None

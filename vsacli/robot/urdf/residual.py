@@ -1,0 +1,92 @@
+"""How well a robot's forward kinematics repeats that of the chain it was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.model import Joint, Pose, Robot
+from vsacli.robot.urdf.rigid_motion import cross_matrix, inverse, pose_matrix
+from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
+
+SAMPLES = 256
+SEED = 1
+REACH = {True: np.pi, False: 1.0}
+"""Half-width of the drawn positions of a revolute (rad) or prismatic (m) joint without limits."""
+
+
+class Residual(NamedTuple):
+    """Largest distance in m and angle in rad between the tips, over random positions of the joints."""
+
+    position: float
+    orientation: float
+
+
+def kinematic_residual(chain: SerialChain, robot: Robot) -> Residual:
+    """Compare the tips at random positions within the limits."""
+    q = _positions(chain.joints)
+    expected, found = _chain_tips(chain, q), _robot_tips(robot, q)
+    shift = np.linalg.norm(found[:, :3, 3] - expected[:, :3, 3], axis=1)
+    turn = np.linalg.norm(found[:, :3, :3] - expected[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
+    return Residual(float(shift.max()), float(turn.max()))
+
+
+def _positions(joints: Sequence[ChainJoint]) -> FloatArray:
+    """Random positions, (samples, joints)."""
+    rng = np.random.default_rng(SEED)
+    reach = np.array([REACH[joint.is_revolute] for joint in joints])
+    given = [joint.urdf.limit.position for joint in joints]
+    bounds = [limits or (-1e9, 1e9) for limits in given]
+    lower, upper = np.clip(np.array(bounds).T, -reach, reach)
+    return rng.uniform(lower, upper, (SAMPLES, len(joints)))
+
+
+def _chain_tips(chain: SerialChain, q: FloatArray) -> FloatArray:
+    """The tip's poses, (samples, 4, 4), by moving every joint in its own URDF frame."""
+    poses = np.broadcast_to(np.eye(4), (len(q), 4, 4))
+    before = np.eye(4)
+    for joint, positions in zip(chain.joints, q.T, strict=True):
+        poses = poses @ (inverse(before) @ joint.frame) @ _motions(joint, positions)
+        before = joint.frame
+    result: FloatArray = poses @ (inverse(before) @ chain.tip_pose)
+    return result
+
+
+def _motions(joint: ChainJoint, positions: FloatArray) -> FloatArray:
+    """The motion of a joint about or along its axis, (samples, 4, 4); Rodrigues' formula if it turns."""
+    poses = np.tile(np.eye(4), (len(positions), 1, 1))
+    if not joint.is_revolute:
+        poses[:, :3, 3] = np.outer(positions, joint.urdf.axis)
+        return poses
+    cross = cross_matrix(joint.urdf.axis)
+    angle = positions[:, None, None]
+    poses[:, :3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+    return poses
+
+
+def _robot_tips(robot: Robot, q: FloatArray) -> FloatArray:
+    poses = np.broadcast_to(_matrix(robot.base), (len(q), 4, 4))
+    for joint, positions in zip(robot.joints, q.T, strict=True):
+        poses = poses @ _rows(joint, positions)
+    result: FloatArray = poses @ _matrix(robot.tool)
+    return result
+
+
+def _rows(joint: Joint, positions: FloatArray) -> FloatArray:
+    """Rz(theta) Tz(d) Tx(a) Rx(alpha) at each position, (samples, 4, 4)."""
+    dh, zero = joint.dh, np.zeros(len(positions))
+    turn, slide = (positions, zero) if joint.is_revolute else (zero, positions)
+    about_z = np.tile(np.eye(4), (len(positions), 1, 1))
+    cosine, sine = np.cos(dh.theta + turn), np.sin(dh.theta + turn)
+    about_z[:, 0, 0] = about_z[:, 1, 1] = cosine
+    about_z[:, 1, 0], about_z[:, 0, 1] = sine, -sine
+    about_z[:, 2, 3] = dh.d + slide
+    result: FloatArray = about_z @ pose_matrix((dh.a, 0, 0), (dh.alpha, 0, 0))
+    return result
+
+
+def _matrix(pose: Pose) -> FloatArray:
+    return pose_matrix(pose.xyz, pose.rpy)

@@ -1,0 +1,78 @@
+"""XML text to a tree with line numbers: no document types, so no entities, and nothing without bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from vsacli.documents.problems import Problems
+from vsacli.documents.tree import quoted
+
+MAX_LEVELS = 100
+MAX_ELEMENTS = 100_000
+
+
+@dataclass(frozen=True)
+class Element:
+    """An element with its attributes and children; text between tags is dropped."""
+
+    tag: str
+    line: int
+    attributes: dict[str, str]
+    children: list[Element] = field(default_factory=list)
+
+    def all(self, tag: str) -> Iterator[Element]:
+        """The children of this tag."""
+        return (child for child in self.children if child.tag == tag)
+
+
+def parse_xml(text: str, problems: Problems) -> Element:
+    """Parse a document.
+
+    Raises:
+        InputError: broken syntax, a document type declaration, or more than the limits allow.
+    """
+    builder = _Builder(problems)
+    try:
+        builder.parser.Parse(text, True)
+    except expat.ExpatError as error:
+        reason = expat.ErrorString(error.code)
+        problems.fail(error.lineno, f"not valid XML at column {error.offset + 1}: {reason}")
+    return builder.root
+
+
+class _Builder:
+    """Takes start and end tags and leaves the document in `root`."""
+
+    root: Element
+
+    def __init__(self, problems: Problems) -> None:
+        self.parser = expat.ParserCreate()
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+        self.parser.StartDoctypeDeclHandler = self._refuse_doctype
+        self._problems = problems
+        self._open: list[Element] = []
+        self._elements = 0
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        line = self.parser.CurrentLineNumber
+        element = Element(tag, line, attributes)
+        self._elements += 1
+        if self._elements > MAX_ELEMENTS:
+            self._problems.fail(line, f"more than {MAX_ELEMENTS:,} elements")
+        if len(self._open) == MAX_LEVELS:
+            self._problems.fail(line, f"nested more than {MAX_LEVELS} levels deep")
+        if self._open:
+            self._open[-1].children.append(element)
+        else:
+            self.root = element
+        self._open.append(element)
+
+    def _end(self, _tag: str) -> None:
+        self._open.pop()
+
+    def _refuse_doctype(self, name: str, *_: object) -> None:
+        reason = "document type declarations and entities are not read; remove it"
+        self._problems.fail(self.parser.CurrentLineNumber, f"found <!DOCTYPE {quoted(name)}>: {reason}")

@@ -1,0 +1,14 @@
+"""What would mend an infeasible task: the smallest slow-down, stiffness offset, or change of profile."""
+
+from vsacli.studies.remedies.advice import suggest
+from vsacli.studies.remedies.fixed_file import check_fixed_target, fixed_paths, write_fixed
+from vsacli.studies.remedies.outcome import StiffnessProfile, Suggestions
+
+__all__ = [
+    "StiffnessProfile",
+    "Suggestions",
+    "check_fixed_target",
+    "fixed_paths",
+    "suggest",
+    "write_fixed",
+]

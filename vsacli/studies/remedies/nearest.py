@@ -1,0 +1,163 @@
+"""The function of least size between two bounds: a cubic spline, from a quadratic programme."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.studies.remedies.load import IndexArray, evenly
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+DEGREE = 3
+PIECES_PER_SMOOTHING = 3
+"""Pieces of the spline in one smoothing time: what the objective leaves is no finer."""
+
+REACH = 8
+"""Smoothing times over which a change dies out; e^-8 is left of it."""
+
+MOST_COEFFICIENTS = 100
+"""Coefficients that the dense solver handles in a tenth of a second; more make coarser pieces."""
+
+ROUNDS = 100
+"""Rounds of adding the instants at which bounds are missed; about five are needed."""
+
+ACCURACY = 1e-7
+"""By how much of its largest value a spline may miss its bounds; a tenth of what is kept clear of them."""
+
+
+class NoSplineError(Exception):
+    """No spline with pieces of this length lies between the bounds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """What a function has to lie between.
+
+    Attributes:
+        time: ascending, (instants,) in s.
+        low: smallest value, (instants,).
+        high: largest value, above `low`; infinite where nothing bounds it.
+    """
+
+    time: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def excluding_zero(self) -> BoolArray:
+        """Where the function cannot vanish."""
+        return (self.low > 0) | (self.high < 0)
+
+    def missed_by(self, values: FloatArray) -> FloatArray:
+        """How far values lie outside; zero or negative inside."""
+        return np.maximum(self.low - values, values - self.high)
+
+
+def nearest_spline(bounds: Bounds, smoothing: float) -> BSpline[np.float64]:
+    """The C2 function x between bounds that minimises the integral of x^2 + smoothing^4 x''^2.
+
+    A convex quadratic programme in the coefficients of a cubic spline, solved as a problem of least distance
+    by non-negative least squares (Lawson & Hanson, "Solving Least Squares Problems", 1974, chapter 23). Far
+    from where the bounds exclude zero, x is zero.
+
+    Args:
+        bounds: excluding zero at some instants.
+        smoothing: time in s within which it is expensive to change.
+
+    Raises:
+        NoSplineError: the bounds are too narrow or change too fast.
+    """
+    from scipy.interpolate import BSpline
+
+    knots, free, smoothing = _knots(bounds, smoothing)
+    size = float(np.max(bounds.missed_by(np.zeros_like(bounds.time))))
+    scaled = Bounds(bounds.time, bounds.low / size, bounds.high / size)
+    coefficients = np.zeros(len(free))
+    coefficients[free] = _least(scaled, knots, free, smoothing)
+    return BSpline(knots, size * coefficients, DEGREE)
+
+
+def _knots(bounds: Bounds, smoothing: float) -> tuple[FloatArray, BoolArray, float]:
+    """Equal pieces, which coefficients are free, and the smoothing that such pieces can follow."""
+    first, last = bounds.time[[0, -1]]
+    while True:
+        pieces = int(np.ceil(PIECES_PER_SMOOTHING * (last - first) / smoothing))
+        ends = np.linspace(first, last, pieces + 1)
+        knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
+        near = _near(ends, bounds.time[bounds.excluding_zero], REACH * smoothing)
+        # coefficient i belongs to the pieces i-3..i
+        free = np.convolve(near, np.ones(DEGREE + 1)) > 0
+        if np.count_nonzero(free) <= MOST_COEFFICIENTS:
+            return knots, free, smoothing
+        smoothing *= 1.5
+
+
+def _near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
+    """The pieces with one of these ascending times in reach."""
+    following = np.searchsorted(times, ends[:-1] - reach)
+    near: BoolArray = np.append(times, np.inf)[following] <= ends[1:] + reach
+    return near
+
+
+def _least(bounds: Bounds, knots: FloatArray, free: BoolArray, smoothing: float) -> FloatArray:
+    """The free coefficients, with as many of the bounds as matter."""
+    from scipy.interpolate import BSpline
+
+    root = _objective(knots, free, smoothing)
+    bounding = np.flatnonzero(bounds.excluding_zero)
+    watched = bounding[evenly(len(bounding), MOST_COEFFICIENTS)]
+    coefficients = np.zeros(len(free))
+    for _ in range(ROUNDS):
+        rows = BSpline.design_matrix(bounds.time[watched], knots, DEGREE).toarray()[:, free]
+        finite = np.isfinite(bounds.high[watched])
+        above = np.concatenate([bounds.low[watched], -bounds.high[watched][finite]])
+        coefficients[free] = _least_distance(root, np.concatenate([rows, -rows[finite]]), above)
+        missed = bounds.missed_by(BSpline(knots, coefficients, DEGREE)(bounds.time))
+        if missed.max() <= ACCURACY:
+            return coefficients[free]
+        watched = np.union1d(watched, _peaks(missed))
+    raise NoSplineError
+
+
+def _objective(knots: FloatArray, free: BoolArray, smoothing: float) -> FloatArray:
+    """Upper triangular R such that |R c|^2 is the integral, in smoothing times; exact by Gauss' rule."""
+    from scipy.interpolate import BSpline
+
+    ends = knots[DEGREE:-DEGREE]
+    half = np.diff(ends) / 2
+    nodes, weights = np.polynomial.legendre.leggauss(DEGREE + 1)
+    time = ((ends[:-1] + half)[:, None] + half[:, None] * nodes).ravel()
+    share = np.sqrt(half[:, None] * weights / smoothing).ravel()
+    basis = BSpline(knots, np.eye(len(free))[:, free], DEGREE)
+    rows = [share[:, None] * basis(time), share[:, None] * smoothing**2 * basis(time, nu=2)]
+    return np.asarray(np.linalg.qr(np.concatenate(rows), mode="r"), dtype=np.float64)
+
+
+def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> FloatArray:
+    """The x of least |root x| with rows x >= low."""
+    from scipy.linalg import solve_triangular
+    from scipy.optimize import nnls
+
+    distance_rows = solve_triangular(root, rows.T, trans="T")  # rows of y = root x
+    problem = np.concatenate([distance_rows, low[None, :]])
+    target = np.append(np.zeros(len(root)), 1.0)
+    try:
+        multipliers, _ = nnls(problem, target)
+    except RuntimeError as error:  # too many iterations
+        raise NoSplineError from error
+    residual = problem @ multipliers - target
+    if -residual[-1] < ACCURACY:
+        raise NoSplineError
+    return np.asarray(solve_triangular(root, residual[:-1] / -residual[-1]), dtype=np.float64)
+
+
+def _peaks(missed: FloatArray) -> IndexArray:
+    """The worst instant of each stretch at which bounds are missed."""
+    padded = np.concatenate([[0.0], np.maximum(missed, 0), [0.0]])
+    rising, falling = padded[1:-1] > padded[:-2], padded[1:-1] >= padded[2:]
+    return np.flatnonzero(rising & falling & (missed > 0))

@@ -1,0 +1,149 @@
+"""The smallest uniform slow-down after which every step is accepted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.wrench import Wrench
+from vsacli.studies.remedies.acceptance import Acceptance
+from vsacli.studies.remedies.impossible import ImpossibleError
+from vsacli.studies.remedies.load import IndexArray, evenly
+from vsacli.studies.remedies.scan import smallest_confirmed
+from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH
+from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Trajectory
+
+GRID = 10_000
+"""Factors are whole multiples of 1/GRID, so that the printed one is the confirmed one."""
+
+LARGEST_FACTOR = 1000
+"""Up to which slow-downs are tried; beyond, the units of the trajectory are more likely to be wrong."""
+
+WATCHED = 1000
+"""Steps that the scan looks at to begin with, and how many a refused confirmation may add."""
+
+FEW = 20
+"""How many of them are tried at many factors before the scan, and how many of those refused even at rest."""
+
+ORDERS = {name: order for signal in (POSITION, STIFFNESS) for order, name in enumerate(signal.names)}
+"""Order of derivation of each array of a motion."""
+
+AT_ONCE = 64
+"""Factors that are tried at once."""
+
+
+def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
+    """The smallest factor by which position, stiffness and wrench must be stretched together in time.
+
+    It is found by a scan upward in steps of 1 %, then bisection to 1e-4, and confirmed on all steps of the
+    stretched trajectory.
+
+    Args:
+        acceptance: the rule, and the robot.
+        trajectory: one that is refused as it is.
+
+    Raises:
+        ImpossibleError: with the reason.
+    """
+    steps = _evenly_chosen(trajectory)
+    at_rest = _slowed(steps, math.inf)
+    refused = np.flatnonzero(np.any(acceptance.refused(at_rest), axis=1))
+    few = np.union1d(evenly(len(steps.time), FEW), refused[evenly(len(refused), FEW)])
+    number = _first_hope(acceptance, _select(steps, few))
+    if number is not None:
+        candidates = SlowDowns(acceptance, trajectory, steps)
+        number = smallest_confirmed(candidates, number, LARGEST_FACTOR * GRID)
+    if number is not None:
+        return number / GRID
+    if refused.size:
+        reasons = "; ".join(acceptance.reasons(at_rest))
+        raise ImpossibleError(f"even at rest, under gravity alone, {reasons}")
+    raise ImpossibleError(f"not even one by a factor {LARGEST_FACTOR} does")
+
+
+def _first_hope(acceptance: Acceptance, few: Motion) -> int | None:
+    """A number up to which the scan would find one of a few steps refused; None if it always would.
+
+    It tries many factors at once, which costs hardly more than one of them.
+    """
+    numbers = [GRID]
+    while numbers[-1] < LARGEST_FACTOR * GRID:
+        numbers.append(min(numbers[-1] + _stride(numbers[-1]), LARGEST_FACTOR * GRID))
+    for start in range(0, len(numbers), AT_ONCE):
+        tried = numbers[start : start + AT_ONCE]
+        refused = acceptance.refused(_joined(_slowed(few, number / GRID) for number in tried))
+        hope = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
+        if hope.size:
+            return numbers[max(start + int(hope[0]) - 1, 0)]
+    return None
+
+
+class SlowDowns:
+    """Stretching by number / GRID, judged at watched steps; see `scan.Candidates`."""
+
+    def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: Motion) -> None:
+        self._acceptance, self._trajectory, self._watched = acceptance, trajectory, watched
+
+    def stride(self, number: int) -> int:
+        """One percent."""
+        return _stride(number)
+
+    def accepts(self, number: int) -> bool:
+        """Whether every watched step is accepted."""
+        return not self._acceptance.refused(_slowed(self._watched, number / GRID)).any()
+
+    def confirms(self, number: int) -> bool:
+        """Whether every step is; if not, watch those of the first block that has refused ones."""
+        factor = number / GRID
+        for motion, refused in self._acceptance.refused_along(self._trajectory.stretched(factor)):
+            steps = np.flatnonzero(np.any(refused, axis=1))
+            if steps.size:
+                motion = _select(motion, steps[evenly(len(steps), WATCHED)])
+                self._watched = _joined([self._watched, _slowed(motion, 1 / factor)])
+                return False
+        return True
+
+
+def _stride(number: int) -> int:
+    return math.ceil(number / 100)
+
+
+def _slowed(motion: Motion, factor: float) -> Motion:
+    """The same steps passed more slowly, at rest if the factor is infinite; their times are kept."""
+    return _mapped(motion, lambda array, order: array / factor**order)
+
+
+def _evenly_chosen(trajectory: Trajectory) -> Motion:
+    return _joined(trajectory.block(step, step + 1) for step in evenly(trajectory.samples, WATCHED).tolist())
+
+
+def _select(motion: Motion, steps: IndexArray) -> Motion:
+    return replace(_mapped(motion, lambda array, _: array[steps]), time=motion.time[steps])
+
+
+def _mapped(motion: Motion, function: Callable[[FloatArray, int], FloatArray]) -> Motion:
+    """The motion with a function applied to each array but the times, and to its order of derivation."""
+    arrays: dict[str, Any] = {name: function(getattr(motion, name), order) for name, order in ORDERS.items()}
+    return replace(motion, **arrays, wrench=motion.wrench and motion.wrench.mapped(function))
+
+
+def _joined(motions: Iterable[Motion]) -> Motion:
+    first, *others = motions
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in (first, *others)]) for name in ("time", *ORDERS)
+    }
+    return replace(first, **arrays, wrench=first.wrench and _joined_wrenches([first, *others]))
+
+
+def _joined_wrenches(motions: list[Motion]) -> Wrench:
+    first, *others = (motion.wrench for motion in motions if motion.wrench is not None)
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in (first, *others)]) for name in WRENCH.names
+    }
+    return replace(first, **arrays)

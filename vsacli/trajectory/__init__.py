@@ -1,0 +1,1 @@
+"""Commanded signals over time, declared in a file or recorded in a laboratory."""

@@ -1,0 +1,68 @@
+"""Profiles given by a formula."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.trajectory.curves.signals import Signal
+from vsacli.trajectory.times import stretch
+
+SHORTEST, LONGEST = 1e-30, 1e30
+"""Durations of profiles, s, of which the fourth power is still a number."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedForm(ABC):
+    """A profile given by a formula, analytic between the two ends of its span, in s."""
+
+    signal: Signal
+    span: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        first, last = self.span
+        if not SHORTEST <= last - first <= LONGEST:
+            allowed = f"a positive time ({SHORTEST:g} to {LONGEST:g} s)"
+            raise InputError.one(f"a profile must last {allowed}, not from {first:g} to {last:g} s")
+
+    @property
+    @abstractmethod
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Nothing: a formula leaves no doubt."""
+        return ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Nothing: all that is given plays a part."""
+        return ()
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """The ends of the span."""
+        return np.array(self.span)
+
+    @abstractmethod
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+
+    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
+        """The same at the steps start..stop-1, whose times are `time`."""
+        return self.at(time)
+
+    def summary(self) -> dict[str, Any] | None:
+        """None: no value comes from a spline through samples."""
+        return None
+
+    def stretched(self, factor: float) -> Self:
+        """The same course, slower by a factor."""
+        first, last = self.span
+        return replace(self, span=(first, stretch(last, first, factor)))

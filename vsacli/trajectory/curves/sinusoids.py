@@ -1,0 +1,100 @@
+"""Sums of sinusoids, the excitation of identification experiments."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.trajectory.curves.closed_form import ClosedForm
+from vsacli.trajectory.curves.piecewise import stepwise
+
+RAMP_DEGREE = 9
+"""Of the rise at both ends: its first four derivatives vanish there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sinusoids(ClosedForm):
+    """offset + sum over k = 1, 2, ... of sine_k sin(k w t) + cosine_k cos(k w t), t from the start on.
+
+    The finite Fourier series of Swevers, Ganseman, Tukel, De Schutter & Van Brussel (IEEE Trans. Robotics and
+    Automation 13(5), 1997).
+
+    Attributes:
+        cycles: periods of the lowest harmonic in the span, w = 2 pi cycles / duration.
+        offset: one value a component.
+        sine, cosine: amplitudes, one value a component for each harmonic.
+        ramp: share of the span in which the sum rises from zero at the start, and falls to zero at the end;
+            its first four derivatives are then zero as well.
+    """
+
+    cycles: float
+    offset: tuple[float, ...]
+    sine: tuple[tuple[float, ...], ...]
+    cosine: tuple[tuple[float, ...], ...]
+    ramp: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if any(len(amplitudes) != len(self.offset) for amplitudes in (*self.sine, *self.cosine)):
+            raise InputError.one("offset, sine and cosine must have the same number of components")
+        if not 0 < self.cycles < math.inf:
+            raise InputError.one(f"the number of cycles must be positive, not {self.cycles:g}")
+        if not 0 <= self.ramp <= 0.5:
+            raise InputError.one(f"a ramp must take at most half of the time, not {self.ramp:g} of it")
+
+    @property
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+        return len(self.offset)
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """The ends of the span and of the ramps."""
+        return np.unique([*self.span, *(time for ends in self._ramps() for time in ends)])
+
+    def _ramps(self) -> list[tuple[float, float]]:
+        (first, last), ramp = self.span, self.ramp * (self.span[1] - self.span[0])
+        return [(first, first + ramp), (max(last - ramp, first + ramp), last)] if ramp else []
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        rows = self._series(time)
+        if self.ramp:
+            window = stepwise(self.signal, self.span, RAMP_DEGREE, ((0.0,), (1.0,), (0.0,)), self._ramps())
+            rows = _product(window.at(time), rows)
+        rows[0] += np.array(self.offset)[:, None]
+        return rows
+
+    def _series(self, time: FloatArray) -> FloatArray:
+        """The sum without the offset."""
+        first, last = self.span
+        turns = self.cycles * ((time - first) / (last - first))
+        rows = np.zeros((self.signal.orders, self.components, len(time)))
+        for k, sine, cosine in self._harmonics():
+            angle = 2 * math.pi * (k * turns)
+            value, slope = np.sin(angle), np.cos(angle)
+            speed = 2 * math.pi * k * self.cycles / np.float64(last - first)
+            for order, row in enumerate(rows):
+                row += speed**order * (np.multiply.outer(sine, value) + np.multiply.outer(cosine, slope))
+                value, slope = slope, -value
+        return rows
+
+    def _harmonics(self) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+        none = (0.0,) * self.components
+        for k in range(max(len(self.sine), len(self.cosine))):
+            sine, cosine = (series[k] if k < len(series) else none for series in (self.sine, self.cosine))
+            yield k + 1, np.array(sine), np.array(cosine)
+
+
+def _product(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Derivatives of a product, by Leibniz' rule."""
+    rows = np.zeros(np.broadcast_shapes(left.shape, right.shape))
+    for order, row in enumerate(rows):
+        for k in range(order + 1):
+            row += math.comb(order, k) * left[k] * right[order - k]
+    return rows

@@ -1,0 +1,196 @@
+"""Splines through points, from rest to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.errors import InputError
+from vsacli.trajectory.curves.closed_form import ClosedForm
+from vsacli.trajectory.curves.curve_degrees import VIA_DEGREES
+from vsacli.trajectory.curves.taylor import taylor_series
+
+SEAM = 1e-9
+"""Largest jump between the expansions about two neighbouring points, relative to the peak of each derivative:
+well-placed points leave 1e-13."""
+
+
+class Extremes(NamedTuple):
+    """The smallest and the largest value of each component, (components,), and when it has them, s."""
+
+    lowest: FloatArray
+    lowest_at: FloatArray
+    highest: FloatArray
+    highest_at: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class ViaPoints(ClosedForm):
+    """The spline through points that begins and ends at rest.
+
+    With m = (degree+1)/2, its derivatives up to m-1 vanish at both ends, and those up to degree-1 are
+    continuous. Of all functions through the points that begin and end so, it has the least integral of the
+    squared m-th derivative (de Boor, A Practical Guide to Splines, 2001): degree 7 gives the minimum-snap
+    motion of Mellinger & Kumar (ICRA 2011). Through two points it is the rest-to-rest polynomial.
+
+    Attributes:
+        degree: odd, 3 to 9.
+        shares: when the points are passed, as shares of the span: increasing, from 0 to 1.
+        points: one value a component each, NaN throughout for a component that has none; taken exactly.
+    """
+
+    degree: int
+    shares: tuple[float, ...]
+    points: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.degree not in VIA_DEGREES:
+            allowed = f"{VIA_DEGREES[0]} to {VIA_DEGREES[-1]}"
+            raise InputError.one(f"the degree must be odd, {allowed}, not {self.degree}")
+        if len(self.points) < 2 or len(self.points) != len(self.shares):
+            counts = f"{len(self.points)} points and {len(self.shares)} times"
+            raise InputError.one(f"two or more points and as many times are needed, not {counts}")
+        if len({len(point) for point in self.points}) > 1:
+            raise InputError.one("the points have different numbers of values")
+        if (self.shares[0], self.shares[-1]) != (0, 1) or not np.all(np.diff(self.shares) > 0):
+            raise InputError.one("the times of the points must increase strictly, from the start to the end")
+
+    @property
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+        return len(self.points[0])
+
+    @cached_property
+    def breakpoints(self) -> FloatArray:
+        """When the points are passed."""
+        first, last = self.span
+        times = first + (last - first) * np.array(self.shares)
+        times[-1] = last
+        return times
+
+    @cached_property
+    def _given(self) -> BoolArray:
+        """Which components have values, (components,)."""
+        given: BoolArray = ~np.isnan(self.points[0])
+        return given
+
+    @cached_property
+    def _derivatives(self) -> FloatArray:
+        """Value and derivatives by the share of the span, (degree+1, given components, points).
+
+        The highest derivative is constant between two points; it stands with the first of them.
+        """
+        from scipy.interpolate import make_interp_spline
+
+        points, shares = np.array(self.points)[:, self._given], np.array(self.shares)
+        vanishing = (self.degree - 1) // 2
+        rest = [(order, np.zeros(points.shape[1])) for order in range(1, vanishing + 1)]
+        with np.errstate(all="ignore"):  # what comes of points that are unfit is refused below
+            try:
+                ends: Any = (rest, rest)
+                away = points - points[0]  # so that a component that stands still does so exactly
+                spline = make_interp_spline(shares, away, k=self.degree, bc_type=ends)
+            except (np.linalg.LinAlgError, ValueError):
+                raise _unfit(self.degree) from None
+            rows = np.stack([spline(shares, nu=order).T for order in range(self.degree + 1)])
+            rows[0] = points.T
+            rows[1 : vanishing + 1, :, [0, -1]] = 0.0
+            if not _is_smooth(rows, np.diff(shares), min(self.signal.orders, self.degree)):
+                raise _unfit(self.degree)
+        return rows
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples).
+
+        Each is expanded about the nearest point, where it is exact.
+
+        Raises:
+            InputError: the points are too unevenly spaced in time.
+        """
+        first, last = self.span
+        knots = self.breakpoints
+        piece = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
+        nearest = piece + (time - knots[piece] > knots[piece + 1] - time)
+        coefficients = [*self._derivatives[:-1, :, nearest], self._derivatives[-1][:, piece]]
+        series = taylor_series(coefficients, (time - knots[nearest]) / (last - first), self.signal.orders)
+
+        rows = np.full((self.signal.orders, self.components, len(time)), np.nan)
+        for order, total in enumerate(series):
+            rows[order, self._given] = total / np.float64(last - first) ** order
+        return rows
+
+    def extremes(self) -> Extremes:
+        """The smallest and largest values, from the zeros of the first derivative.
+
+        Raises:
+            InputError: as `at`.
+        """
+        times = [np.union1d(self.breakpoints, zeros) for zeros in self._zeros()]
+        found = np.full((4, self.components), np.nan)
+        for component, time in zip(np.flatnonzero(self._given), times, strict=True):
+            values = self.at(time)[0, component]
+            low, high = values.argmin(), values.argmax()
+            found[:, component] = values[low], time[low], values[high], time[high]
+        return Extremes(*found)
+
+    def _zeros(self) -> Sequence[FloatArray]:
+        """Times between the ends at which the first derivative of each given component vanishes."""
+        from scipy.interpolate import PPoly
+
+        first, last = self.span
+        orders = np.arange(self.degree, 0, -1)
+        factorials = np.cumprod(np.arange(1.0, self.degree + 1))[::-1]
+        powers = self._derivatives[orders, :, :-1] * (orders / factorials)[:, None, None]
+        slope = PPoly(np.moveaxis(powers, 1, 2), np.array(self.shares))
+        roots = slope.roots(discontinuity=False, extrapolate=False)
+        return [first + (last - first) * found[np.isfinite(found)] for found in roots]
+
+
+def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
+    """When points are passed, if nothing is said about it, as shares of the span, (points,).
+
+    The way between two points counts by the square root of their distance (Lee, Computer-Aided Design 21,
+    1989), so that near points are not passed in too short a time; along the whole way time passes as on the
+    rest-to-rest polynomial of that degree, the regularized incomplete beta function.
+
+    Args:
+        points: (points, components); components that are NaN do not count.
+        degree: of the spline.
+    """
+    from scipy.special import betaincinv
+
+    corners = np.nan_to_num(np.asarray(points, dtype=np.float64))
+    steps = np.diff(corners / (np.abs(corners).max() or 1.0), axis=0)
+    way = np.concatenate(([0.0], np.cumsum(np.sqrt(np.linalg.norm(steps, axis=1)))))
+    half = (degree + 1) // 2
+    shares: FloatArray = betaincinv(half, half, way / (way[-1] or 1.0))
+    return shares
+
+
+def _is_smooth(rows: FloatArray, lengths: FloatArray, orders: int) -> bool:
+    """Whether the expansions about neighbouring points meet half-way, with that many derivatives.
+
+    Values are compared with those of the points, derivatives with their peaks.
+    """
+    left, right = list(rows[:, :, :-1]), [*rows[:-1, :, 1:], rows[-1, :, :-1]]
+    before, after = (
+        np.array(taylor_series(*side, orders)) for side in ((left, lengths / 2), (right, -lengths / 2))
+    )
+    quarters = [taylor_series(left, lengths / 4, orders), taylor_series(right, -lengths / 4, orders)]
+    peaks = np.abs(np.concatenate([rows[:orders], before, *quarters], axis=2)).max(axis=2)
+    peaks[0] = np.abs(rows[0]).max(axis=1)
+    return bool(np.all(np.abs(before - after).max(axis=2) <= SEAM * peaks))
+
+
+def _unfit(degree: int) -> InputError:
+    return InputError.one(
+        f"the points are too unevenly spaced in time for a spline of degree {degree};"
+        " space them more evenly, or take a lower degree"
+    )

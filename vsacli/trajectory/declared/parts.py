@@ -1,0 +1,181 @@
+"""Parts of a sequence."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+
+from vsacli.base import units
+from vsacli.base.errors import FieldProblem
+from vsacli.documents.fields import POSITIVE, PerJoint, check_fields, integer, number, value
+from vsacli.trajectory import curves as profiles
+from vsacli.trajectory.curves import ClosedForm, Constant, RestToRest
+from vsacli.trajectory.declared import degrees
+from vsacli.trajectory.declared.course import Course, same_time
+from vsacli.trajectory.declared.sinusoids import PositionSinusoids
+from vsacli.trajectory.declared.via_points import PositionVia
+
+Position: TypeAlias = tuple[float, ...]
+
+
+class Part(ABC):
+    """A motion with a duration of its own; what is declared may leave open where it begins."""
+
+    opening: ClassVar[tuple[str | int, ...]]
+    """Path to where the position at its start is declared."""
+
+    @property
+    @abstractmethod
+    def lasts(self) -> float:
+        """The duration, s."""
+
+    @property
+    @abstractmethod
+    def begins(self) -> Position | None:
+        """The position at the start; None if it is where the part before ends."""
+
+    @abstractmethod
+    def placed(self, span: tuple[float, float], here: Position) -> ClosedForm:
+        """The profile over a span, in s, after a part that ends here."""
+
+    def own_problems(self) -> Iterator[FieldProblem]:
+        """What keeps it from being executed."""
+        return iter(())
+
+
+class _Timed(Part):
+    """A part with a required duration."""
+
+    duration: float
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def lasts(self) -> float:
+        """The duration, s."""
+        return self.duration
+
+
+@dataclass(frozen=True)
+class Dwell(_Timed):
+    """The robot stands still where the part before ends; at the beginning, where the next part starts."""
+
+    opening = ()
+    begins = None
+    duration: float = number(units.TIME, "duration of the part", check=POSITIVE)
+
+    def placed(self, span: tuple[float, float], here: Position) -> Constant:
+        """The profile over a span, in s, after a part that ends here."""
+        return Constant(signal=profiles.POSITION, span=span, value=here)
+
+
+@dataclass(frozen=True)
+class PolynomialPart(_Timed):
+    """Rest to rest: all derivatives up to (degree-1)/2 vanish at both ends."""
+
+    opening = ("start",)
+    duration: float = number(units.TIME, "duration of the part", check=POSITIVE)
+    degree: int = integer(
+        "degree of the polynomial: from 9 on next to another part; from 5 on if all joints are rigid",
+        check=degrees.POSITION,
+    )
+    start: Position | None = value(
+        PerJoint(units.POSITION), "position at the start; where the part before ends, if absent", default=None
+    )
+    end: Position = value(PerJoint(units.POSITION), "position at the end")
+
+    @property
+    def begins(self) -> Position | None:
+        """The position at the start; None if it is where the part before ends."""
+        return self.start
+
+    def placed(self, span: tuple[float, float], here: Position) -> RestToRest:
+        """The profile over a span, in s, after a part that ends here."""
+        start = here if self.start is None else self.start
+        return RestToRest(signal=profiles.POSITION, span=span, degree=self.degree, start=start, end=self.end)
+
+
+@dataclass(frozen=True)
+class RigidPolynomialPart(PolynomialPart):
+    """The same for a robot whose joints are all rigid."""
+
+    degree: int = integer("degree of the polynomial", check=degrees.RIGID_POSITION)
+
+
+class _Standalone(Course, Part):
+    """A course that is a part as well: it knows by itself where it begins."""
+
+    @property
+    @abstractmethod
+    def lasts(self) -> float:
+        """The duration, s."""
+
+    @property
+    def begins(self) -> Position:
+        """The position at the start."""
+        start: Position = tuple(self.over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
+        return start
+
+    def placed(self, span: tuple[float, float], _here: Position) -> ClosedForm:
+        """The profile over a span, in s."""
+        return self.over(span)
+
+    def own_problems(self) -> Iterator[FieldProblem]:
+        """What keeps it from being executed."""
+        return self.problems_over(self.lasts)
+
+
+@dataclass(frozen=True)
+class ViaPart(PositionVia, _Standalone):
+    """A spline through points as above."""
+
+    opening = ("points", 0)
+    duration: float | None = number(
+        units.TIME, "duration of the part, if there are no times", check=POSITIVE, default=None
+    )
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        yield from super()._problems()
+        if self.duration is None and self.times is None:
+            yield FieldProblem((), "missing key 'duration' or 'times' (s)")
+        elif self.duration is not None and self.times and not same_time(self.duration, self.times[-1]):
+            message = (
+                f"is {self.duration:.10g} s, but the last of the times {self.times[-1]:.10g} s; leave it out"
+            )
+            yield FieldProblem(("duration",), message)
+
+    @property
+    def lasts(self) -> float:
+        """The duration, s."""
+        duration = self.duration if self.times is None else self.times[-1]
+        assert duration is not None, "see _problems"
+        return duration
+
+
+@dataclass(frozen=True)
+class RigidViaPart(ViaPart):
+    """The same for a robot whose joints are all rigid."""
+
+    degree: int = integer("degree of the spline", check=degrees.RIGID_POSITION_VIA)
+
+
+@dataclass(frozen=True)
+class SinusoidsPart(PositionSinusoids, _Standalone):
+    """A sum of sinusoids as above; it needs a `ramp` where another part precedes or follows."""
+
+    opening = ("offset",)
+    duration: float = number(units.TIME, "duration of the part", check=POSITIVE)
+
+    @property
+    def lasts(self) -> float:
+        """The duration, s."""
+        return self.duration
+
+
+PARTS = {"polynomial": PolynomialPart, "via": ViaPart, "sinusoids": SinusoidsPart, "dwell": Dwell}
+RIGID_PARTS = {**PARTS, "polynomial": RigidPolynomialPart, "via": RigidViaPart}

@@ -1,0 +1,151 @@
+"""Splines that stand for recorded samples, and what is known of their errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.trajectory.times import stretch
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The components that share a spline's knots.
+
+    Attributes:
+        members: their indices.
+        spline: with one column a member.
+        exact: whether it goes through the samples, rather than near them.
+    """
+
+    members: IndexArray
+    spline: BSpline[np.float64]
+    exact: bool
+
+    @property
+    def knots(self) -> FloatArray:
+        """Ascending times between which the spline is one polynomial; the first and last are its span."""
+        return np.asarray(self.spline.t[self.spline.k : -self.spline.k])
+
+    @property
+    def doubtful(self) -> tuple[float, float]:
+        """How long after the start and before the end the derivatives are doubtful, s.
+
+        (degree + 1)/2 knot spans, beyond which noise passes into the highest derivative that is needed less
+        than 1.4 times as much as anywhere inside; at the ends themselves it is up to 850 times.
+        """
+        spans = (self.spline.k + 1) // 2
+        return float(np.ptp(self.knots[: spans + 1])), float(np.ptp(self.knots[-spans - 1 :]))
+
+    def at(self, time: FloatArray, orders: int) -> FloatArray:
+        """Value and derivatives, shape (orders, members, samples).
+
+        Within a knot span one polynomial is evaluated, so that neighbouring values share their rounding
+        error; evaluating derivatives of B-splines point by point leaves noise of about eps / step^order.
+        """
+        degree, knots = self.spline.k, self.knots
+        span = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
+        used, which = np.unique(span, return_inverse=True)
+        offset = time - knots[span]
+        taylor = [self.spline(knots[used], nu=order).T[:, which] for order in range(degree + 1)]
+        rows = np.empty((orders, len(self.members), len(time)))
+        for order, row in enumerate(rows):
+            row[:] = taylor[degree]
+            for power in range(degree - order, 0, -1):
+                row *= offset / power
+                row += taylor[order + power - 1]
+        return rows
+
+    def stretched(self, factor: float) -> Part:
+        """The same course, slower by a factor, from the same first time on."""
+        from scipy.interpolate import BSpline
+
+        knots = stretch(self.spline.t, self.spline.t[0], factor)
+        return replace(self, spline=BSpline(knots, self.spline.c, self.spline.k))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What stands for the samples of a signal between them, and for its derivatives.
+
+    Attributes:
+        components: how many there are; those in no part have no values.
+        degree: of the splines.
+        parts: components that share knots.
+        residual: root mean square of sample minus fit, (components,).
+        largest: largest |sample - fit|, (components,).
+        noise: estimated standard deviation of a sample, (components,).
+        step: mean distance of samples, s.
+    """
+
+    components: int
+    degree: int
+    parts: tuple[Part, ...]
+    residual: FloatArray
+    largest: FloatArray
+    noise: FloatArray
+    step: float
+
+    @cached_property
+    def breakpoints(self) -> FloatArray:
+        """Ascending times between which all components are polynomials; the first and last are the span."""
+        return np.unique(np.concatenate([part.knots for part in self.parts]))
+
+    @property
+    def doubtful(self) -> tuple[float, float]:
+        """How long after the start and before the end the derivatives of any component are doubtful, s."""
+        stretches = [part.doubtful for part in self.parts] or [(0.0, 0.0)]
+        starts, ends = zip(*stretches, strict=True)
+        return max(starts), max(ends)
+
+    @cached_property
+    def exact(self) -> BoolArray:
+        """Which components' splines go through the samples, (components,); also those that have no values."""
+        exact = np.ones(self.components, dtype=bool)
+        for part in self.parts:
+            exact[part.members] = part.exact
+        return exact
+
+    def at(self, time: FloatArray, orders: int) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        rows = np.full((orders, self.components, len(time)), np.nan)
+        for part in self.parts:
+            rows[:, part.members] = part.at(time, orders)
+        return rows
+
+    def stretched(self, factor: float) -> Fit:
+        """The same course, slower by a factor, from the same first time on."""
+        parts = tuple(part.stretched(factor) for part in self.parts)
+        return replace(self, parts=parts, step=factor * self.step)
+
+
+def join(degree: int, parts: Sequence[Part], time: FloatArray, rows: FloatArray, noise: FloatArray) -> Fit:
+    """The fit that consists of parts.
+
+    Args:
+        degree: of their splines.
+        parts: each component in at most one.
+        time: (samples,) of the record, s.
+        rows: (components, samples), what was fitted.
+        noise: estimated standard deviation of the samples, (components,); that of parts that are not exact
+            is taken from their residual.
+    """
+    components = len(rows)
+    residual, largest, noise = np.zeros(components), np.zeros(components), noise.copy()
+    for part in parts:
+        if not part.exact:
+            error = rows[part.members] - part.spline(time).T
+            freedom = max(1, len(time) - len(part.spline.c))
+            residual[part.members] = np.sqrt(np.mean(error**2, axis=1))
+            largest[part.members] = np.abs(error).max(axis=1)
+            noise[part.members] = np.sqrt(np.sum(error**2, axis=1) / freedom)
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    return Fit(components, degree, tuple(parts), residual, largest, noise, step)

@@ -1,0 +1,137 @@
+"""Least-squares splines, and the number of their knots by generalised cross-validation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+PENALTY = 1.4
+"""What a coefficient costs in cross-validation. With 1 it now and then takes far too many knots (Kim & Gu,
+2004); twice as many mean 2^4.5 times the noise in a fourth derivative."""
+
+BLOCK_SAMPLES = 16384
+"""Samples whose B-splines are held in memory at a time."""
+
+COARSE_RATIO = 4
+"""Of successive numbers of spans tried at first, over the whole range: the score may have several minima, one
+for each time scale of the motion."""
+
+FINE_RATIOS = (2.0, 2.0**0.5, 2.0**0.25)
+"""Of the numbers tried then on both sides of the best; the last is finer than the minimum is sharp."""
+
+
+def most_spans(samples: int, degree: int) -> int:
+    """The largest number of spans tried: half as many coefficients as samples, to tell noise by the rest."""
+    return max(1, samples // 2 - degree)
+
+
+def fit_spline(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> BSpline[np.float64]:
+    """The spline nearest to samples, with as many samples in each knot span.
+
+    Banded normal equations, solved once more for the residual: that gives back the digits that squaring the
+    condition number costs (corrected seminormal equations, Björck, Numerical Methods for Least Squares
+    Problems, 1996, 6.6.5). They take a fraction of the time of SciPy's `make_lsq_spline`, which grows with
+    the product of samples and knots.
+
+    Args:
+        time: (samples,), s.
+        rows: (components, samples).
+        spans: number of knot spans.
+        degree: of the spline.
+    """
+    from scipy.interpolate import make_lsq_spline
+
+    try:
+        first = _solve(time, rows, spans, degree)
+        correction = _solve(time, rows - first(time).T, spans, degree)
+    except np.linalg.LinAlgError:  # of very uneven times
+        return make_lsq_spline(time, rows.T, _knots(time, spans, degree), k=degree, method="qr")
+    return type(first)(first.t, first.c + correction.c, degree)
+
+
+def best_spans(time: FloatArray, rows: FloatArray, degree: int) -> IndexArray:
+    """The number of knot spans for each row, by generalised cross-validation (Craven & Wahba, 1979).
+
+    It minimises RSS / (1 - 1.4 coefficients/samples)^2, see `PENALTY`. Rows choose for themselves: one knot
+    spacing for all would pass the noise of a slow joint through the knots of the fastest. Of successive
+    samples that are equal, as an encoder of low resolution gives them, only one counts: their errors are not
+    independent, and a score that took them for it would follow the steps.
+
+    Returns:
+        (components,); `most_spans` where it is best to go on towards interpolation.
+    """
+    limit = most_spans(len(time), degree)
+    informative = 1 + np.count_nonzero(np.diff(rows), axis=1)
+    scores: dict[int, FloatArray] = {}
+
+    def best(candidates: set[int]) -> IndexArray:
+        for spans in candidates - scores.keys():
+            scores[spans] = _score(time, rows, informative, spans, degree)
+        counts = np.array(sorted(scores))
+        return np.asarray(counts[np.argmin([scores[count] for count in counts.tolist()], axis=0)])
+
+    powers = range(int(np.log(limit) / np.log(COARSE_RATIO) + 1e-9) + 1)
+    chosen = best({limit, *(COARSE_RATIO**power for power in powers)})
+    for ratio in FINE_RATIOS:
+        near = np.concatenate([chosen / ratio, chosen * ratio]).round().astype(int)
+        chosen = best(set(np.clip(near, 1, limit).tolist()))
+    return chosen
+
+
+def _score(
+    time: FloatArray, rows: FloatArray, informative: IndexArray, spans: int, degree: int
+) -> FloatArray:
+    """(components,); infinite where more than half of the informative samples would go into coefficients.
+
+    And where very uneven times leave spans with samples that are the same to rounding.
+    """
+    share = (spans + degree) / informative
+    if np.all(share > 0.5):
+        return np.full(len(rows), np.inf)
+    try:
+        error = rows - _solve(time, rows, spans, degree)(time).T
+    except np.linalg.LinAlgError:
+        return np.full(len(rows), np.inf)
+    return np.where(share > 0.5, np.inf, np.sum(error**2, axis=1) / (1 - PENALTY * share) ** 2)
+
+
+def _solve(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> BSpline[np.float64]:
+    from scipy.interpolate import BSpline
+    from scipy.linalg import solveh_banded
+
+    knots = _knots(time, spans, degree)
+    bands, sums = np.zeros((degree + 1, spans + degree)), np.zeros((spans + degree, len(rows)))
+    for start in range(0, len(time), BLOCK_SAMPLES):
+        stop = start + BLOCK_SAMPLES
+        _add(bands, sums, time[start:stop], rows[:, start:stop], knots)
+    return BSpline(knots, solveh_banded(bands, sums, lower=True), degree)
+
+
+def _knots(time: FloatArray, spans: int, degree: int) -> FloatArray:
+    """Equally spaced by the count of samples, so that none is without any, and in time if the samples are."""
+    inner = np.interp(np.linspace(0, len(time) - 1, spans + 1), np.arange(len(time)), time)
+    return np.concatenate([np.repeat(time[0], degree), inner, np.repeat(time[-1], degree)])
+
+
+def _add(bands: FloatArray, sums: FloatArray, time: FloatArray, rows: FloatArray, knots: FloatArray) -> None:
+    """Add what a block of samples gives to the normal equations: the lower bands and the right-hand sides."""
+    from scipy.interpolate import BSpline
+
+    width = len(bands)
+    design = BSpline.design_matrix(
+        time, knots, width - 1, extrapolate=True
+    )  # spares a slow check of the span
+    basis = np.ascontiguousarray(design.data.reshape(-1, width).T)
+    first = design.indices[::width]
+    starts = np.flatnonzero(np.diff(first, prepend=-1))
+    columns = first[starts]
+    for i in range(width):
+        sums[columns + i] += np.add.reduceat(basis[i] * rows, starts, axis=1).T
+        for j in range(i, width):
+            bands[j - i, columns + i] += np.add.reduceat(basis[i] * basis[j], starts)

@@ -1,0 +1,1 @@
+"""Signals recorded in a laboratory: columns of a CSV table."""

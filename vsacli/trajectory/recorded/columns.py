@@ -1,0 +1,191 @@
+"""Which column of a recorded trajectory is which quantity of which joint, and in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.unit_expressions import conversion_factor
+from vsacli.base.units import Quantity
+from vsacli.base.variables import VARIABLES
+from vsacli.base.wrench import WRENCH_AXES, wrench_columns
+from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH, Signal
+
+TIME = "time"
+JOINT_SIGNALS = (POSITION, STIFFNESS)
+SIGNALS = (*JOINT_SIGNALS, WRENCH)
+
+Way = dict[str, dict[int, str]]
+"""For each quantity the names of its columns, by index of the joint (wrench axis)."""
+
+_PATTERNS = ("{joint}.{name}", "{name}{number}")
+
+_WRENCH_WAY: Way = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
+
+_MOTION_ALONE = "; a trajectory in YAML can take the motion from here and set the stiffness itself"
+
+_HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
+_PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        index: its place, from 0.
+        name: from the header, without the unit.
+        factor: what its numbers are multiplied by to be SI.
+    """
+
+    index: int
+    name: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where quantities stand in a table.
+
+    Attributes:
+        time: the column of the times.
+        quantities: for each quantity that the table has, e.g. `dq`, the columns by index of the joint (axis).
+        unused: names of the other columns.
+    """
+
+    time: Column
+    quantities: Mapping[str, Mapping[int, Column]]
+    unused: tuple[str, ...]
+
+
+def column_layout(
+    header: Sequence[str],
+    joints: Mapping[str, str],
+    wanted: Sequence[Signal],
+    file: str,
+    line: int = 1,
+    without_stiffness: Collection[str] = (),
+) -> Layout:
+    """Where the quantities stand in a table.
+
+    Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one way
+    throughout. Those of the wrench are named by `wrench_columns`. A unit in brackets may follow any name.
+
+    Args:
+        header: names of all columns, none twice.
+        joints: names with types, base to tip; each must have a column of each quantity that any joint has.
+        wanted: signals whose values must be there; their derivatives are optional.
+        file: named in errors.
+        line: of the header, likewise.
+        without_stiffness: joints that need no stiffness; columns of it are admitted, but not in the layout.
+
+    Raises:
+        InputError: all that is wrong with the header.
+    """
+    headings = [_HEADING.fullmatch(text) for text in header]
+    names = [text if match is None else match["name"] for text, match in zip(header, headings, strict=True)]
+    everything = [column for pattern in _PATTERNS for column in _all(_columns(pattern, joints))]
+    ways = [_columns(pattern, joints, without_stiffness) for pattern in _PATTERNS]
+    used = [way for way in ways if any(column in names for column in _all(way))]
+    way = used[0] if used else ways[0]
+    expected = [TIME, *_all(way), *(_all(_WRENCH_WAY) if WRENCH in wanted else ())]
+
+    problems = list(_strangers(names, expected, {TIME, *everything, *_all(_WRENCH_WAY)}))
+    problems += [f"column {name!r} appears {n} times" for name, n in Counter(names).items() if n > 1]
+    way = way | _WRENCH_WAY
+    if len(used) == len(ways):
+        examples = " and ".join(repr(next(column for column in names if column in _all(way))) for way in ways)
+        problems.append(f"columns are named both by joint and by number ({examples}); use one way")
+    else:
+        problems += _gaps(names, way, {signal.names[0] for signal in wanted})
+    units = [None if match is None else match["unit"] for match in headings]
+    columns = dict(_measured(names, units, way, joints, problems))
+    if problems:
+        raise InputError(Problem(file, line, problem) for problem in problems)
+    return Layout(
+        time=columns[TIME],
+        quantities={
+            name: {index: columns[column] for index, column in of_joints.items()}
+            for name, of_joints in way.items()
+            if all(column in columns for column in of_joints.values())
+        },
+        unused=tuple(name for name in names if name not in columns),
+    )
+
+
+def _columns(pattern: str, joint_names: Collection[str], without_stiffness: Collection[str] = ()) -> Way:
+    """The columns of the joints."""
+    return {
+        name: {
+            index: pattern.format(name=name, joint=joint, number=index + 1)
+            for index, joint in enumerate(joint_names)
+            if signal is not STIFFNESS or joint not in without_stiffness
+        }
+        for signal in JOINT_SIGNALS
+        for name in signal.names
+    }
+
+
+def _all(way: Way) -> list[str]:
+    return [column for columns in way.values() for column in columns.values()]
+
+
+def _strangers(header: Sequence[str], expected: Sequence[str], known: Collection[str]) -> Iterator[str]:
+    meant = [column for column in expected if column not in header]
+    for column in header:
+        if column in known:
+            continue
+        unit = _PARENTHESISED.fullmatch(column)
+        if unit is not None and unit["name"] in known:
+            yield f"{column!r}: units are written in square brackets, {unit['name']} [{unit['unit']}]"
+        else:
+            yield f"unknown column {column!r}{did_you_mean(column, meant)}"
+
+
+def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[str]:
+    if TIME not in header:
+        yield f"there is no column {TIME!r}"
+    for name, columns in way.items():
+        absent = [column for column in columns.values() if column not in header]
+        if not absent:
+            continue
+        missing = f"there {'is no column' if len(absent) == 1 else 'are no columns'} {', '.join(absent)}"
+        if name in needed:
+            alone = name in STIFFNESS.names and len(absent) == len(columns)
+            yield missing + (_MOTION_ALONE if alone else "")
+        elif len(absent) < len(columns):
+            every = "axes" if name in WRENCH.names else "joints"
+            yield f"{missing}; {name} is given for all {every} or for none"
+
+
+def _measured(
+    names: Sequence[str],
+    units: Sequence[str | None],
+    way: Way,
+    joints: Mapping[str, str],
+    problems: list[str],
+) -> Iterator[tuple[str, Column]]:
+    """The columns that are used, by name; notes units that cannot be converted."""
+    expected = {TIME: VARIABLES[TIME].quantity.unit("")}
+    for quantity, columns in way.items():
+        for index, column in columns.items():
+            expected[column] = _unit(VARIABLES[quantity].quantity, quantity, index, tuple(joints.values()))
+    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
+        if name in expected:
+            try:
+                factor = 1.0 if unit is None else conversion_factor(unit, expected[name])
+            except InputError as error:
+                problems.append(f"column {name!r}: {error}")
+            else:
+                yield name, Column(place, name, factor)
+
+
+def _unit(quantity: Quantity, name: str, index: int, joint_types: Sequence[str]) -> str:
+    """Of one column; the axes of a wrench are forces, then moments."""
+    if name not in WRENCH.names:
+        return quantity.unit(joint_types[index])
+    return quantity.prismatic if WRENCH_AXES[index].startswith("f") else quantity.revolute

@@ -1,0 +1,172 @@
+"""Recorded trajectories: the columns of a CSV table as position and stiffness of joints, and wrench."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.wrench import WRENCH_AXES
+from vsacli.documents.source import Source
+from vsacli.documents.table import Lines, Table, read_table
+from vsacli.trajectory.curves import WRENCH, Signal
+from vsacli.trajectory.recorded.columns import JOINT_SIGNALS, SIGNALS, Column, Layout, column_layout
+from vsacli.trajectory.recorded.samples import (
+    SampledProfile,
+    SampleProblem,
+    Samples,
+    time_problems,
+    value_problems,
+)
+from vsacli.trajectory.times import RecordedTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+DEFAULT_FITS: Mapping[Signal, str | None] = dict.fromkeys(JOINT_SIGNALS)
+"""Position and stiffness, each fitted as its noise asks for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What was read from a CSV file.
+
+    Attributes:
+        times: the column `time`.
+        profiles: one for each signal that was asked for, in that order.
+        notes: what of the file is not used.
+        source: the file.
+        lines: those of its rows.
+    """
+
+    times: RecordedTimes
+    profiles: tuple[SampledProfile, ...]
+    notes: tuple[str, ...]
+    source: Source
+    lines: Lines
+
+    def check_times(self, other: Recording) -> None:
+        """Refuse another recording that is to be combined with this one if its times differ.
+
+        Raises:
+            InputError: naming the first row of `other` whose time is not the one here.
+        """
+        here, there = self.times.time, other.times.time
+        common = min(len(here), len(there))
+        differ = here[:common] != there[:common]
+        if differ.any():
+            row = int(np.argmax(differ))
+            message = f"time is {there[row]} s, but {here[row]} s in the same row of {self.source.path}"
+            raise InputError.one(message, other.source.path, other.lines.of(row))
+        if len(here) != len(there):
+            message = f"the file has {len(there)} rows, but {self.source.path} has {len(here)}"
+            raise InputError.one(message, other.source.path)
+
+
+def read_recording(
+    path: str | os.PathLike[str],
+    joints: Mapping[str, str],
+    wanted: Mapping[Signal, str | None] = DEFAULT_FITS,
+    without_stiffness: Collection[str] = (),
+    *,
+    resampled: bool = False,
+) -> Recording:
+    """Read signals from a CSV file.
+
+    Args:
+        path: a file with the columns `time` and those of `column_layout`.
+        joints: names with types, from the base to the tip.
+        wanted: the signals to read, each with the method of its fit as in `fit_samples`.
+        without_stiffness: joints for which no stiffness is read.
+        resampled: whether the steps will be other times than the recorded ones.
+
+    Raises:
+        InputError: with file and line of everything that does not fit.
+    """
+    table = read_table(path)
+    file = table.source.path
+    signals = tuple(wanted)
+    layout = column_layout(table.columns, joints, signals, file, table.header_line, without_stiffness)
+    time = _si(table, layout.time)
+    records = [_samples(signal, tuple(joints), time, table, layout) for signal in signals]
+
+    problems = [*time_problems(time), *(problem for record in records for problem in value_problems(record))]
+    if problems:
+        raise InputError(_located(problem, table, layout) for problem in problems)
+    notes = tuple(f"{file}: {clause}" for clause in _unused(layout, signals))
+    source, lines = table.source, table.lines
+    del table  # as large as the records, which may be fitted now
+    profiles = tuple(
+        SampledProfile.of(record, wanted[record.signal], resampled=resampled) for record in records
+    )
+    return Recording(RecordedTimes(time), profiles, notes, source, lines)
+
+
+def _unused(layout: Layout, wanted: Sequence[Signal]) -> Iterator[str]:
+    for signal in SIGNALS:
+        if signal not in wanted and any(layout.quantities.get(name) for name in signal.names):
+            yield f"its columns of {signal.names[0]} are not used"
+    if layout.unused:
+        yield f"not used: {', '.join(layout.unused)}; only antagonistic joints take a stiffness"
+
+
+def _samples(
+    signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: Table, layout: Layout
+) -> Samples:
+    labels = WRENCH_AXES if signal is WRENCH else joint_names
+    values, *derivatives = (
+        _rows(table, layout.quantities[name], len(labels)) if name in layout.quantities else None
+        for name in signal.names
+    )
+    assert values is not None, "columns of values are required"
+    return Samples(signal=signal, time=time, values=values, derivatives=tuple(derivatives), labels=labels)
+
+
+def _rows(table: Table, columns: Mapping[int, Column], components: int) -> FloatArray:
+    """(components, samples), NaN where a component has no column."""
+    rows = np.full((components, len(table.values)), np.nan)
+    for component, column in columns.items():
+        rows[component] = _si(table, column)
+    return rows
+
+
+def _si(table: Table, column: Column) -> FloatArray:
+    """A column in SI; divided rather than multiplied where that is exact, so that 3 ms are 0.003 s."""
+    values = np.ascontiguousarray(table.values[:, column.index])
+    divisor = round(1 / column.factor)
+    if divisor > 1 and math.isclose(divisor * column.factor, 1, rel_tol=1e-14):
+        return values / divisor
+    with np.errstate(over="ignore"):  # infinite is a problem of its own
+        return values * column.factor
+
+
+def _located(problem: SampleProblem, table: Table, layout: Layout) -> Problem:
+    line = 0 if problem.sample is None else table.line_of(problem.sample)
+    column = (
+        problem.quantity if problem.joint is None else layout.quantities[problem.quantity][problem.joint].name
+    )
+    return Problem(table.source.path, line, f"{column} {problem.message}")
+
+
+def recorded_trajectory(
+    path: str | os.PathLike[str], joints: Mapping[str, str], without_stiffness: Collection[str] = ()
+) -> Trajectory:
+    """A trajectory whose position and stiffness come from one CSV file, named after the file.
+
+    Raises:
+        InputError: as `read_recording`.
+    """
+    recording = read_recording(path, joints, without_stiffness=without_stiffness)
+    position, stiffness = recording.profiles
+    return Trajectory(
+        recording.times,
+        position,
+        stiffness,
+        name=Path(path).stem,
+        notes=recording.notes,
+        sources=[recording.source],
+    )

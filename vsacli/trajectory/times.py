@@ -1,0 +1,148 @@
+"""The times of a trajectory's steps: a uniform grid, or as recorded."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+
+_Time = TypeVar("_Time", float, FloatArray)
+
+MAX_STEPS = 1_000_000_000
+"""More steps than this are taken for a mistake in duration or rate."""
+
+
+class Times(Protocol):
+    """The times of the steps, both ends included."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the times were understood, where that is not obvious."""
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time, s."""
+
+    @property
+    def samples(self) -> int:
+        """Number of steps, both ends included."""
+
+    def block(self, start: int, stop: int) -> FloatArray:
+        """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
+
+    def stretched(self, factor: float) -> Times:
+        """The times of the same motion made slower by a factor, from the same first time on."""
+
+
+@dataclass(frozen=True)
+class UniformTimes:
+    """Times t_k = k duration/n with n = round(duration rate), the last one exactly the duration.
+
+    Attributes:
+        duration: s.
+        rate: steps per second that are asked for.
+    """
+
+    duration: float
+    rate: float
+
+    def __post_init__(self) -> None:
+        if not (0 < self.duration < math.inf and 0 < self.rate < math.inf):
+            raise InputError.one(
+                f"duration and rate must be positive, not {self.duration:g} s and {self.rate:g} per second"
+            )
+        if self.duration * self.rate > MAX_STEPS:
+            steps = self.duration * self.rate
+            raise InputError.one(
+                f"duration times rate gives {steps:.4g} steps; at most {MAX_STEPS:.0e} are possible"
+            )
+
+    @property
+    def steps(self) -> int:
+        """Number n of intervals."""
+        return max(1, round(self.duration * self.rate))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The rate, if the duration does not hold a whole number of steps at the rate asked for."""
+        rate = self.steps / self.duration
+        if math.isclose(rate, self.rate, rel_tol=1e-9):
+            return ()
+        return (
+            f"the rate is {rate:.9g} per second, not {self.rate:.9g}: whole steps in {self.duration:g} s",
+        )
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time, s."""
+        return (0.0, self.duration)
+
+    @property
+    def samples(self) -> int:
+        """Number of steps, both ends included."""
+        return self.steps + 1
+
+    def block(self, start: int, stop: int) -> FloatArray:
+        """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
+        time = np.arange(start, min(stop, self.samples)) * self.duration / self.steps
+        if stop >= self.samples > start:
+            time[-1] = self.duration
+        return time
+
+    def stretched(self, factor: float) -> UniformTimes:
+        """A longer duration at the same rate."""
+        return UniformTimes(stretch(self.duration, 0.0, factor), self.rate)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedTimes:
+    """Times that are given one by one.
+
+    Attributes:
+        time: (samples,) in s; see `time_problems` for what they must satisfy.
+        notes: how they were understood, where that is not obvious.
+    """
+
+    time: FloatArray = field(repr=False)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time, s."""
+        return (float(self.time[0]), float(self.time[-1]))
+
+    @property
+    def samples(self) -> int:
+        """Number of steps, both ends included."""
+        return len(self.time)
+
+    def block(self, start: int, stop: int) -> FloatArray:
+        """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
+        return self.time[start:stop]
+
+    def stretched(self, factor: float) -> RecordedTimes:
+        """As many steps, further apart."""
+        return RecordedTimes(stretch(self.time, self.time[0], factor))
+
+
+def uniform_times_over(span: tuple[float, float], rate: float) -> RecordedTimes:
+    """Equally spaced times from the first to the last of a span, in s, at about `rate` per second.
+
+    Raises:
+        InputError: the rate is not possible.
+    """
+    first, last = span
+    uniform = UniformTimes(last - first, rate)
+    time = first + uniform.block(0, uniform.samples)
+    time[-1] = last
+    return RecordedTimes(time, uniform.notes)
+
+
+def stretch(time: _Time, first: float, factor: float) -> _Time:
+    """Times in s, seen from the first one, multiplied by a factor; the one rule for steps and profiles."""
+    return first + factor * (time - first)
