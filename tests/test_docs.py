@@ -250,7 +250,7 @@ def test_every_extra_package_has_its_reason() -> None:
         assert re.search(rf"^\| .*`{name[0]}`.* \| \w.* \|$", table, re.MULTILINE), requirement
 
 
-def test_the_changelog_begins_with_this_version() -> None:
+def test_the_changelog_begins_with_what_is_not_released_and_this_version() -> None:
     changelog = (REPOSITORY / "docs" / "changelog.md").read_text(encoding="utf-8")
-    assert re.findall(r"^## (.*)$", changelog, re.MULTILINE)[0] == vsacli.__version__
+    assert re.findall(r"^## (.*)$", changelog, re.MULTILINE)[:2] == ["Unreleased", vsacli.__version__]
     assert importlib.metadata.version("vsacli") == vsacli.__version__

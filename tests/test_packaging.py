@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 from samples.command_line import contents
 
+import vsacli
+
 REPOSITORY = Path(__file__).parents[1]
 
 
@@ -65,6 +67,20 @@ def test_what_is_installed_lists_and_copies_its_examples(wheel: zipfile.Path, tm
     subprocess.run([*command, "--copy", "mine"], **options)
     for folder in ("robots", "trajectories"):
         assert contents(tmp_path / "mine" / folder) == contents(REPOSITORY / folder)
+
+
+def test_the_wheel_says_its_licence_and_its_authors(wheel: zipfile.Path) -> None:
+    [metadata] = [folder for folder in wheel.iterdir() if folder.name.endswith(".dist-info")]
+    text = (metadata / "METADATA").read_text(encoding="utf-8")
+    assert "License-Expression: BSD-3-Clause\n" in text
+    assert "Author: the vsacli contributors\n" in text
+    licence = (REPOSITORY / "docs" / "LICENSE").read_text(encoding="utf-8")
+    assert (metadata / "licenses" / "docs" / "LICENSE").read_text(encoding="utf-8") == licence
+
+
+def test_the_citation_is_of_this_version() -> None:
+    citation = (REPOSITORY / "docs" / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {vsacli.__version__}\n" in citation
 
 
 def test_the_readme_is_the_description(wheel: zipfile.Path) -> None:

@@ -1,4 +1,4 @@
-"""Recorded programs on rows: the numbers of the text they were recorded from, to the last bit."""
+"""Recorded programs on rows: the numbers of the text they were recorded from, to the bit but for powers."""
 
 from __future__ import annotations
 

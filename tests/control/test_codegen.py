@@ -189,13 +189,22 @@ def test_what_cannot_be_generated_is_left_out_with_the_reason() -> None:
     assert omitted in mixed.files["README.md"]
 
 
-FLOAT_BOUND = 1e-6
-"""Of a variable's peak, margin above 10 %; a rounding is 6e-8, and the recursion adds some tens of them."""
+FLOAT_BOUND = {
+    "vsa_3r": 1e-6,
+    "rp_2": 1e-6,
+    "lwr_7r_vsa": 1e-6,
+    "measured_1r": 1e-5,
+    "qbmove_arm_gazebo": 1e-5,
+}
+"""Of a variable's peak, margin above 10 %: a rounding is 6e-8, and the recursion adds some tens of them.
+
+Springs whose stiffness grows tenfold over their range multiply what rounding does to a deflection by as much.
+"""
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "lwr_7r_vsa"])
-def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "bound"), FLOAT_BOUND.items())
+def test_accuracy_in_single_precision(name: str, bound: float, tmp_path: Path) -> None:
     robot = shipped(name)
     function, command = inverse_dynamics_function(robot), commands(robot, 200, seed=9)
     command = {key: values.astype(np.float32).astype(float) for key, values in command.items()}
@@ -210,6 +219,4 @@ def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
             np.testing.assert_array_equal(values[chosen], expected[chosen])
             continue
         scale = np.abs(expected[chosen]).max(initial=0.0)
-        np.testing.assert_allclose(
-            values[chosen], expected[chosen], rtol=0, atol=FLOAT_BOUND * scale, err_msg=key
-        )
+        np.testing.assert_allclose(values[chosen], expected[chosen], rtol=0, atol=bound * scale, err_msg=key)

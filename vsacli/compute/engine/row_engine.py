@@ -19,7 +19,8 @@ KEPT = 8
 class RecordedEngine:
     """The operations of each kernel, recorded when it is first needed; a kernel with loops as it is.
 
-    The numbers are those of `NumPyEngine`, to the last bit. Not for several threads at a time.
+    The numbers are those of `NumPyEngine`, to the last bit but for powers: exponents of 3, 4 and 1.5 are
+    recorded as products. Not for several threads at a time.
     """
 
     def __init__(self) -> None:
