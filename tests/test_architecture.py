@@ -27,7 +27,7 @@ NOT_FOR_THE_MAIN_JOB = (
     *("concurrent", "importlib.resources", "random", "shutil", "subprocess", "tempfile", "traceback"),
     *("cli.simulate", "cli.check_feasibility", "control", "files", "studies"),
     *("results.csv_export", "results.plots", "results.store.reader", "robot.modified_dh", "robot.urdf"),
-    *("analysis.drift", "analysis.result", "dynamics.integrated_deflections", "documents.table"),
+    *("analysis.result", "dynamics.integrated_deflections", "documents.table"),
     *("compute.engine.compiler", "compute.engine.loading", "compute.engine.row_engine", "compute.tracing"),
     *("trajectory.declared.csv_samples", "trajectory.declared.sequence", "trajectory.declared.via_points"),
     *("trajectory.curves.piecewise", "trajectory.curves.sinusoids", "trajectory.curves.via_points"),

@@ -279,7 +279,7 @@ def test_start_at_a_singular_step_has_no_torque_step():
     assert "torque step" not in text
 
 
-def test_remarks_about_the_inputs_follow_the_table():
+def test_warnings_and_notes_about_the_inputs_follow_the_table():
     lines = render(report(warnings=("its mass is zero",), notes=("the rate is 8 per second",))).splitlines()
     assert lines[3:5] == ["warning: its mass is zero", "note: the rate is 8 per second"]
 

@@ -39,14 +39,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "vsacli"
 
 
-def remarks() -> tuple[str, ...]:
+def warnings() -> tuple[str, ...]:
     """What is said on the way to right results, in a process that has loaded nothing yet."""
     _loaded.clear()
     chosen = choose("c", KERNEL, 1, 1)
     found, expected = (link_torques(vsa_3r(), *MOTION, engine=engine) for engine in (chosen.engine, "numpy"))
     # Rounding of some thousand operations that the compiler may contract and reorder.
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
-    return chosen.remarks
+    return chosen.warnings
 
 
 def files(folder: Path) -> list[str]:
@@ -55,11 +55,11 @@ def files(folder: Path) -> list[str]:
 
 @needs_compiler
 def test_library_is_kept_and_found(folder: Path):
-    assert remarks() == ()
+    assert warnings() == ()
     assert files(folder) == [CHECKSUM, LIBRARY]
     (entry,) = folder.iterdir()
     built = entry.stat().st_mtime_ns
-    assert remarks() == ()
+    assert warnings() == ()
     assert entry.stat().st_mtime_ns == built
     assert folder.stat().st_mode & 0o777 == 0o700
 
@@ -67,7 +67,7 @@ def test_library_is_kept_and_found(folder: Path):
 @needs_compiler
 @pytest.mark.parametrize("damage", ["changed", "truncated", "without checksum", "without library"])
 def test_damaged_library_is_never_loaded(folder: Path, damage: str):
-    remarks()
+    warnings()
     (library,) = folder.rglob(LIBRARY)
     content = library.read_bytes()
     library.unlink()  # this process has loaded it: another file takes its place
@@ -79,26 +79,26 @@ def test_damaged_library_is_never_loaded(folder: Path, damage: str):
         case "without checksum":
             library.write_bytes(content)
             library.with_name(CHECKSUM).unlink()
-    assert remarks() == (f"{library} was damaged; it is removed",)
+    assert warnings() == (f"{library} was damaged; it is removed",)
     assert library.read_bytes() == content
     assert files(folder) == [CHECKSUM, LIBRARY]
-    assert remarks() == ()
+    assert warnings() == ()
 
 
 @needs_compiler
 def test_folder_that_cannot_be_made(tmp_path: Path):
     (tmp_path / "cache").write_text("a file")
-    (remark,) = remarks()
-    assert remark.startswith("there is no cache folder: ")
-    assert remark.endswith("; compiled code is not kept")
+    (warning,) = warnings()
+    assert warning.startswith("there is no cache folder: ")
+    assert warning.endswith("; compiled code is not kept")
 
 
 @needs_compiler
 def test_folder_that_others_may_write_to_is_not_trusted(folder: Path):
-    remarks()
+    warnings()
     folder.chmod(0o777)
     expected = f"the cache folder {folder} can be written by others; `chmod go-w {folder}` mends that"
-    assert remarks() == (f"{expected}; compiled code is not kept",)
+    assert warnings() == (f"{expected}; compiled code is not kept",)
 
 
 def test_folder_of_somebody_else_is_not_trusted(folder: Path, monkeypatch: pytest.MonkeyPatch):
@@ -124,7 +124,7 @@ def test_full_disk_is_told_and_leaves_nothing(folder: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(cache.shutil, "copyfile", full)
     told = f"the cache folder {folder} cannot be written: No space left on device; compiled code is not kept"
-    assert remarks() == (told,)
+    assert warnings() == (told,)
     assert not list(folder.iterdir())
 
 

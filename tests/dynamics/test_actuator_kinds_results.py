@@ -19,7 +19,7 @@ from samples.robots import vsa_3r
 
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.integrated_deflections import follow
+from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.results.plots import compare_files, plot_feasibility, plot_stored
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Limits, Robot
@@ -280,9 +280,9 @@ def test_a_comparison_shows_the_motors_that_any_of_the_results_has() -> None:
 
 
 def test_only_antagonistic_joints_are_followed(robot: Robot, motion: Trajectory) -> None:
-    following = follow(robot, motion)
-    assert following.stops == (None, None, None)
-    result = inverse_dynamics(robot, motion, following=following)
+    deflections = integrate_deflections(robot, motion)
+    assert deflections.stops == (None, None, None)
+    result = inverse_dynamics(robot, motion, deflections=deflections)
     assert [drift.joint for drift in result.report.drifts] == ["elbow"]
     assert result.report.drifts[0].largest < 1e-10  # the tolerance of the integration is 1e-12 a step
     solved = inverse_dynamics(robot, motion)
@@ -300,9 +300,9 @@ def test_a_stop_is_told_of_the_joint_that_stops(
 
 def test_nothing_is_followed_where_no_joint_is_antagonistic(motion: Trajectory) -> None:
     robot = with_actuators(vsa_3r(), {0: rigid(), 1: elastic(), 2: elastic()})
-    following = follow(robot, motion)
-    assert np.isnan(following.at(np.array([0.5]))).all()
-    assert inverse_dynamics(robot, motion, following=following).report.drifts == ()
+    deflections = integrate_deflections(robot, motion)
+    assert np.isnan(deflections.at(np.array([0.5]))).all()
+    assert inverse_dynamics(robot, motion, deflections=deflections).report.drifts == ()
 
 
 def test_a_suggested_profile_is_of_the_antagonistic_joint_alone(robot: Robot, tmp_path: Path) -> None:

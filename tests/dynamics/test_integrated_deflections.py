@@ -23,7 +23,7 @@ from vsacli.analysis.result import Result
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
-from vsacli.dynamics.integrated_deflections import follow
+from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.dynamics.integrated_deflections.task import REASONS, SINGULAR, STALLED, UNREACHABLE, Task
 from vsacli.robot.model import Robot
 
@@ -80,7 +80,9 @@ def recorded(samples: int, noise: float = 0.0) -> Trajectory:
 
 
 def followed(robot: Robot, trajectory: Trajectory, tolerance: float = 1e-12) -> Result:
-    return inverse_dynamics(robot, trajectory, following=follow(robot, trajectory, tolerance))
+    return inverse_dynamics(
+        robot, trajectory, deflections=integrate_deflections(robot, trajectory, tolerance)
+    )
 
 
 def drifts(result: Result) -> list[float]:
@@ -170,15 +172,15 @@ def test_corridor_is_that_of_the_root(crossing: Result):
 
 def test_first_step_is_the_root_itself():
     trajectory = motion()
-    start = follow(ARM, trajectory).at(np.zeros(1))
+    start = integrate_deflections(ARM, trajectory).at(np.zeros(1))
     np.testing.assert_array_equal(start[..., 0], inverse_dynamics(ARM, trajectory).phi[0])
 
 
 def test_result_does_not_depend_on_the_blocks():
     trajectory = softening()
-    following = follow(ARM, trajectory, COARSE)
+    deflections = integrate_deflections(ARM, trajectory, COARSE)
     at_once, by_seven = (
-        Run(ARM, trajectory, following=following, block_samples=samples) for samples in (201, 7)
+        Run(ARM, trajectory, deflections=deflections, block_samples=samples) for samples in (201, 7)
     )
     (whole,), pieces = list(at_once), list(by_seven)
     assert at_once.report().as_json() == by_seven.report().as_json()
@@ -194,7 +196,7 @@ def test_cost_does_not_grow_with_the_samples(monkeypatch):
     counts = []
     for rate in (100, 10_000):
         calls.clear()
-        follow(ARM, motion(rate=rate), COARSE)
+        integrate_deflections(ARM, motion(rate=rate), COARSE)
         counts.append(len(calls))
     assert 0 < counts[0] == counts[1]
 
@@ -237,10 +239,10 @@ def test_steps_after_the_end_are_infeasible(touching: Result):
 
 
 def test_way_holds_no_number_at_its_very_end():
-    following = follow(ARM, softening(), COARSE)
-    _, stop = following.stops
+    deflections = integrate_deflections(ARM, softening(), COARSE)
+    _, stop = deflections.stops
     assert stop is not None
-    ends = following.at(np.array([np.nextafter(stop.time, 0), stop.time]))
+    ends = deflections.at(np.array([np.nextafter(stop.time, 0), stop.time]))
     np.testing.assert_array_equal(np.isnan(ends[1]), [[False, True]] * 2)
     assert np.isfinite(ends[0]).all()
 
@@ -290,7 +292,9 @@ def test_crossing_the_fold_ends_where_the_corridor_does(crossing: Result):
 
 def test_end_of_a_spring_is_not_singular():
     robot = with_joint(ARM, 1, joint_with(springs(Stopped(k=400, k_c=2000), Stopped(k=400, k_c=2000))))
-    base, shoulder = follow(robot, motion(start=(850.0, 840.0), end=(850.0, 1000.0)), COARSE).stops
+    base, shoulder = integrate_deflections(
+        robot, motion(start=(850.0, 840.0), end=(850.0, 1000.0)), COARSE
+    ).stops
     assert base is None
     assert shoulder is not None
     assert shoulder.reason == REASONS[UNREACHABLE]
@@ -305,11 +309,11 @@ def test_another_sign_of_the_determinant_is_beyond_the_singular_set():
 
 def test_integration_that_stalls_ends_at_the_joint_to_blame(monkeypatch):
     trajectory = softening()
-    expected = follow(ARM, trajectory, COARSE).stops[1]
+    expected = integrate_deflections(ARM, trajectory, COARSE).stops[1]
     monkeypatch.setattr(
         Task, "hindrances", lambda _task, joints, time, _phi: np.zeros((len(joints), time.size), int)
     )
-    base, shoulder = follow(ARM, trajectory, COARSE).stops
+    base, shoulder = integrate_deflections(ARM, trajectory, COARSE).stops
     assert base is None
     assert expected is not None
     assert shoulder is not None
@@ -331,14 +335,14 @@ def test_start_out_of_reach_is_not_followed():
 
 
 def test_robot_that_nobody_can_follow_ends_at_once():
-    following = follow(ARM, motion(start=(790.0, 790.0)))
-    assert np.isnan(following.at(np.linspace(0, 2, 5))).all()
+    deflections = integrate_deflections(ARM, motion(start=(790.0, 790.0)))
+    assert np.isnan(deflections.at(np.linspace(0, 2, 5))).all()
 
 
 def test_run_that_stops_at_infeasible_steps_stops_at_the_end_of_the_way():
     trajectory = dipping(800.0)
     result = inverse_dynamics(
-        ARM, trajectory, following=follow(ARM, trajectory, COARSE), stop_on_infeasible=True
+        ARM, trajectory, deflections=integrate_deflections(ARM, trajectory, COARSE), stop_on_infeasible=True
     )
     assert result.time[-1] == 1.3
     assert not result.report.complete

@@ -68,7 +68,7 @@ def test_block_is_the_function_at_the_steps():
     np.testing.assert_array_equal(block.stiffness[-1], [1200.0, 2400.0])
 
 
-def test_remarks_of_all_parts_and_sources_are_collected():
+def test_warnings_and_notes_of_all_parts_and_sources_are_collected():
     times = UniformTimes(0.25, 10.0)
     still = Constant(signal=POSITION, span=times.span, value=(0.0,))
     firm = Constant(signal=STIFFNESS, span=times.span, value=(850.0,))

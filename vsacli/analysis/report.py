@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vsacli.analysis.self_check import DRIFT_BOUND, LADDER_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.base.flags import LIMITS, Flag
-from vsacli.base.json_values import Plain, finite, number, pair
+from vsacli.base.json_values import JsonObject, finite, number, pair
 from vsacli.dynamics.energy import JointEnergy
 
 if TYPE_CHECKING:
@@ -42,15 +42,15 @@ class Worst(NamedTuple):
     motor: int | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values; the kind is the key under which they stand."""
+        """JSON values; the kind is the key under which they stand."""
         entry = {"time": self.time, "value": self.value, "bound": self.bound, "unit": self.unit}
         return entry if self.motor is None else {**entry, "motor": self.motor}
 
     @classmethod
-    def from_json(cls, kind: str, plain: Plain) -> Worst:
+    def from_json(cls, kind: str, content: JsonObject) -> Worst:
         """From what `as_json` gave, `finite`."""
-        time, value, bound = (number(plain[name]) for name in ("time", "value", "bound"))
-        return cls(kind, time, value, bound, plain["unit"], plain.get("motor"))
+        time, value, bound = (number(content[name]) for name in ("time", "value", "bound"))
+        return cls(kind, time, value, bound, content["unit"], content.get("motor"))
 
 
 class JointReport(NamedTuple):
@@ -95,7 +95,7 @@ class JointReport(NamedTuple):
     energy: JointEnergy
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values under the published keys."""
+        """JSON values under the published keys."""
         return {
             "name": self.name,
             "type": self.type,
@@ -112,25 +112,25 @@ class JointReport(NamedTuple):
         }
 
     @classmethod
-    def from_json(cls, plain: Plain) -> JointReport:
+    def from_json(cls, content: JsonObject) -> JointReport:
         """From what `as_json` gave, `finite`: no end of a corridor is NaN alone, so the upper is infinite."""
-        margin = plain["margin"]
+        margin = content["margin"]
         lower, upper = pair(margin["reachable"])
         if math.isnan(upper) and not math.isnan(lower):
             upper = math.inf
         return cls(
-            **{name: plain[name] for name in ("name", "type", "actuator", "steps", "first_time")},
-            worst={kind: Worst.from_json(kind, worst) for kind, worst in plain["worst"].items()},
+            **{name: content[name] for name in ("name", "type", "actuator", "steps", "first_time")},
+            worst={kind: Worst.from_json(kind, worst) for kind, worst in content["worst"].items()},
             margin=number(margin["min"]),
             margin_time=number(margin["time"]),
             reachable=(lower, upper),
-            stiffness=pair(plain["stiffness"][end] for end in ("min", "max")),
-            peak_tau_e=number(plain["peak"]["tau_e"]),
-            peak_tau_motor=pair(plain["peak"]["tau_motor"]),
-            start_theta=pair(plain["start"]["theta"]),
-            torque_step=pair(plain["start"]["torque_step"]),
-            other_preload=plain["other_preload"],
-            energy=JointEnergy.from_json(plain["energy"]),
+            stiffness=pair(content["stiffness"][end] for end in ("min", "max")),
+            peak_tau_e=number(content["peak"]["tau_e"]),
+            peak_tau_motor=pair(content["peak"]["tau_motor"]),
+            start_theta=pair(content["start"]["theta"]),
+            torque_step=pair(content["start"]["torque_step"]),
+            other_preload=content["other_preload"],
+            energy=JointEnergy.from_json(content["energy"]),
         )
 
 
@@ -152,7 +152,7 @@ class JointDrift(NamedTuple):
     stop: Stop | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values under the published keys."""
+        """JSON values under the published keys."""
         return {
             "joint": self.joint,
             "drift": self.largest,
@@ -162,12 +162,12 @@ class JointDrift(NamedTuple):
         }
 
     @classmethod
-    def from_json(cls, plain: Plain) -> JointDrift:
+    def from_json(cls, content: JsonObject) -> JointDrift:
         """From what `as_json` gave, `finite`."""
         from vsacli.dynamics.integrated_deflections import Stop
 
-        stop = None if plain["stopped"] is None else Stop(**plain["stopped"])
-        return cls(plain["joint"], number(plain["drift"]), number(plain["time"]), plain["unit"], stop)
+        stop = None if content["stopped"] is None else Stop(**content["stopped"])
+        return cls(content["joint"], number(content["drift"]), number(content["time"]), content["unit"], stop)
 
 
 class Report(NamedTuple):
@@ -184,7 +184,7 @@ class Report(NamedTuple):
         self_check: outcome of the self-check.
         joints: one report a joint.
         drifts: one a joint if the deflections were followed by integration, else none.
-        fits: what is known of the splines that recorded samples were replaced by, plain values.
+        fits: what is known of the splines that recorded samples were replaced by, JSON values.
     """
 
     robot: str
@@ -208,9 +208,9 @@ class Report(NamedTuple):
         return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values for `json.dumps`; numbers that are not finite become None."""
+        """JSON values for `json.dumps`; numbers that are not finite become None."""
         check = self.self_check
-        plain: dict[str, Any] = finite(
+        content: dict[str, Any] = finite(
             {
                 "format": FORMAT,
                 "verdict": self.verdict,
@@ -232,7 +232,7 @@ class Report(NamedTuple):
                 "joints": [joint.as_json() for joint in self.joints],
             }
         )
-        return plain
+        return content
 
     def _deflections(self) -> dict[str, Any]:
         if not self.drifts:
@@ -240,23 +240,23 @@ class Report(NamedTuple):
         return {"method": "integrate", "joints": [drift.as_json() for drift in self.drifts]}
 
     @classmethod
-    def from_json(cls, plain: Plain) -> Report:
+    def from_json(cls, content: JsonObject) -> Report:
         """From what `as_json` gave, as a result file holds it.
 
         Raises:
             LookupError, TypeError, AttributeError, ValueError: it is no such report.
         """
-        check, drifts = plain["self_check"], plain["deflections"].get("joints", ())
+        check, drifts = content["self_check"], content["deflections"].get("joints", ())
         return cls(
-            **{name: plain[name] for name in ("robot", "trajectory", "samples", "duration", "complete")},
-            warnings=tuple(plain["warnings"]),
-            notes=tuple(plain.get("notes", ())),
-            fits=tuple(plain["fits"]),
+            **{name: content[name] for name in ("robot", "trajectory", "samples", "duration", "complete")},
+            warnings=tuple(content["warnings"]),
+            notes=tuple(content.get("notes", ())),
+            fits=tuple(content["fits"]),
             self_check=SelfCheck(
                 number(check["spring_residual"]),
                 number(check["ladder"]),
                 DRIFT_BOUND if drifts else SPRING_BOUND,
             ),
-            joints=tuple(map(JointReport.from_json, plain["joints"])),
+            joints=tuple(map(JointReport.from_json, content["joints"])),
             drifts=tuple(map(JointDrift.from_json, drifts)),
         )

@@ -36,7 +36,7 @@ def render(report: Report) -> str:
         [
             _headline(report),
             *_table(report),
-            *remarks(report.warnings, report.notes),
+            *warnings_and_notes(report.warnings, report.notes),
             *(sentence for joint in report.joints for sentence in sentences(joint)),
             *_stops(report),
             *_start(report),
@@ -47,7 +47,7 @@ def render(report: Report) -> str:
     )
 
 
-def remarks(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
+def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
     """A line each, marked as what it is."""
     yield from (f"warning: {warning}" for warning in warnings)
     yield from (f"note: {note}" for note in notes)

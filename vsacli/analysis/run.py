@@ -12,7 +12,7 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular, has
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
-from vsacli.analysis.summaries import JointTally
+from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.flags import Flag
 from vsacli.base.variables import Block
@@ -23,9 +23,8 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from vsacli.analysis.drift import DriftTally
     from vsacli.analysis.result import Result
-    from vsacli.dynamics.integrated_deflections import Following
+    from vsacli.dynamics.integrated_deflections import IntegratedDeflections
 
 
 class Run:
@@ -36,7 +35,7 @@ class Run:
         trajectory: what it is asked to do.
         stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does.
         near_singular: margin below which a step is near-singular.
-        following: deflections to use, by `follow`, instead of the root of (14) at each step.
+        deflections: integrated ones to use instead of the root of (14) at each step.
         block_samples: steps in a block, as `usual_block` has it if None; results do not depend on it.
         engine: what computes, one of `vsacli.compute.engine.NAMES`.
         threads: of compiled code; as many as there are processors if None.
@@ -56,7 +55,7 @@ class Run:
         *,
         stop_on_infeasible: bool = False,
         near_singular: float = NEAR_SINGULAR,
-        following: Following | None = None,
+        deflections: IntegratedDeflections | None = None,
         block_samples: int | None = None,
         engine: str = "numpy",
         threads: int | None = None,
@@ -68,12 +67,12 @@ class Run:
         self._stop_on_infeasible = stop_on_infeasible
         self._near_singular = near_singular
         self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
-        self._following = following
+        self._deflections = deflections
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        kernel = InverseDynamics(robot, frame, near_singular, following is not None)
+        kernel = InverseDynamics(robot, frame, near_singular, deflections is not None)
         self.choice = choose(engine, kernel, trajectory.samples, threads)
-        self._tallies = [JointTally(joint, index) for index, joint in enumerate(robot.joints)]
-        self._drifts = [] if following is None else _drift_tallies(robot, following)
+        self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
+        self._drifts = [] if deflections is None else _drift_summaries(robot, deflections)
         self._energy = RunEnergy(robot)
         self._spring_residual = 0.0
         self._samples = 0
@@ -82,7 +81,7 @@ class Run:
         for start in range(0, self.trajectory.samples, self._block_samples):
             stop = min(start + self._block_samples, self.trajectory.samples)
             motion = self.trajectory.block(start, stop)
-            followed = None if self._following is None else self._following.at(motion.time)
+            followed = None if self._deflections is None else self._deflections.at(motion.time)
             block = compute_block(self.robot, motion, self._near_singular, followed, self.choice.engine)
             infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
             if self._stop_on_infeasible and infeasible.any():
@@ -94,8 +93,8 @@ class Run:
         """The block with the energy that the motors have spent, once it is merged into the report."""
         self._samples += len(block.time)
         self._spring_residual = float(np.maximum(self._spring_residual, spring_residual(self.robot, block)))
-        for tally in self._tallies:
-            tally.add(block)
+        for summary in self._summaries:
+            summary.add(block)
         for drift in self._drifts:
             drift.add(block)
         return replace(block, motor_energy=self._energy.add(block))
@@ -111,14 +110,14 @@ class Run:
             warnings=(*self.robot.warnings, *self.trajectory.warnings),
             notes=self.trajectory.notes,
             self_check=self._self_check(),
-            joints=tuple(map(JointTally.report, self._tallies, self._energy.report())),
+            joints=tuple(map(JointSummary.report, self._summaries, self._energy.report())),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,
         )
 
     def _self_check(self) -> SelfCheck:
         """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
-        bound = SPRING_BOUND if self._following is None else DRIFT_BOUND
+        bound = SPRING_BOUND if self._deflections is None else DRIFT_BOUND
         found = ladder(self.robot, self.trajectory, self.choice.engine)
         return SelfCheck(self._spring_residual, found, bound)
 
@@ -128,7 +127,7 @@ def inverse_dynamics(
     trajectory: Trajectory,
     *,
     stop_on_infeasible: bool = False,
-    following: Following | None = None,
+    deflections: IntegratedDeflections | None = None,
     engine: str = "numpy",
 ) -> Result:
     """Motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
@@ -139,7 +138,7 @@ def inverse_dynamics(
         robot: the robot, from `load_robot` or built in Python.
         trajectory: for this robot, from `load_trajectory` or `Trajectory.from_samples`.
         stop_on_infeasible: end with the first infeasible step.
-        following: deflections to use, by `follow`, instead of the root of (14) at each step.
+        deflections: integrated ones to use instead of the root of (14) at each step.
         engine: what computes, "numpy", compiled "c", or "auto", which takes the latter where that saves
             time.
 
@@ -152,16 +151,16 @@ def inverse_dynamics(
     """
     from vsacli.analysis.result import Result
 
-    run = Run(robot, trajectory, stop_on_infeasible=stop_on_infeasible, following=following, engine=engine)
+    run = Run(
+        robot, trajectory, stop_on_infeasible=stop_on_infeasible, deflections=deflections, engine=engine
+    )
     return Result(**_joined(list(run)), report=run.report(), joint_names=robot.joint_names)
 
 
-def _drift_tallies(robot: Robot, following: Following) -> list[DriftTally]:
-    from vsacli.analysis.drift import DriftTally
-
-    pairs = zip(robot.joints, following.stops, strict=True)
+def _drift_summaries(robot: Robot, deflections: IntegratedDeflections) -> list[DriftSummary]:
+    pairs = zip(robot.joints, deflections.stops, strict=True)
     return [
-        DriftTally(joint, joint.actuator, index, stop)
+        DriftSummary(joint, joint.actuator, index, stop)
         for index, (joint, stop) in enumerate(pairs)
         if isinstance(joint.actuator, Antagonistic)
     ]

@@ -1,28 +1,32 @@
-"""Merges blocks of steps into the report of a joint: counts, first times, worst steps, peaks."""
+"""Merges blocks of steps into the report of a joint: counts, first times, worst steps, peaks, drift."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do
+from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do, solve_deflections
 from vsacli.actuators.reach import TOUCHING, excess, has, margin
 from vsacli.actuators.rigid import Rigid
-from vsacli.analysis.report import COUNTED, JointReport, Worst
+from vsacli.analysis.report import COUNTED, JointDrift, JointReport, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.model import Joint
 
+if TYPE_CHECKING:
+    from vsacli.dynamics.integrated_deflections import Stop
+
 REACH = {kind: COUNTED[kind] for kind in ("infeasible", "singular", "near_singular")}
 """Kinds of trouble whose worst step is the one with the smallest margin."""
 
 
-class JointTally:
-    """Running record of one joint; `add` blocks in order, then ask for the `report`."""
+class JointSummary:
+    """What there is to report of one joint; `add` blocks in order, then ask for the `report`."""
 
     def __init__(self, joint: Joint, index: int) -> None:
         self._joint = joint
@@ -62,9 +66,9 @@ class JointTally:
         gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
         self._record_margin(gap, block.time, corridor)
         self._record_reach(flags, gap, block)
-        beyond = gap < -TOUCHING
-        if self._other_preload and beyond.any():
-            demand = block.tau_e[beyond, index], stiffness[beyond]
+        outside = gap < -TOUCHING
+        if self._other_preload and outside.any():
+            demand = block.tau_e[outside, index], stiffness[outside]
             self._other_preload = bool(other_preload_would_do(actuator, *demand).all())
 
     def report(self, energy: JointEnergy) -> JointReport:
@@ -112,9 +116,9 @@ class JointTally:
 
     def _record_reach(self, flags: FlagArray, gap: FloatArray, block: Block) -> None:
         """Followed deflections may end inside the corridor; such a step is infeasible, but has no worst."""
-        beyond = gap < -TOUCHING
+        outside = gap < -TOUCHING
         for kind, bits in REACH.items():
-            hit = has(flags, bits) & (beyond if kind == "infeasible" else ~beyond)
+            hit = has(flags, bits) & (outside if kind == "infeasible" else ~outside)
             for step in _worst_step(hit, -gap):
                 value, lower, upper = (
                     float(getattr(block, name)[step, self._index])
@@ -149,6 +153,36 @@ class JointTally:
     def _keep(self, badness: float, worst: Worst) -> None:
         if worst.kind not in self._worst or badness > self._worst[worst.kind][0]:
             self._worst[worst.kind] = (badness, worst)
+
+
+class DriftSummary:
+    """How far integrated deflections of one antagonistic joint drift from the root of (14).
+
+    `add` blocks in order, then ask for the `report`.
+    """
+
+    def __init__(self, joint: Joint, actuator: Antagonistic, index: int, stop: Stop | None) -> None:
+        self._joint = joint
+        self._actuator = actuator
+        self._index = index
+        self._stop = stop
+        self._largest, self._time = math.nan, math.nan
+
+    def add(self, block: Block) -> None:
+        """Merge a block of steps; those without deflections do not count."""
+        tau_e, stiffness = block.tau_e[:, self._index], block.stiffness[:, self._index]
+        root = solve_deflections(self._actuator, tau_e, stiffness).deflections
+        drift = np.abs(block.phi[:, self._index].T - root).max(axis=0)
+        followed = np.flatnonzero(~np.isnan(drift))
+        if followed.size:
+            step = followed[drift[followed].argmax()]
+            if not drift[step] <= self._largest:
+                self._largest, self._time = float(drift[step]), float(block.time[step])
+
+    def report(self) -> JointDrift:
+        """What was found so far."""
+        unit = VARIABLES["phi"].quantity.unit(self._joint.type)
+        return JointDrift(self._joint.name, self._largest, self._time, unit, self._stop)
 
 
 def _worst_step(hit: BoolArray, badness: FloatArray) -> Iterator[int]:

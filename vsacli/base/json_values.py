@@ -1,4 +1,4 @@
-"""Plain values for JSON, which has no numbers that are not finite: there and back."""
+"""Values for JSON, which has no numbers that are not finite: there and back."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeAlias
 
-Plain: TypeAlias = Mapping[str, Any]
+JsonObject: TypeAlias = Mapping[str, Any]
 """An object of JSON."""
 
 
 def finite(content: Any) -> Any:
-    """The same plain values, with None for numbers that are not finite."""
+    """The same JSON values, with None for numbers that are not finite."""
     if isinstance(content, dict):
         return {key: finite(entry) for key, entry in content.items()}
     if isinstance(content, list):

@@ -20,7 +20,14 @@ from vsacli.cli.options import (
     stop_option,
     trajectory_argument,
 )
-from vsacli.cli.running import compute, followed, load_inputs, refuse_input_as_output, run_stem, show_report
+from vsacli.cli.running import (
+    chosen_deflections,
+    compute,
+    load_inputs,
+    refuse_input_as_output,
+    run_stem,
+    show_report,
+)
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -106,7 +113,7 @@ def check_feasibility(
         *inputs,
         stop_on_infeasible=stop_on_infeasible,
         near_singular=margin,
-        following=followed(deflections, *inputs),
+        deflections=chosen_deflections(deflections, *inputs),
         engine=engine,
         threads=threads,
     )

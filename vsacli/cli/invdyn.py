@@ -21,7 +21,14 @@ from vsacli.cli.options import (
     trajectory_argument,
     variables_option,
 )
-from vsacli.cli.running import compute, followed, load_inputs, refuse_input_as_output, run_stem, show_report
+from vsacli.cli.running import (
+    chosen_deflections,
+    compute,
+    load_inputs,
+    refuse_input_as_output,
+    run_stem,
+    show_report,
+)
 
 
 @click.command(
@@ -87,7 +94,7 @@ def invdyn(
     run = Run(
         *inputs,
         stop_on_infeasible=stop_on_infeasible,
-        following=followed(deflections, *inputs),
+        deflections=chosen_deflections(deflections, *inputs),
         engine=engine,
         threads=threads,
     )

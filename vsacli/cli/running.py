@@ -18,7 +18,7 @@ from vsacli.cli.exit_codes import OF_VERDICT, Exit
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
-    from vsacli.dynamics.integrated_deflections import Following
+    from vsacli.dynamics.integrated_deflections import IntegratedDeflections
     from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
     from vsacli.robot.model import Robot
@@ -44,19 +44,19 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> tuple[Robo
     return robot, trajectory
 
 
-def followed(deflections: str, robot: Robot, trajectory: Trajectory) -> Following | None:
+def chosen_deflections(method: str, robot: Robot, trajectory: Trajectory) -> IntegratedDeflections | None:
     """The deflections that a run uses, as `--deflections` says; None if it solves for them at each step."""
-    if deflections == "root":
+    if method == "root":
         return None
-    from vsacli.dynamics.integrated_deflections import follow
+    from vsacli.dynamics.integrated_deflections import integrate_deflections
 
-    return follow(robot, trajectory)
+    return integrate_deflections(robot, trajectory)
 
 
 def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
     """Compute block by block; a writer gets each block as it comes, and the report at the end."""
-    for remark in run.choice.remarks:
-        talk.note(remark)
+    for warning in run.choice.warnings:
+        talk.note(warning)
     talk.detail(run.choice.reason)
     with writer or nullcontext(), talk.progress(run.trajectory.samples) as progress:
         for block in run:

@@ -9,7 +9,7 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES, motors_and_springs
 from vsacli.base.arrays import FloatArray, by_joint, over_time
-from vsacli.base.json_values import Plain, number
+from vsacli.base.json_values import JsonObject, number
 from vsacli.base.variables import Block
 from vsacli.robot.model import Robot
 
@@ -42,13 +42,13 @@ class JointEnergy(NamedTuple):
         return self.co_contraction**2 / squared if squared else math.nan
 
     def as_json(self) -> dict[str, float]:
-        """Plain values under the published keys."""
+        """JSON values under the published keys."""
         return {**self._asdict(), "co_contraction_share": self.co_contraction_share}
 
     @classmethod
-    def from_json(cls, plain: Plain) -> JointEnergy:
+    def from_json(cls, content: JsonObject) -> JointEnergy:
         """From what `as_json` gave, with None for NaN."""
-        return cls(*(number(plain[name]) for name in cls._fields))
+        return cls(*(number(content[name]) for name in cls._fields))
 
 
 class Flow(NamedTuple):

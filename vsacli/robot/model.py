@@ -100,8 +100,8 @@ class Inertia:
         """Eigenvalues, ascending."""
         return np.asarray(np.linalg.eigvalsh(self.tensor), dtype=np.float64)
 
-    def doubts(self) -> Iterator[str]:
-        """What is unusual, though not impossible to compute with."""
+    def warnings(self) -> Iterator[str]:
+        """What may not be what was meant, though it can be computed with."""
         low, middle, high = self.principal_moments
         if high == 0:
             yield "its inertia is zero"
@@ -122,11 +122,11 @@ class Link:
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def doubts(self) -> Iterator[str]:
-        """What is unusual, though not impossible to compute with."""
+    def warnings(self) -> Iterator[str]:
+        """What may not be what was meant, though it can be computed with."""
         if self.mass == 0:
             yield "its mass is zero"
-        yield from self.inertia.doubts()
+        yield from self.inertia.warnings()
 
 
 @dataclass(frozen=True)
@@ -183,8 +183,8 @@ class Joint:
         return tuple({id(law): law for law in laws}.values())
 
     def warnings(self) -> Iterator[str]:
-        """What is doubtful though usable, and what the springs say about themselves."""
-        yield from (f"link of joint {self.name}: {doubt}" for doubt in self.link.doubts())
+        """What may not be what was meant, of the link and of the springs."""
+        yield from (f"link of joint {self.name}: {warning}" for warning in self.link.warnings())
         yield from (f"spring of joint {self.name}: {note}" for law in self.springs for note in law.notes)
 
 
@@ -237,5 +237,5 @@ class Robot:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Doubtful but usable physics, and what springs say about themselves, one sentence each."""
+        """What may not be what was meant, one sentence each."""
         return tuple(warning for joint in self.joints for warning in joint.warnings())

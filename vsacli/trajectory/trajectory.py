@@ -52,7 +52,7 @@ class Profile(Protocol):
         """The same course, slower by a factor, from the same first time on."""
 
     def summary(self) -> dict[str, Any] | None:
-        """The spline that values at the steps come from, in plain values; None if they come from none."""
+        """The spline that values at the steps come from, in JSON values; None if they come from none."""
 
 
 @dataclass(frozen=True)

@@ -34,12 +34,12 @@ class Choice(NamedTuple):
     Attributes:
         engine: it.
         reason: what computes, and why; a clause.
-        remarks: what was wrong on the way to it.
+        warnings: what went wrong before it was found, one sentence each.
     """
 
     engine: Engine
     reason: str
-    remarks: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) -> Choice:
@@ -64,24 +64,24 @@ def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) 
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
     threads = threads or _processors()
-    remarks: list[str] = []
+    warnings: list[str] = []
     try:
-        engine = CompiledEngine(system_compiler(), threads, remarks.append)
+        engine = CompiledEngine(system_compiler(), threads, warnings.append)
         loaded = engine.prepare(kernel, lambda operations: name == "c" or _repays(operations, samples))
     except CompilerError as error:
         if name == "c":
             raise InputError.one(f"{error}; the engine numpy needs none") from error
-        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(remarks))
+        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(warnings))
     except NotImplementedError as error:
         if name == "c":
             raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
-        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(remarks))
+        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(warnings))
     if loaded is None:
         return Choice(
-            _numpy(samples), f"NumPy computes: {samples} samples would not repay compiling", tuple(remarks)
+            _numpy(samples), f"NumPy computes: {samples} samples would not repay compiling", tuple(warnings)
         )
     when = "now" if loaded.compiled else "before"
-    return Choice(engine, f"C code computes, compiled {when}, in {_counted(threads)}", tuple(remarks))
+    return Choice(engine, f"C code computes, compiled {when}, in {_counted(threads)}", tuple(warnings))
 
 
 def _repays(operations: int, samples: int) -> bool:

@@ -11,7 +11,7 @@ from vsacli.actuators.reach import excess, has
 from vsacli.analysis.report import VERDICTS, Worst
 from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.flags import LIMITS, Flag
-from vsacli.base.json_values import Plain, finite, number, pair
+from vsacli.base.json_values import JsonObject, finite, number, pair
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES, actual
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
@@ -40,13 +40,13 @@ class Deviation:
         return cls(float(abs(error[worst])), float(time[worst]), float(error[-1]))
 
     def as_json(self) -> dict[str, float]:
-        """Plain values."""
+        """JSON values."""
         return vars(self)
 
     @classmethod
-    def from_json(cls, plain: Plain) -> Deviation:
+    def from_json(cls, content: JsonObject) -> Deviation:
         """From what `as_json` gave, `finite`."""
-        return cls(*(number(plain[name]) for name in ("peak", "time", "final")))
+        return cls(*(number(content[name]) for name in ("peak", "time", "final")))
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class JointTracking:
     energy: JointEnergy
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values under the published keys."""
+        """JSON values under the published keys."""
         return {
             "name": self.name,
             "type": self.type,
@@ -87,17 +87,17 @@ class JointTracking:
         }
 
     @classmethod
-    def from_json(cls, plain: Plain) -> JointTracking:
+    def from_json(cls, content: JsonObject) -> JointTracking:
         """From what `as_json` gave, `finite`."""
         return cls(
-            name=plain["name"],
-            type=plain["type"],
-            q=Deviation.from_json(plain["q_error"]),
-            stiffness=Deviation.from_json(plain["stiffness_error"]),
-            peak_tau_motor=pair(plain["peak"]["tau_motor"]),
-            steps_over_limit=plain["steps"]["over_limit"],
-            worst={kind: Worst.from_json(kind, worst) for kind, worst in plain["worst"].items()},
-            energy=JointEnergy.from_json(plain["energy"]),
+            name=content["name"],
+            type=content["type"],
+            q=Deviation.from_json(content["q_error"]),
+            stiffness=Deviation.from_json(content["stiffness_error"]),
+            peak_tau_motor=pair(content["peak"]["tau_motor"]),
+            steps_over_limit=content["steps"]["over_limit"],
+            worst={kind: Worst.from_json(kind, worst) for kind, worst in content["worst"].items()},
+            energy=JointEnergy.from_json(content["energy"]),
         )
 
 
@@ -205,8 +205,8 @@ class SimulationReport:
         return self.ending is None
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values for `json.dumps`; numbers that are not finite become None."""
-        plain: dict[str, Any] = finite(
+        """JSON values for `json.dumps`; numbers that are not finite become None."""
+        content: dict[str, Any] = finite(
             {
                 "format": FORMAT,
                 "verdict": self.verdict,
@@ -224,10 +224,10 @@ class SimulationReport:
                 "with_full_state": [deviation.as_json() for deviation in self.with_full_state],
             }
         )
-        return plain
+        return content
 
     @classmethod
-    def from_json(cls, plain: Plain) -> SimulationReport:
+    def from_json(cls, content: JsonObject) -> SimulationReport:
         """From what `as_json` gave, as a simulation file holds it.
 
         Raises:
@@ -235,9 +235,9 @@ class SimulationReport:
         """
         as_they_are = ("robot", "trajectory", "controller", "samples", "duration", "verdict", "ending")
         return cls(
-            **{name: plain[name] for name in (*as_they_are, "evaluations")},
-            warnings=tuple(plain["warnings"]),
-            notes=tuple(plain.get("notes", ())),
-            joints=tuple(map(JointTracking.from_json, plain["joints"])),
-            with_full_state=tuple(map(Deviation.from_json, plain["with_full_state"])),
+            **{name: content[name] for name in (*as_they_are, "evaluations")},
+            warnings=tuple(content["warnings"]),
+            notes=tuple(content.get("notes", ())),
+            joints=tuple(map(JointTracking.from_json, content["joints"])),
+            with_full_state=tuple(map(Deviation.from_json, content["with_full_state"])),
         )

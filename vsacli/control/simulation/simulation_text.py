@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from vsacli.analysis.report import Worst
-from vsacli.analysis.report_text import QUANTITY_OF_LIMIT, WIDTH, aligned, energy_lines, remarks
+from vsacli.analysis.report_text import QUANTITY_OF_LIMIT, WIDTH, aligned, energy_lines, warnings_and_notes
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
 from vsacli.control.simulation.simulation_report import JointTracking, SimulationReport
 
@@ -19,7 +19,7 @@ def render(report: SimulationReport) -> str:
         [
             _headline(report),
             *aligned([HEADER, *map(_row, report.joints)]),
-            *remarks(report.warnings, report.notes),
+            *warnings_and_notes(report.warnings, report.notes),
             *(_limit(joint, worst) for joint in report.joints for worst in joint.worst.values()),
             *([] if report.ending is None else [report.ending]),
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in report.joints]),

@@ -3,7 +3,7 @@
 Buondonno & De Luca (2016), III-B, who warn of the drift.
 """
 
-from vsacli.dynamics.integrated_deflections.follow import Following, follow
+from vsacli.dynamics.integrated_deflections.solution import IntegratedDeflections, integrate_deflections
 from vsacli.dynamics.integrated_deflections.task import Stop
 
-__all__ = ["Following", "Stop", "follow"]
+__all__ = ["IntegratedDeflections", "Stop", "integrate_deflections"]

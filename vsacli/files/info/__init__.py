@@ -1,4 +1,4 @@
-"""What a file holds, as plain values for JSON and as text."""
+"""What a file holds, as JSON values and as text."""
 
 from vsacli.files.info.describe import describe_file
 from vsacli.files.info.selection import bare, select

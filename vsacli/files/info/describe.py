@@ -16,7 +16,7 @@ from vsacli.trajectory.file import load_trajectory
 
 
 def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
-    """What a robot, trajectory, result or simulation file holds, as plain values in SI units.
+    """What a robot, trajectory, result or simulation file holds, as JSON values in SI units.
 
     Args:
         path: the file.

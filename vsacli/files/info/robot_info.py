@@ -16,7 +16,7 @@ RELATIVE_ROUNDING = 1e-12
 
 
 def describe_robot(robot: Robot) -> dict[str, Any]:
-    """A robot as plain values in SI units: every declared field, reach, static load and reachable stiffness.
+    """A robot as JSON values in SI units: every declared field, reach, static load and reachable stiffness.
 
     `reach` and `static_load` are the largest values found over the configurations within the position limits;
     a prismatic joint without limits is held at zero. `static_load` is the torque of gravity alone.

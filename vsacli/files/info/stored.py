@@ -9,7 +9,7 @@ from vsacli.results.store.reader import StoredResult
 
 
 def describe_result(result: StoredResult) -> dict[str, Any]:
-    """A result or simulation as plain values: provenance, inputs with their SHA-256, variables, report.
+    """A result or simulation as JSON values: provenance, inputs with their SHA-256, variables, report.
 
     Raises:
         InputError: the file is damaged.

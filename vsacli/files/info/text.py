@@ -39,7 +39,7 @@ def _robot(robot: Description) -> Iterator[str]:
     yield "stiffness: reachable without load, and with the static load in either direction"
     if robot["held_at_zero"]:
         yield f"without position limits, and held at zero: {', '.join(robot['held_at_zero'])}"
-    yield from report_text.remarks(robot["warnings"], ())
+    yield from report_text.warnings_and_notes(robot["warnings"], ())
 
 
 def _geometry(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
@@ -90,7 +90,7 @@ def _trajectory(trajectory: Description) -> Iterator[str]:
     yield f"units: q {POSITION}, its k-th derivative per s^k; stiffness {STIFFNESS}"
     if "wrench" in trajectory:
         yield from _wrench(trajectory["wrench"])
-    yield from report_text.remarks(trajectory["warnings"], trajectory["notes"])
+    yield from report_text.warnings_and_notes(trajectory["warnings"], trajectory["notes"])
 
 
 def _wrench(wrench: Description) -> Iterator[str]:

@@ -17,7 +17,7 @@ SIGNALS = (*POSITION.names, *STIFFNESS.names)
 
 
 def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> dict[str, Any]:
-    """A trajectory as plain values: times, and of each joint the range and the peak of each quantity.
+    """A trajectory as JSON values: times, and of each joint the range and the peak of each quantity.
 
     `min`, `max` and `peak`, the largest absolute value, are those at the steps. What a joint does not have,
     such as the stiffness of a rigid one, is NaN.

@@ -30,7 +30,7 @@ class Finding:
         return str(Problem(problem.file, problem.line, f"{self.severity}: {problem.message}"))
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values under the published keys; a line of None concerns the whole file."""
+        """JSON values under the published keys; a line of None concerns the whole file."""
         return {
             "file": self.problem.file,
             "line": self.problem.line or None,

@@ -16,7 +16,7 @@ class NotPossible:
     reasons: tuple[str, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """JSON values."""
         return {"possible": False, "reasons": list(self.reasons)}
 
 
@@ -33,7 +33,7 @@ class SlowDown:
     duration: float
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values; the duration is the new one."""
+        """JSON values; the duration is the new one."""
         return {"possible": True, "factor": self.factor, "duration": self._slower, "text": self.sentence}
 
     @property
@@ -65,7 +65,7 @@ class StiffnessOffset:
     offsets: tuple[Offset, ...]
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """JSON values."""
         values = {offset.joint: offset.value for offset in self.offsets}
         return {"possible": True, "offsets": values, "text": self.sentence}
 
@@ -105,7 +105,7 @@ class StiffnessProfile:
     trajectory: Trajectory = field(repr=False, compare=False)
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """JSON values."""
         changes = {
             change.joint: {"largest": change.largest, "time": change.time, "rms": change.rms}
             for change in self.changes
@@ -140,7 +140,7 @@ class Suggestions:
     }
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values; a kind is null where nothing needs to change."""
+        """JSON values; a kind is null where nothing needs to change."""
         kinds = {kind: getattr(self, kind) for kind in self.KINDS}
         return {
             "near_singular": self.near_singular,

@@ -42,7 +42,7 @@ def fit_sentences(
 
 
 def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
-    """What is known of a fit, as plain values.
+    """What is known of a fit, as JSON values.
 
     Args:
         value: name of the signal.

@@ -74,7 +74,7 @@ class Samples:
         pairs = zip(self.signal.names[1:], self.derivatives, strict=True)
         return tuple(name for name, given in pairs if given is None)
 
-    def doubts(self, fit: Fit, *, resampled: bool) -> Iterator[str]:
+    def warnings(self, fit: Fit, *, resampled: bool) -> Iterator[str]:
         """Which numbers at the steps are estimates, and which given derivatives do not follow."""
         value, *names = self.signal.names
         yield from fit_sentences(value, names if resampled else self.missing, self.labels, self.time, fit)
@@ -123,7 +123,7 @@ class SampledProfile:
             over="ignore", invalid="ignore"
         ):  # a range of 1e100 in 1e-30 s is judged by the robot
             fit = fit_samples(record.time, record.values, signal.spline_degree, signal.orders - 1, method)
-            warnings = tuple(record.doubts(fit, resampled=resampled))
+            warnings = tuple(record.warnings(fit, resampled=resampled))
         return cls(record=record, fit=fit, resampled=resampled, warnings=warnings)
 
     @property
@@ -152,7 +152,7 @@ class SampledProfile:
         return self.resampled or not self.record.complete
 
     def summary(self) -> dict[str, Any] | None:
-        """The fit in plain values, for the report: see `describe`; None if nothing comes from it."""
+        """The fit in JSON values, for the report: see `describe`; None if nothing comes from it."""
         return describe(self.record.signal.names[0], self.record.labels, self.fit) if self.fitted else None
 
     @property

@@ -34,8 +34,8 @@ class _Way:
 
 
 @dataclass(frozen=True)
-class Following:
-    """Deflections along a trajectory, as `follow` found them.
+class IntegratedDeflections:
+    """Deflections along a trajectory, as `integrate_deflections` found them.
 
     Attributes:
         stops: for each joint, where its way ends before the trajectory does.
@@ -61,7 +61,9 @@ class Following:
         return phi
 
 
-def follow(robot: Robot, trajectory: Trajectory, tolerance: float = TOLERANCE) -> Following:
+def integrate_deflections(
+    robot: Robot, trajectory: Trajectory, tolerance: float = TOLERANCE
+) -> IntegratedDeflections:
     """Integrate phi' = A(phi)^-1 (tau_e', sigma') (19) from the root of (14) at the first step.
 
     The smooth functions of the trajectory are followed; derivatives given with samples play no part. The way
@@ -75,7 +77,7 @@ def follow(robot: Robot, trajectory: Trajectory, tolerance: float = TOLERANCE) -
     """
     task = Task(robot, trajectory)
     if not task.joints:
-        return Following((None,) * trajectory.joints, ())
+        return IntegratedDeflections((None,) * trajectory.joints, ())
     time, end = trajectory.times.span
     pieces = Pieces.of(trajectory, tolerance)
     phi = np.full((trajectory.joints, SIDES, 1), np.nan)
@@ -92,4 +94,4 @@ def follow(robot: Robot, trajectory: Trajectory, tolerance: float = TOLERANCE) -
             ways.append(_Way(going, integration.solution()))
             phi[going] = ways[-1].deflections(np.array([time]))
         stops |= {joint: Stop(time, reason) for joint, reason in integration.stopped.items()}
-    return Following(tuple(map(stops.get, range(trajectory.joints))), tuple(ways))
+    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(ways))
