@@ -9,7 +9,8 @@ from samples.drives import Stopped
 from test_springs import residuals
 
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.pairs import PairSolution, make_pair
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.pairs import make_pair
 from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)

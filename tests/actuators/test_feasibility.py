@@ -22,8 +22,8 @@ from samples.robots import vsa_3r
 from vsacli import inverse_dynamics
 from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do
 from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.motor import Motor
-from vsacli.actuators.pairs import PairSolution
 from vsacli.actuators.reach import NEAR_SINGULAR, margin, reach_flags
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray

@@ -8,9 +8,10 @@ from test_springs import residuals
 
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.exponential import Exponential, ExponentialPair
+from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.laws.quadratic import Quadratic, QuadraticTwins
 from vsacli.actuators.laws.sinh import Sinh, SinhPair
-from vsacli.actuators.pairs import PairSolution, make_pair
+from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.pairs.iterated import IteratedPair
 from vsacli.base.arrays import FloatArray
 

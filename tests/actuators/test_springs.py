@@ -10,7 +10,8 @@ from scipy.optimize import brentq
 
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import AlikeCubics, Cubic
-from vsacli.actuators.pairs import PairSolution, make_pair
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.pairs.iterated import IteratedPair
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError

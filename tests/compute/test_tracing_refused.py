@@ -12,7 +12,7 @@ from samples.generated_code import COMPILERS
 
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.pairs.pair import Pair
+from vsacli.actuators.laws.pair import Pair
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.compute.engine import choose

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws import LAWS, SpringLaw
+from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.motor import Motor
-from vsacli.actuators.pairs import PairSolution, make_pair
-from vsacli.actuators.pairs.decoupling_matrix import Sides, beta, determinant, solve, spring_state
+from vsacli.actuators.pairs import make_pair
+from vsacli.actuators.pairs.decoupling_matrix import Sides, beta, determinant, solve
 from vsacli.actuators.reach import Reach, reach
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -123,13 +124,13 @@ def deflection_rates(
     actuator: Antagonistic, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray
 ) -> FloatArray:
     """Rates of the deflections phi, both (2, samples), by (19)-(20)."""
-    one, two = (spring_state(law, deflection) for law, deflection in zip(actuator.laws, phi, strict=True))
+    one, two = (law.state(deflection) for law, deflection in zip(actuator.laws, phi, strict=True))
     return np.stack(solve(one, two, determinant(one, two), dtau_e, dstiffness))
 
 
 def decoupling_determinant(actuator: Antagonistic, phi: FloatArray) -> FloatArray:
     """Determinant of A at deflections (2, samples), (67)."""
-    one, two = (spring_state(law, deflection) for law, deflection in zip(actuator.laws, phi, strict=True))
+    one, two = (law.state(deflection) for law, deflection in zip(actuator.laws, phi, strict=True))
     return determinant(one, two)
 
 

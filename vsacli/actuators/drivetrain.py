@@ -14,8 +14,9 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.kinds import Actuator
 from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.motor import JointMotor
-from vsacli.actuators.pairs.decoupling_matrix import Springs, determinant, spring_state
+from vsacli.actuators.pairs.decoupling_matrix import determinant
 from vsacli.actuators.rigid import Rigid
 from vsacli.base.arrays import FloatArray
 
@@ -121,11 +122,11 @@ class Drivetrain:
         """Torque of each spring at its deflection, (..., springs)."""
         return self._each(phi, lambda law, part: law.torque(part))
 
-    def springs(self, phi: FloatArray) -> Springs:
+    def springs(self, phi: FloatArray) -> SpringState:
         """The springs at their deflections, (..., springs)."""
-        result = Springs(*(np.empty_like(phi) for _ in Springs._fields))
+        result = SpringState(*(np.empty_like(phi) for _ in SpringState._fields))
         for law, members in self._groups:
-            for values, of_law in zip(result, spring_state(law, phi[..., members]), strict=True):
+            for values, of_law in zip(result, law.state(phi[..., members]), strict=True):
                 values[..., members] = of_law
         return result
 
@@ -133,7 +134,7 @@ class Drivetrain:
         """Elastic energy of each joint, (..., joints), from the deflections (..., springs)."""
         return self.joint_sum(self._each(phi, lambda law, part: law.energy(part)))
 
-    def decoupling_determinant(self, springs: Springs) -> FloatArray:
+    def decoupling_determinant(self, springs: SpringState) -> FloatArray:
         """Det A (67) of the joints that have two springs, (..., pairs)."""
         return determinant(springs.of(self.first), springs.of(self.second))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.pairs.decoupling_matrix import Springs, spring_state
+from vsacli.actuators.laws.state import SpringState
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
 
@@ -27,7 +27,7 @@ TINY = 1e-100
 
 def inverse(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
-) -> tuple[FloatArray, Springs]:
+) -> tuple[FloatArray, SpringState]:
     """Deflection at which the law has a torque, between `low` and `high` that enclose it; the spring there.
 
     The last step is so short that what was known before it tells what the spring is after it.
@@ -41,12 +41,14 @@ def inverse(
             (torque, low, high, start),
             (phi, *spring.after(phi - start)),
         )
-        return np.where(torque == 0, 0.0, phi), Springs(*values)
+        return np.where(torque == 0, 0.0, phi), SpringState(*values)
 
 
-def _halley(law: SpringLaw, torque: FloatArray, phi: FloatArray) -> tuple[FloatArray, FloatArray, Springs]:
+def _halley(
+    law: SpringLaw, torque: FloatArray, phi: FloatArray
+) -> tuple[FloatArray, FloatArray, SpringState]:
     """The deflection after a step, and the error of the torque and the spring before it."""
-    spring = spring_state(law, phi)
+    spring = law.state(phi)
     error = spring.tau - torque
     newton = error / spring.sigma
     bend = newton * spring.zeta / (2 * spring.sigma)
@@ -77,7 +79,7 @@ def _bracketed(
     return phi, *spring
 
 
-def turned_to(torque: FloatArray, phi: FloatArray, spring: Springs) -> tuple[FloatArray, Springs]:
+def turned_to(torque: FloatArray, phi: FloatArray, spring: SpringState) -> tuple[FloatArray, SpringState]:
     """Of a law that is odd, from the size of its torque to the torque."""
     tau, zeta = np.copysign(spring.tau, torque), np.copysign(spring.zeta, torque)
     return np.copysign(phi, torque), spring._replace(tau=tau, zeta=zeta)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.pairs import PairSolution
+from vsacli.actuators.laws.pair import PairSolution
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag

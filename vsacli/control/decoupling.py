@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.pairs.decoupling_matrix import Springs, beta, determinant, solve
+from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.pairs.decoupling_matrix import beta, determinant, solve
 from vsacli.base.arrays import FloatArray
 from vsacli.base.wrench import Wrench
 from vsacli.control.gains import Gains
@@ -76,13 +77,13 @@ class Decoupling:
 
     def _springs(
         self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray
-    ) -> tuple[Springs, FloatArray]:
+    ) -> tuple[SpringState, FloatArray]:
         """The springs, and phi' by (69)."""
         springs = self._plant.drivetrain.springs(self._plant.deflections(q, theta))
         return springs, self._plant.deflections(dq, dtheta)
 
     def _link_motion(
-        self, q: FloatArray, dq: FloatArray, springs: Springs, dphi: FloatArray, wrench: Wrench | None
+        self, q: FloatArray, dq: FloatArray, springs: SpringState, dphi: FloatArray, wrench: Wrench | None
     ) -> LinkMotion:
         chain, total = self._plant.chain, self._plant.drivetrain.joint_sum
         tau_e, dtau_e = total(springs.tau), total(springs.sigma * dphi)  # (6), (17)
@@ -95,7 +96,7 @@ class Decoupling:
 
     def _motor_acceleration(
         self,
-        springs: Springs,
+        springs: SpringState,
         dphi: FloatArray,
         link: LinkMotion,
         ddtau_e: FloatArray,

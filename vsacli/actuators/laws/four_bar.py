@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.actuators.inversion import FirstGuess, inverse, turned_to
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.pairs.decoupling_matrix import Springs
+from vsacli.actuators.laws.state import SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import POSITIVE, Check, number
@@ -52,10 +52,10 @@ class FourBar(SpringLaw):
         """Derivatives of the energy k beta^2/2, which share the angles."""
         return _derivatives(self.k, self._angle(phi, order + 1))
 
-    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
         """Energy and all derivatives, which share the angles."""
         beta = self._angle(phi, 4)
-        return self.k / 2 * beta[0] * beta[0], Springs(*_derivatives(self.k, beta))
+        return self.k / 2 * beta[0] * beta[0], SpringState(*_derivatives(self.k, beta))
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque k beta beta'."""
@@ -82,7 +82,7 @@ class FourBar(SpringLaw):
         """Inverse by safeguarded iteration within the domain."""
         return self.under(torque)[0]
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
         """Deflection and spring by one iteration."""
         load = np.minimum(np.abs(torque), self.torque_range[1])
         low, high = np.zeros_like(load), np.full_like(load, self.domain[1])

@@ -6,8 +6,8 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
-from vsacli.actuators.pairs.decoupling_matrix import Springs, spring_state
-from vsacli.actuators.pairs.pair import Pair
+from vsacli.actuators.laws.pair import Pair
+from vsacli.actuators.laws.state import SpringState
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import POSITION
 from vsacli.documents.fields import POSITIVE_OR_INFINITE, check_fields, number
@@ -80,14 +80,18 @@ class SpringLaw(ABC):
         methods = (self.torque, self.stiffness, self.slope, self.curvature)
         return tuple(method(phi) for method in methods[: order + 1])
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+    def state(self, phi: FloatArray) -> SpringState:
+        """Torque and all derivatives at deflections."""
+        return SpringState(*self.derivatives(phi, 3))
+
+    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
         """Deflection under a torque and the spring there; for laws that find both in one."""
         phi = self.deflection(torque)
-        return phi, spring_state(self, phi)
+        return phi, self.state(phi)
 
-    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
         """Energy and all derivatives; for laws in which they share work."""
-        return self.energy(phi), spring_state(self, phi)
+        return self.energy(phi), self.state(phi)
 
     @abstractmethod
     def torque(self, phi: FloatArray) -> FloatArray:

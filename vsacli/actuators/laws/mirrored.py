@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.pairs.decoupling_matrix import Springs
+from vsacli.actuators.laws.state import SpringState
 from vsacli.base.arrays import FloatArray
 
 
@@ -39,12 +39,12 @@ class Mirrored(SpringLaw):
         values = self.law.derivatives(-phi, order)
         return tuple(value if each % 2 else -value for each, value in enumerate(values))
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
         """As the law under the opposite torque."""
         phi, spring = self.law.under(-torque)
         return -phi, _mirrored(spring)
 
-    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
         """Even and odd in turn."""
         energy, spring = self.law.loaded(-phi)
         return energy, _mirrored(spring)
@@ -74,7 +74,7 @@ class Mirrored(SpringLaw):
         return -self.law.deflection(-torque)
 
 
-def _mirrored(spring: Springs) -> Springs:
+def _mirrored(spring: SpringState) -> SpringState:
     return spring._replace(tau=-spring.tau, zeta=-spring.zeta)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from vsacli.actuators.inversion import inverse, turned_to
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.pairs.decoupling_matrix import Springs
+from vsacli.actuators.laws.state import SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, number
@@ -69,7 +69,7 @@ class Polynomial(SpringLaw):
         """Inverse by safeguarded iteration from the bound that each term alone sets."""
         return self.under(torque)[0]
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
         """Deflection and spring by one iteration."""
         load = np.abs(torque)
         bounds = [

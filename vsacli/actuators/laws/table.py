@@ -12,7 +12,7 @@ from vsacli.actuators.inversion import FirstGuess, inverse
 from vsacli.actuators.laws.law import SpringLaw
 from vsacli.actuators.laws.measured_curve import MeasuredCurve, fit_curve
 from vsacli.actuators.laws.mirrored import Mirrored
-from vsacli.actuators.pairs.decoupling_matrix import Springs
+from vsacli.actuators.laws.state import SpringState
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.documents.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
@@ -91,10 +91,10 @@ class MeasuredSpring(SpringLaw):
         """Of the fitted curve, looked up once."""
         return self._curve(phi, 1, order + 1)
 
-    def loaded(self, phi: FloatArray) -> tuple[FloatArray, Springs]:
+    def loaded(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
         """Of the fitted curve, looked up once."""
         energy, *derivatives = self._curve(phi, 0, 4)
-        return energy, Springs(*derivatives)
+        return energy, SpringState(*derivatives)
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque of the fitted curve."""
@@ -120,7 +120,7 @@ class MeasuredSpring(SpringLaw):
         """Inverse by safeguarded iteration within the measured range."""
         return self.under(torque)[0]
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, Springs]:
+    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
         """Deflection and spring by one iteration."""
         low, high = (np.full_like(torque, end) for end in self.domain)
         least, largest = self.torque_range

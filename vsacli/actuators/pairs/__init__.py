@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
-from vsacli.actuators.pairs.pair import Pair, PairSolution
+from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.pair import Pair
 
-if TYPE_CHECKING:
-    from vsacli.actuators.laws.law import SpringLaw
-
-__all__ = ["Pair", "PairSolution", "make_pair"]
+__all__ = ["make_pair"]
 
 
 @lru_cache(maxsize=1024)

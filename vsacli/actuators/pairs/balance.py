@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.pairs.decoupling_matrix import Springs, spring_state
+from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.pairs.state import PairState
 from vsacli.base.arrays import BoolArray, FloatArray
 
@@ -25,12 +25,11 @@ class Balance:
     second: SpringLaw
 
     @cached_property
-    def ends(self) -> tuple[tuple[Springs, ...], ...]:
+    def ends(self) -> tuple[tuple[SpringState, ...], ...]:
         """Each spring at the two ends of its domain; scalars, unknown where there is no end."""
         with np.errstate(all="ignore"):
             return tuple(
-                tuple(spring_state(law, np.array(phi)) for phi in law.domain)
-                for law in (self.first, self.second)
+                tuple(law.state(np.array(phi)) for phi in law.domain) for law in (self.first, self.second)
             )
 
     def at(self, tau_e: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -43,7 +42,7 @@ class Balance:
 
     def state(self, phi_1: FloatArray, phi_2: FloatArray) -> PairState:
         """The springs at deflections."""
-        return PairState(phi_1, phi_2, spring_state(self.first, phi_1), spring_state(self.second, phi_2))
+        return PairState(phi_1, phi_2, self.first.state(phi_1), self.second.state(phi_2))
 
     def stiffness(self, phi_1: FloatArray, phi_2: FloatArray) -> FloatArray:
         """G."""

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.pairs.balance import Balance
-from vsacli.actuators.pairs.decoupling_matrix import Springs
 from vsacli.actuators.pairs.state import PairState
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, where_needed
@@ -57,5 +57,5 @@ def at_end(
     return values
 
 
-def _everywhere(spring: Springs, like: FloatArray) -> Springs:
-    return Springs(*(np.full_like(like, value) for value in spring))
+def _everywhere(spring: SpringState, like: FloatArray) -> SpringState:
+    return SpringState(*(np.full_like(like, value) for value in spring))

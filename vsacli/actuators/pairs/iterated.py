@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.pair import Pair, PairSolution
 from vsacli.actuators.pairs.balance import Balance
 from vsacli.actuators.pairs.corridor import corridor
 from vsacli.actuators.pairs.folds import Folds, map_folds
-from vsacli.actuators.pairs.pair import Pair, PairSolution
 from vsacli.actuators.pairs.search import deflections_at
 from vsacli.base.arrays import FloatArray
 

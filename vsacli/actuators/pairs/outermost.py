@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.actuators.bracketing import bracketed_root
+from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.pairs.balance import Balance
-from vsacli.actuators.pairs.decoupling_matrix import Sides, Springs
+from vsacli.actuators.pairs.decoupling_matrix import Sides
 from vsacli.actuators.pairs.folds import Folds, along_equal_hardening
 from vsacli.actuators.pairs.state import PairState
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
@@ -30,7 +31,7 @@ def outermost_fold(balance: Balance, folds: Folds, tau_e: FloatArray) -> tuple[B
     """Whether there is one, and the springs there; arrays (samples,)."""
     if np.isnan(folds.tau_e).all():
         nowhere = np.full_like(tau_e, np.nan)
-        spring = Springs(*[nowhere] * len(Springs._fields))
+        spring = SpringState(*[nowhere] * len(SpringState._fields))
         return np.zeros_like(tau_e, dtype=bool), PairState(nowhere, nowhere, spring, spring)
     cell = _cell(folds, tau_e)
     low, high, *ways = look_up((*folds.tau_e, *folds.way_1, *folds.way_2), cell)

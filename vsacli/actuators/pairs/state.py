@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.pairs.decoupling_matrix import Sides, Springs
+from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.pairs.decoupling_matrix import Sides
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.control_flow import Values
 
@@ -16,15 +17,15 @@ class PairState(NamedTuple):
 
     phi_1: FloatArray
     phi_2: FloatArray
-    one: Springs
-    two: Springs
+    one: SpringState
+    two: SpringState
 
     @classmethod
     def of(cls, values: Values) -> PairState:
         """From what `values` gives."""
         phi_1, phi_2, *springs = values
-        count = len(Springs._fields)
-        return cls(phi_1, phi_2, Springs(*springs[:count]), Springs(*springs[count:]))
+        count = len(SpringState._fields)
+        return cls(phi_1, phi_2, SpringState(*springs[:count]), SpringState(*springs[count:]))
 
     @property
     def values(self) -> Values:
@@ -59,7 +60,7 @@ class PairState(NamedTuple):
         return self.one.bent(step_1) + self.two.bent(step_2)
 
     def moved(self, step_1: FloatArray, step_2: FloatArray) -> PairState:
-        """After short steps, as `Springs.after`."""
+        """After short steps, as `SpringState.after`."""
         return PairState(
             self.phi_1 + step_1, self.phi_2 + step_2, self.one.after(step_1), self.two.after(step_2)
         )
