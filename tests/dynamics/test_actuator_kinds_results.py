@@ -24,7 +24,7 @@ from vsacli.results.plots import compare_files, plot_feasibility, plot_stored
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Limits, Robot
 from vsacli.studies.remedies import StiffnessProfile, suggest, write_fixed
-from vsacli.studies.remedies.outcome import NotPossible, StiffnessOffset
+from vsacli.studies.remedies.suggestions import NotPossible, StiffnessOffset
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 

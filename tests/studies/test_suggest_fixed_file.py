@@ -11,7 +11,7 @@ from vsacli import load_trajectory
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError, StorageError
 from vsacli.studies.remedies import StiffnessProfile, check_fixed_target, suggest, write_fixed
-from vsacli.studies.remedies.restiffened import restiffened
+from vsacli.studies.remedies.stiffness_profile import with_changed_stiffness
 from vsacli.trajectory.curves import POSITION, WRENCH, Constant, RestToRest
 from vsacli.trajectory.curves.piecewise import stepwise
 from vsacli.trajectory.curves.via_points import ViaPoints
@@ -88,7 +88,8 @@ def test_position_stays_a_formula(tmp_path, task, kind):
 
 
 def test_many_steps_are_written_block_by_block(tmp_path):
-    robot, trajectory = vsa_3r(), restiffened(rest_to_rest(4.0, rate=5000), {1: np.ones((3, 20_001))})
+    robot = vsa_3r()
+    trajectory = with_changed_stiffness(rest_to_rest(4.0, rate=5000), {1: np.ones((3, 20_001))})
     path, _ = write_fixed(trajectory, robot.joint_names, tmp_path / "long.yaml")
     again = load_trajectory(path, robot)
     assert again.samples == 20_001
@@ -98,7 +99,7 @@ def test_many_steps_are_written_block_by_block(tmp_path):
 @pytest.mark.parametrize("existing", ["fixed.yaml", "fixed.csv"])
 def test_neither_file_is_replaced_unless_asked(tmp_path, existing):
     (tmp_path / existing).write_text("mine")
-    robot, trajectory = vsa_3r(), restiffened(SOFT, {})
+    robot, trajectory = vsa_3r(), with_changed_stiffness(SOFT, {})
     for act in (
         lambda: check_fixed_target(tmp_path / "fixed.yaml", overwrite=False),
         lambda: write_fixed(trajectory, robot.joint_names, tmp_path / "fixed.yaml"),

@@ -29,11 +29,10 @@ from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
 from vsacli.robot.model import Limits
 from vsacli.studies.remedies import suggest
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.impossible import ImpossibleError
-from vsacli.studies.remedies.load import joint_loads
-from vsacli.studies.remedies.offset import smallest_offset
-from vsacli.studies.remedies.outcome import NotPossible, StiffnessOffset
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.remedies.admissible_stiffness import joint_loads
+from vsacli.studies.remedies.stiffness_offset import smallest_offset
+from vsacli.studies.remedies.suggestions import NotPossible, StiffnessOffset
 from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN = 0.01

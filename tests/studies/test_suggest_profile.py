@@ -24,8 +24,8 @@ from vsacli.analysis.run import Run
 from vsacli.dynamics.link_torques import link_torques
 from vsacli.robot.model import Limits
 from vsacli.studies.remedies import StiffnessProfile, suggest
-from vsacli.studies.remedies.nearest import Bounds, NoSplineError, nearest_spline
-from vsacli.studies.remedies.outcome import NotPossible
+from vsacli.studies.remedies.nearest_spline import Bounds, NoSplineError, nearest_spline
+from vsacli.studies.remedies.suggestions import NotPossible
 
 MARGIN = 0.01
 

@@ -23,12 +23,11 @@ from samples.robots import vsa_3r
 
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.robot.model import Limits
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.impossible import ImpossibleError
-from vsacli.studies.remedies.slow_down import GRID, smallest_slow_down
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.remedies.slow_down import FACTOR_DENOMINATOR, smallest_slow_down
 from vsacli.trajectory.trajectory import Trajectory
 
-STEP = 1 / GRID
+STEP = 1 / FACTOR_DENOMINATOR
 
 
 def slow_down(robot, trajectory, near_singular=0.01):

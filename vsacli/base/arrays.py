@@ -30,3 +30,8 @@ def over_time(rows: FloatArray) -> FloatArray:
 def by_joint(array: ArrayLike) -> FloatArray:
     """The inverse of `over_time`, with contiguous samples; copies only an array laid out otherwise."""
     return np.ascontiguousarray(np.moveaxis(np.asarray(array, dtype=np.float64), 0, -1))
+
+
+def evenly(length: int, count: int) -> IndexArray:
+    """At most `count` indices of `length`, evenly chosen, both ends included."""
+    return np.linspace(0, length - 1, min(length, count)).round().astype(np.intp)

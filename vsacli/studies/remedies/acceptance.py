@@ -1,23 +1,32 @@
-"""The rule that a suggestion has to satisfy: every step keeps the margin and no limit is exceeded."""
+"""What a remedy has to satisfy, why a motion does not satisfy it, and a search for the smallest that does."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from vsacli.actuators.reach import excess, has, limit_flags, margin
+from vsacli.actuators.reach import LimitCheck, excess, has, limit_flags, margin
 from vsacli.actuators.transmission import Command
+from vsacli.analysis.report_text import QUANTITY_OF_LIMIT
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.errors import VsacliError
 from vsacli.base.flags import LIMITS, Flag
+from vsacli.base.units import STIFFNESS
+from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.inverse import command_of, compute_block, elastic_torques, usual_block
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.model import Joint, Robot
-from vsacli.studies.remedies.clauses import corridor_reason, limit_reason
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
+
+
+class ImpossibleError(VsacliError):
+    """No change of a kind mends a motion; the message says why, without a full stop."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +88,7 @@ class Acceptance:
         step = int(gap.argmin())
         if gap[step] >= self.near_singular:
             return ""
-        return corridor_reason(
+        return _corridor_reason(
             joint,
             time[step],
             command.stiffness[step],
@@ -101,5 +110,71 @@ def _limit_reason(joint: Joint, time: FloatArray, computed: Mapping[str, FloatAr
             values = rows if check.motor is None else rows[check.motor - 1]
             if limit_flags(check, values).any():
                 step = int(np.nanargmax(excess(values, check.range)))
-                return limit_reason(joint, time[step], check, values[step])
+                return _limit_text(joint, time[step], check, values[step])
     return ""
+
+
+def stiffness_text(joint: Joint, value: float) -> str:
+    """A stiffness with its unit."""
+    return f"{value:.6g} {STIFFNESS.unit(joint.type)}"
+
+
+def _corridor_reason(joint: Joint, time: float, asked: float, low: float, high: float) -> str:
+    """A step whose stiffness is not between the smallest and the largest that would be accepted."""
+    when = f"at t = {time:.3f} s"
+    if math.isnan(low):
+        return f"the springs of {joint.name} cannot carry its elastic torque {when} at any stiffness"
+    side, bound = ("at least", low) if asked < low else ("at most", high)
+    return f"{joint.name} needs {side} {stiffness_text(joint, bound)} {when} and is asked for {asked:.6g}"
+
+
+def _limit_text(joint: Joint, time: float, check: LimitCheck, value: float) -> str:
+    """A step that exceeds a limit."""
+    quantity = QUANTITY_OF_LIMIT[check.flag.label]
+    whose = quantity if check.motor is None else f"{quantity} {check.motor}"
+    unit = VARIABLES[check.variable].quantity.unit(joint.type)
+    side, bound = ("below", check.range[0]) if value < check.range[0] else ("above", check.range[1])
+    asked = f"{value:.6g} {unit} at t = {time:.3f} s"
+    return f"the {whose} of {joint.name}, {asked}, is {side} its limit {bound:g}"
+
+
+class Candidates(Protocol):
+    """Whole numbers that stand for changes of growing size, judged on a few watched steps or on all."""
+
+    def stride(self, number: int) -> int:
+        """How far a scan goes from a refused number, at least 1."""
+
+    def accepts(self, number: int) -> bool:
+        """Whether the change is accepted at the watched steps."""
+
+    def confirms(self, number: int) -> bool:
+        """Whether it is accepted at all steps; some of those that refuse it are watched from now on."""
+
+
+def smallest_confirmed(candidates: Candidates, start: int, stop: int) -> int | None:
+    """The smallest number from `start` to `stop` that scan, bisection and confirmation find; None if none."""
+    number: int | None = start if start <= stop else None
+    while number is not None:
+        number = _smallest_accepted(candidates, number, stop)
+        if number is not None and candidates.confirms(number):
+            break
+    return number
+
+
+def _smallest_accepted(candidates: Candidates, start: int, stop: int) -> int | None:
+    """Go up in strides to the first accepted number, then bisect down to the last refused one.
+
+    Numbers between strides that are accepted while their neighbours are not may be missed.
+    """
+    refused, number = start - 1, start
+    while not candidates.accepts(number):
+        if number == stop:
+            return None
+        refused, number = number, min(number + candidates.stride(number), stop)
+    while number - refused > 1:
+        middle = (number + refused) // 2
+        if candidates.accepts(middle):
+            number = middle
+        else:
+            refused = middle
+    return number

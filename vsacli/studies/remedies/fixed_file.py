@@ -74,16 +74,16 @@ def _document(trajectory: Trajectory, table: str) -> str:
     lines = [
         f"format: {FORMAT}",
         f"name: {json.dumps(trajectory.name)}",
-        f"position: {{{_course(trajectory.position, table)}}}",
-        f"stiffness: {{{_course(trajectory.stiffness, table)}}}",
+        f"position: {{{_declaration(trajectory.position, table)}}}",
+        f"stiffness: {{{_declaration(trajectory.stiffness, table)}}}",
     ]
     if trajectory.wrench is not None:
-        course = _course(trajectory.wrench.profile, table)
-        lines.append(f"wrench: {{{course}, frame: {trajectory.wrench.frame}}}")
+        declaration = _declaration(trajectory.wrench.profile, table)
+        lines.append(f"wrench: {{{declaration}, frame: {trajectory.wrench.frame}}}")
     return "\n".join([*lines, ""])
 
 
-def _course(profile: Profile, table: str) -> str:
+def _declaration(profile: Profile, table: str) -> str:
     return _formula(profile) or f"type: csv, file: {json.dumps(table)}"
 
 

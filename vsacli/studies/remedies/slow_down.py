@@ -9,32 +9,29 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.wrench import Wrench
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.impossible import ImpossibleError
-from vsacli.studies.remedies.load import IndexArray, evenly
-from vsacli.studies.remedies.scan import smallest_confirmed
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed
 from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
-GRID = 10_000
-"""Factors are whole multiples of 1/GRID, so that the printed one is the confirmed one."""
+FACTOR_DENOMINATOR = 10_000
+"""Factors are whole multiples of 1/FACTOR_DENOMINATOR, so that the printed one is the confirmed one."""
 
 LARGEST_FACTOR = 1000
 """Up to which slow-downs are tried; beyond, the units of the trajectory are more likely to be wrong."""
 
-WATCHED = 1000
+WATCHED_STEPS = 1000
 """Steps that the scan looks at to begin with, and how many a refused confirmation may add."""
 
-FEW = 20
+FIRST_STEPS = 20
 """How many of them are tried at many factors before the scan, and how many of those refused even at rest."""
 
 ORDERS = {name: order for signal in (POSITION, STIFFNESS) for order, name in enumerate(signal.names)}
 """Order of derivation of each array of a motion."""
 
-AT_ONCE = 64
+FACTORS_AT_ONCE = 64
 """Factors that are tried at once."""
 
 
@@ -54,13 +51,13 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     steps = _evenly_chosen(trajectory)
     at_rest = _slowed(steps, math.inf)
     refused = np.flatnonzero(np.any(acceptance.refused(at_rest), axis=1))
-    few = np.union1d(evenly(len(steps.time), FEW), refused[evenly(len(refused), FEW)])
+    few = np.union1d(evenly(len(steps.time), FIRST_STEPS), refused[evenly(len(refused), FIRST_STEPS)])
     number = _first_hope(acceptance, _select(steps, few))
     if number is not None:
         candidates = SlowDowns(acceptance, trajectory, steps)
-        number = smallest_confirmed(candidates, number, LARGEST_FACTOR * GRID)
+        number = smallest_confirmed(candidates, number, LARGEST_FACTOR * FACTOR_DENOMINATOR)
     if number is not None:
-        return number / GRID
+        return number / FACTOR_DENOMINATOR
     if refused.size:
         reasons = "; ".join(acceptance.reasons(at_rest))
         raise ImpossibleError(f"even at rest, under gravity alone, {reasons}")
@@ -72,12 +69,12 @@ def _first_hope(acceptance: Acceptance, few: Motion) -> int | None:
 
     It tries many factors at once, which costs hardly more than one of them.
     """
-    numbers = [GRID]
-    while numbers[-1] < LARGEST_FACTOR * GRID:
-        numbers.append(min(numbers[-1] + _stride(numbers[-1]), LARGEST_FACTOR * GRID))
-    for start in range(0, len(numbers), AT_ONCE):
-        tried = numbers[start : start + AT_ONCE]
-        refused = acceptance.refused(_joined(_slowed(few, number / GRID) for number in tried))
+    numbers = [FACTOR_DENOMINATOR]
+    while numbers[-1] < LARGEST_FACTOR * FACTOR_DENOMINATOR:
+        numbers.append(min(numbers[-1] + _stride(numbers[-1]), LARGEST_FACTOR * FACTOR_DENOMINATOR))
+    for start in range(0, len(numbers), FACTORS_AT_ONCE):
+        tried = numbers[start : start + FACTORS_AT_ONCE]
+        refused = acceptance.refused(_joined(_slowed(few, number / FACTOR_DENOMINATOR) for number in tried))
         hope = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
         if hope.size:
             return numbers[max(start + int(hope[0]) - 1, 0)]
@@ -85,7 +82,7 @@ def _first_hope(acceptance: Acceptance, few: Motion) -> int | None:
 
 
 class SlowDowns:
-    """Stretching by number / GRID, judged at watched steps; see `scan.Candidates`."""
+    """Stretching by number / FACTOR_DENOMINATOR, judged at watched steps; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: Motion) -> None:
         self._acceptance, self._trajectory, self._watched = acceptance, trajectory, watched
@@ -96,15 +93,15 @@ class SlowDowns:
 
     def accepts(self, number: int) -> bool:
         """Whether every watched step is accepted."""
-        return not self._acceptance.refused(_slowed(self._watched, number / GRID)).any()
+        return not self._acceptance.refused(_slowed(self._watched, number / FACTOR_DENOMINATOR)).any()
 
     def confirms(self, number: int) -> bool:
-        """Whether every step is; if not, watch those of the first block that has refused ones."""
-        factor = number / GRID
+        """Whether every step is accepted; those of the first block with others are watched from now on."""
+        factor = number / FACTOR_DENOMINATOR
         for motion, refused in self._acceptance.refused_along(self._trajectory.stretched(factor)):
             steps = np.flatnonzero(np.any(refused, axis=1))
             if steps.size:
-                motion = _select(motion, steps[evenly(len(steps), WATCHED)])
+                motion = _select(motion, steps[evenly(len(steps), WATCHED_STEPS)])
                 self._watched = _joined([self._watched, _slowed(motion, 1 / factor)])
                 return False
         return True
@@ -120,7 +117,9 @@ def _slowed(motion: Motion, factor: float) -> Motion:
 
 
 def _evenly_chosen(trajectory: Trajectory) -> Motion:
-    return _joined(trajectory.block(step, step + 1) for step in evenly(trajectory.samples, WATCHED).tolist())
+    return _joined(
+        trajectory.block(step, step + 1) for step in evenly(trajectory.samples, WATCHED_STEPS).tolist()
+    )
 
 
 def _select(motion: Motion, steps: IndexArray) -> Motion:

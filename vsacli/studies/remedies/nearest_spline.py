@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.studies.remedies.load import IndexArray, evenly
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, evenly
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -17,16 +16,16 @@ DEGREE = 3
 PIECES_PER_SMOOTHING = 3
 """Pieces of the spline in one smoothing time: what the objective leaves is no finer."""
 
-REACH = 8
+DECAY_SMOOTHING_TIMES = 8
 """Smoothing times over which a change dies out; e^-8 is left of it."""
 
 MOST_COEFFICIENTS = 100
 """Coefficients that the dense solver handles in a tenth of a second; more make coarser pieces."""
 
-ROUNDS = 100
+MOST_ROUNDS = 100
 """Rounds of adding the instants at which bounds are missed; about five are needed."""
 
-ACCURACY = 1e-7
+BOUND_ACCURACY = 1e-7
 """By how much of its largest value a spline may miss its bounds; a tenth of what is kept clear of them."""
 
 
@@ -89,7 +88,7 @@ def _knots(bounds: Bounds, smoothing: float) -> tuple[FloatArray, BoolArray, flo
         pieces = int(np.ceil(PIECES_PER_SMOOTHING * (last - first) / smoothing))
         ends = np.linspace(first, last, pieces + 1)
         knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
-        near = _near(ends, bounds.time[bounds.excluding_zero], REACH * smoothing)
+        near = _near(ends, bounds.time[bounds.excluding_zero], DECAY_SMOOTHING_TIMES * smoothing)
         # coefficient i belongs to the pieces i-3..i
         free = np.convolve(near, np.ones(DEGREE + 1)) > 0
         if np.count_nonzero(free) <= MOST_COEFFICIENTS:
@@ -99,8 +98,8 @@ def _knots(bounds: Bounds, smoothing: float) -> tuple[FloatArray, BoolArray, flo
 
 def _near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
     """The pieces with one of these ascending times in reach."""
-    following = np.searchsorted(times, ends[:-1] - reach)
-    near: BoolArray = np.append(times, np.inf)[following] <= ends[1:] + reach
+    next_time = np.append(times, np.inf)[np.searchsorted(times, ends[:-1] - reach)]
+    near: BoolArray = next_time <= ends[1:] + reach
     return near
 
 
@@ -112,13 +111,13 @@ def _least(bounds: Bounds, knots: FloatArray, free: BoolArray, smoothing: float)
     bounding = np.flatnonzero(bounds.excluding_zero)
     watched = bounding[evenly(len(bounding), MOST_COEFFICIENTS)]
     coefficients = np.zeros(len(free))
-    for _ in range(ROUNDS):
+    for _ in range(MOST_ROUNDS):
         rows = BSpline.design_matrix(bounds.time[watched], knots, DEGREE).toarray()[:, free]
         finite = np.isfinite(bounds.high[watched])
         above = np.concatenate([bounds.low[watched], -bounds.high[watched][finite]])
         coefficients[free] = _least_distance(root, np.concatenate([rows, -rows[finite]]), above)
         missed = bounds.missed_by(BSpline(knots, coefficients, DEGREE)(bounds.time))
-        if missed.max() <= ACCURACY:
+        if missed.max() <= BOUND_ACCURACY:
             return coefficients[free]
         watched = np.union1d(watched, _peaks(missed))
     raise NoSplineError
@@ -151,7 +150,7 @@ def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> Floa
     except RuntimeError as error:  # too many iterations
         raise NoSplineError from error
     residual = problem @ multipliers - target
-    if -residual[-1] < ACCURACY:
+    if -residual[-1] < BOUND_ACCURACY:
         raise NoSplineError
     return np.asarray(solve_triangular(root, residual[:-1] / -residual[-1]), dtype=np.float64)
 

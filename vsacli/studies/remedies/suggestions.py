@@ -94,7 +94,7 @@ class JointChange:
 
 @dataclass(frozen=True)
 class StiffnessProfile:
-    """Give the stiffness another course.
+    """Give the stiffness another profile.
 
     Attributes:
         changes: of the joints that are not fine.

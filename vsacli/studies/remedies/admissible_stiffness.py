@@ -1,21 +1,74 @@
-"""Which stiffness a joint may have at an instant, as far as it depends on that instant alone."""
+"""What a joint carries along a motion, and which stiffness it may have while it does."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.antagonistic import Antagonistic, solve_deflections
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Joint
-from vsacli.studies.remedies.acceptance import Acceptance, path_reason
-from vsacli.studies.remedies.impossible import ImpossibleError
-from vsacli.studies.remedies.load import Load
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.dynamics.inverse import command_of, elastic_torques, usual_block
+from vsacli.robot.model import Joint, Robot
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, path_reason
+from vsacli.trajectory.curves import STIFFNESS
+from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Trajectory
 
-HALVINGS = 50
+BISECTIONS = 50
 """Bisections of a share of 0 to 1: down to rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What one joint is asked to do, and its elastic torque.
+
+    Attributes:
+        time: ascending, (instants,) in s.
+        command: rows (instants,).
+    """
+
+    time: FloatArray
+    command: Command
+
+    def at(self, instants: IndexArray | slice) -> Load:
+        """Some of the instants."""
+        return Load(self.time[instants], Command(*(row[instants] for row in self.command)))
+
+    def changed(self, stiffness: FloatArray | float, *rates: FloatArray) -> Load:
+        """The same with something added to the stiffness and, if given, to its rate and second derivative."""
+        changes = dict(zip(STIFFNESS.names, (stiffness, *rates), strict=False))
+        sums = {name: getattr(self.command, name) + change for name, change in changes.items()}
+        return replace(self, command=self.command._replace(**sums))
+
+
+def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int]) -> list[Load]:
+    """The loads of some joints, given by index: at every step, and half-way from one to the next.
+
+    Every second instant, from the first on, is a step.
+    """
+    instants = 2 * trajectory.samples - 1
+    time, rows = np.empty(instants), np.empty((len(joints), len(Command._fields), instants))
+    samples = usual_block(len(robot.joints))
+    for start in range(0, trajectory.samples, samples):
+        steps = trajectory.block(start, start + samples + 1)
+        middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
+        for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
+            _fill(robot, motion, joints, time[first:], rows[:, :, first:])
+    return [Load(time, Command(*of_joint)) for of_joint in rows]
+
+
+def _fill(robot: Robot, motion: Motion, joints: list[int], time: FloatArray, rows: FloatArray) -> None:
+    """Enter a motion at every second instant."""
+    if not len(motion.time):
+        return
+    places = slice(0, 2 * len(motion.time), 2)
+    commanded = {**motion.variables(), **elastic_torques(robot, motion)}
+    time[places] = motion.time
+    for row, joint in zip(rows, joints, strict=True):
+        row[:, places] = np.stack(command_of(joint, commanded))
 
 
 class Range(NamedTuple):
@@ -31,7 +84,7 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
     Raises:
         ImpossibleError: no stiffness mends the joint, or it has none to choose.
     """
-    chosen_actuator(joint)
+    variable_stiffness_actuator(joint)
     if reason := path_reason(joint, load.time, load.command):
         raise ImpossibleError(f"no stiffness changes that {reason}")
     admissible = admissible_stiffness(joint, load.command, acceptance.near_singular)
@@ -40,11 +93,11 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
     return admissible
 
 
-def chosen_actuator(joint: Joint) -> Antagonistic:
-    """The actuator of a joint, if a trajectory chooses its stiffness.
+def variable_stiffness_actuator(joint: Joint) -> Antagonistic:
+    """The actuator of a joint, if its stiffness can be chosen.
 
     Raises:
-        ImpossibleError: it does not.
+        ImpossibleError: the actuator has none to choose.
     """
     if not isinstance(joint.actuator, Antagonistic):
         raise ImpossibleError(f"the actuator of {joint.name} has no stiffness to choose")
@@ -61,7 +114,7 @@ def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -
         command: its elastic torque counts, and its stiffness as a scale.
         near_singular: the margin m.
     """
-    actuator = chosen_actuator(joint)
+    actuator = variable_stiffness_actuator(joint)
     corridor = solve_deflections(actuator, command.tau_e, command.stiffness)
     least, most = joint.limits.stiffness
     low = np.maximum(corridor.lower / (1 - near_singular), least)
@@ -79,7 +132,7 @@ def _deflection_ceiling(actuator: Antagonistic, command: Command, lower: FloatAr
     """
     limits = np.array([[spring.max_deflection] for spring in actuator.spring])
     kept, broken = np.zeros_like(lower), np.ones_like(lower)
-    for _ in range(HALVINGS):
+    for _ in range(BISECTIONS):
         share = (kept + broken) / 2
         stiffness = lower + command.stiffness * share / (1 - share)
         solution = solve_deflections(actuator, command.tau_e, stiffness)

@@ -6,21 +6,18 @@ import math
 
 import numpy as np
 
+from vsacli.base.arrays import IndexArray, evenly
 from vsacli.robot.model import Joint
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.admissible import checked_range
-from vsacli.studies.remedies.clauses import stiffness
-from vsacli.studies.remedies.impossible import ImpossibleError
-from vsacli.studies.remedies.load import IndexArray, Load, evenly
-from vsacli.studies.remedies.scan import smallest_confirmed
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed, stiffness_text
+from vsacli.studies.remedies.admissible_stiffness import Load, checked_range
 
 LARGEST_RATIO = 100
 """How many times stiffer or softer an offset may make a joint, where nothing else bounds it."""
 
-WATCHED = 1000
+WATCHED_STEPS = 1000
 """Steps that the scan looks at to begin with, and how many a refused confirmation may add."""
 
-DIGITS = 4
+OFFSET_DIGITS = 4
 """Decimal places of an offset behind the leading digit of the stiffness: so what is printed was confirmed."""
 
 GRID_ROUNDING = 1e-6
@@ -62,21 +59,21 @@ def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, fl
     if rise[first] > fall[last]:
         raise ImpossibleError(
             f"none takes {joint.name} from {asked[first]:.6g} to at least "
-            f"{stiffness(joint, admissible.low[first])} at t = {load.time[first]:.3f} s "
+            f"{stiffness_text(joint, admissible.low[first])} at t = {load.time[first]:.3f} s "
             f"and from {asked[last]:.6g} to at most "
-            f"{stiffness(joint, admissible.high[last])} at t = {load.time[last]:.3f} s"
+            f"{stiffness_text(joint, admissible.high[last])} at t = {load.time[last]:.3f} s"
         )
     return float(rise[first]), float(fall[last])
 
 
 class Offsets:
-    """Constants of one sign on a decimal grid, judged at watched steps; see `scan.Candidates`."""
+    """Constants of one sign on a decimal grid, judged at watched steps; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, joint: Joint, load: Load, sign: int) -> None:
         self._acceptance, self._joint, self._load, self._sign = acceptance, joint, load, sign
         self._softest = float(load.command.stiffness.min())
-        self._exponent = math.floor(math.log10(self._softest)) - DIGITS
-        self._watched = evenly(len(load.time), WATCHED)
+        self._exponent = math.floor(math.log10(self._softest)) - OFFSET_DIGITS
+        self._watched = evenly(len(load.time), WATCHED_STEPS)
 
     def value(self, number: int) -> float:
         """The constant that a number stands for: the double nearest to the decimal."""
@@ -100,9 +97,9 @@ class Offsets:
         return not self._refused(self._load.at(self._watched), number).size
 
     def confirms(self, number: int) -> bool:
-        """Whether every step is; if not, watch those that are not."""
+        """Whether every step is accepted; steps that are not are watched from now on."""
         refused = self._refused(self._load, number)
-        self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED)])
+        self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED_STEPS)])
         return not refused.size
 
     def _refused(self, load: Load, number: int) -> IndexArray:

@@ -1,4 +1,4 @@
-"""What smallest change makes a task possible: a slow-down, a stiffness offset, or another profile."""
+"""The smallest changes after which a motion is possible: a slow-down, a stiffness offset, another profile."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import STIFFNESS
 from vsacli.robot.model import Joint, Robot
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.impossible import ImpossibleError
-from vsacli.studies.remedies.load import Load, joint_loads
-from vsacli.studies.remedies.offset import smallest_offset
-from vsacli.studies.remedies.outcome import (
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.remedies.admissible_stiffness import Load, joint_loads
+from vsacli.studies.remedies.slow_down import smallest_slow_down
+from vsacli.studies.remedies.stiffness_offset import smallest_offset
+from vsacli.studies.remedies.stiffness_profile import Change, nearest_change, with_changed_stiffness
+from vsacli.studies.remedies.suggestions import (
     JointChange,
     NotPossible,
     Offset,
@@ -25,9 +26,6 @@ from vsacli.studies.remedies.outcome import (
     StiffnessProfile,
     Suggestions,
 )
-from vsacli.studies.remedies.profile import Change, nearest_change
-from vsacli.studies.remedies.restiffened import restiffened
-from vsacli.studies.remedies.slow_down import smallest_slow_down
 from vsacli.trajectory.trajectory import Trajectory
 
 _Found = TypeVar("_Found", float, Change)
@@ -131,7 +129,7 @@ def _confirmed(
     acceptance: Acceptance, trajectory: Trajectory, changes: Mapping[int, FloatArray]
 ) -> Trajectory:
     """The trajectory with changed stiffness, after all of its steps have been recomputed."""
-    fixed = restiffened(trajectory, changes)
+    fixed = with_changed_stiffness(trajectory, changes)
     refused = acceptance.refused_joints(fixed)
     assert not refused.any(), "a change that was accepted joint by joint is not confirmed"
     return fixed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -10,12 +11,19 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Joint
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.admissible import admissible_stiffness, checked_range, chosen_actuator
-from vsacli.studies.remedies.clauses import stiffness
-from vsacli.studies.remedies.impossible import ImpossibleError
-from vsacli.studies.remedies.load import Load
-from vsacli.studies.remedies.nearest import DEGREE, Bounds, NoSplineError, nearest_spline
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, stiffness_text
+from vsacli.studies.remedies.admissible_stiffness import (
+    Load,
+    admissible_stiffness,
+    checked_range,
+    variable_stiffness_actuator,
+)
+from vsacli.studies.remedies.nearest_spline import DEGREE, Bounds, NoSplineError, nearest_spline
+from vsacli.trajectory.curves import STIFFNESS
+from vsacli.trajectory.fits import INTERPOLATE
+from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.times import RecordedTimes
+from vsacli.trajectory.trajectory import Trajectory
 
 MARGINS = (1, 2, 4, 8)
 """Multiples of the margin tried where motor limits refuse the nearest profile: torques grow with 1/margin."""
@@ -86,8 +94,8 @@ def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
     worst = int((low - high).argmax())
     if low[worst] > high[worst]:
         raise ImpossibleError(
-            f"{joint.name} needs at least {stiffness(joint, low[worst])} at t = {load.time[worst]:.3f} s, "
-            f"but its limits of stiffness and deflection allow at most {high[worst]:.6g}"
+            f"{joint.name} needs at least {stiffness_text(joint, low[worst])} at t = {load.time[worst]:.3f} s"
+            f", but its limits of stiffness and deflection allow at most {high[worst]:.6g}"
         )
 
 
@@ -122,7 +130,7 @@ def _clear(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
 
 def _smoothing_time(joint: Joint, load: Load) -> float:
     """sqrt(B/sigma): the motors follow slower changes with little torque of inertia; at least three steps."""
-    inertia = max(motor.at_joint.inertia for motor in chosen_actuator(joint).motor)
+    inertia = max(motor.at_joint.inertia for motor in variable_stiffness_actuator(joint).motor)
     resonance = math.sqrt(inertia / float(load.command.stiffness.min()))
     step = float(np.median(np.diff(load.time[::2])))
     return min(max(resonance, 3 * step), float(load.time[-1] - load.time[0]))
@@ -140,3 +148,27 @@ def _reason(acceptance: Acceptance, joint: Joint, load: Load, change: Change | N
         return f"what {joint.name} may have is too narrow, or changes too fast, for a smooth profile"
     reason = acceptance.reason(joint, load.time, load.changed(*change.rows).command)
     return f"none that was tried keeps every limit of {joint.name}; with the nearest, {reason}"
+
+
+def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatArray]) -> Trajectory:
+    """A trajectory with the same steps, whose stiffness is recorded at them.
+
+    Args:
+        trajectory: what is to be changed.
+        changes: for joints by index what to add to the stiffness, its rate and its second derivative at the
+            steps, (3, steps), N m/rad (N/m) per s^k.
+    """
+    time = trajectory.times.block(0, trajectory.samples)
+    rows = trajectory.stiffness.samples(0, trajectory.samples, time).copy()
+    for joint, change in changes.items():
+        rows[:, joint] += change
+    values, *derivatives = rows
+    labels = tuple(f"column {joint}" for joint in range(len(values)))
+    record = Samples(
+        signal=STIFFNESS, time=time, values=values, derivatives=tuple(derivatives), labels=labels
+    )
+    stiffness = SampledProfile.of(record, INTERPOLATE)
+    name = f"{trajectory.name}-fixed"
+    return Trajectory(
+        RecordedTimes(time), trajectory.position, stiffness, wrench=trajectory.wrench, name=name
+    )
