@@ -44,6 +44,7 @@ ENTRIES = ROW.findall(PAGE.partition("\n## Rooms\n")[2].partition("\n## ")[0])
 
 ROOMS = [entry for entry in ENTRIES if "." not in entry]
 SOURCES = sorted(PACKAGE.rglob("*.py"))
+TESTS = Path(__file__).parent
 
 
 def part_of(source: Path) -> str:
@@ -203,3 +204,33 @@ assert signal.getsignal(signal.SIGINT) is handler
     outcome = run_python(code, tmp_path)
     assert (outcome.returncode, outcome.stdout, outcome.stderr) == (0, "", "")
     assert not list(tmp_path.iterdir())
+
+
+def quick_tests(source: Path) -> list[str]:
+    """Tests of a file that run without being asked for, some of their cases at least."""
+    return [
+        node.name
+        for node in ast.parse(source.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef)
+        and node.name.startswith("test_")
+        and "pytest.mark.slow" not in map(ast.unparse, node.decorator_list)
+    ]
+
+
+def test_every_room_has_a_folder_of_tests_of_which_some_are_quick() -> None:
+    folders = {path.name for path in TESTS.iterdir() if path.is_dir() and any(path.glob("*.py"))}
+    rooms = {entry for entry in ROOMS if (PACKAGE / entry).is_dir()}
+    assert folders == rooms | {"benchmarks", "oracles", "samples"}
+    assert [room for room in rooms if not any(map(quick_tests, (TESTS / room).glob("test_*.py")))] == []
+
+
+def test_oracles_know_nothing_of_what_they_judge() -> None:
+    """Oracles take robots and arrays, and compute by themselves."""
+    known = ("vsacli.base.arrays", "vsacli.robot.model")
+    strays = [
+        f"{source}:{line}: {name}"
+        for source in sorted((TESTS / "oracles").glob("*.py"))
+        for name, line in imports(source)
+        if name.startswith("vsacli") and name not in known
+    ]
+    assert strays == []

@@ -20,6 +20,7 @@ import click
 import h5py
 import pytest
 from samples.command_line import installed
+from samples.marks import slow
 
 import vsacli
 from vsacli.actuators.reach import NEAR_SINGULAR, TOUCHING
@@ -31,6 +32,9 @@ from vsacli.documents.yaml_tree import MAX_LEVELS, MAX_NODES
 REPOSITORY = Path(__file__).parents[1]
 README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
+
+LONG = ("cli.md", "energy.md", "quickstart.md", "recorded.md", "robots.md", "simulation.md", "urdf.md")
+"""Pages whose examples take more than a second."""
 
 SAVED_AS = re.compile(r"Save as `(\S+)`:$")
 EXIT_CODE = re.compile(r"# exit code (\d+)$")
@@ -121,7 +125,7 @@ def test_every_part_has_its_place(generate: ModuleType) -> None:
     assert {match["name"] for match in generate.PART.finditer(text)} == generate.PARTS.keys()
 
 
-@pytest.mark.parametrize("page", PAGES, ids=named)
+@pytest.mark.parametrize("page", [slow(page) if page.name in LONG else page for page in PAGES], ids=named)
 def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
     printed: tuple[str, ...] = ()
     for block in blocks(page):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oracles.scalar_vsa import Curve, Side
 from samples.drives import Stopped
+from samples.marks import slow
 from test_springs import residuals
 
 from vsacli.actuators.laws.cubic import Cubic
@@ -99,10 +100,11 @@ def test_lower_end_jumps_where_the_outermost_piece_splits():
         assert lower[index] == pytest.approx(curve.stiffness(curve.fold(nodes=3000)), rel=1e-9)
 
 
+@pytest.mark.parametrize("pairs", [10, slow(150)])
 @pytest.mark.parametrize("decades", [1e-8, 1e-3, 0.05, 0.5, 2, 4])
-def test_corridor_ends_where_a_dense_scan_says(decades: float):
+def test_corridor_ends_where_a_dense_scan_says(decades: float, pairs: int):
     rng = np.random.default_rng(round(1e9 * decades))
-    for _ in range(150):
+    for _ in range(pairs):
         springs = random_springs(rng, decades)
         share = 20 * 10 ** rng.uniform(-4, 0) * rng.choice([-1, 1])
         tau_e = float(share * fold_load(springs[rng.integers(2)]))
@@ -196,7 +198,7 @@ def test_below_reach_the_deflections_are_those_of_the_end():
 # Anything goes
 
 
-@pytest.mark.parametrize("decades", [0.05, 1, 2])
+@pytest.mark.parametrize("decades", [0.05, slow(1), slow(2)])
 def test_any_load_and_stiffness_is_solved_to_rounding(decades: float):
     rng = np.random.default_rng(3)
     for _ in range(25):
@@ -210,10 +212,11 @@ def test_any_load_and_stiffness_is_solved_to_rounding(decades: float):
         assert residuals(springs, pair.solve(tau_e, stiffness), tau_e, stiffness) <= 1e-12
 
 
-def test_absurd_springs_and_loads_give_numbers():
+@pytest.mark.parametrize("pairs", [10, slow(50)])
+def test_absurd_springs_and_loads_give_numbers(pairs: int):
     rng = np.random.default_rng(1)
     sizes = np.concatenate([10 ** rng.uniform(-3, 6, 30), [1e-300, 1e-200, 1e-100, 1e-30, 1e-15, 0]])
-    for _ in range(50):
+    for _ in range(pairs):
         first, second = (Cubic(k=10 ** rng.uniform(-3, 6), k_c=10 ** rng.uniform(-3, 9)) for _ in range(2))
         tau_e = rng.choice([-1, 1], sizes.size) * sizes
         stiffness = (first.k + second.k) * 10 ** rng.uniform(-6, 6, sizes.size)

@@ -34,6 +34,7 @@ def peak_memory(folder: Path, samples: int) -> float:
     return float(memory)
 
 
+@pytest.mark.slow
 def test_memory_is_bounded_and_does_not_grow_with_the_trajectory(tmp_path):
     short, long = peak_memory(tmp_path, 100_000), peak_memory(tmp_path, 400_000)
     assert long < MEMORY_LIMIT

@@ -133,6 +133,7 @@ def test_unreadable_file(vsacli, tmp_path):
     assert re.fullmatch(r"r\.yaml: .*[Pp]ermission.*\n", done.err)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["noise.yaml", "noise.csv"])
 def test_200_megabytes_of_noise_are_refused_within_seconds(tmp_path, name):
     noise = os.urandom(1_000_000)

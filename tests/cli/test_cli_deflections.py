@@ -7,6 +7,7 @@ import json
 import h5py
 import pytest
 from samples.command_line import ROBOT, contents
+from samples.marks import slow
 
 COMMANDS = pytest.mark.parametrize("command", ["invdyn", "check-feasibility"])
 
@@ -19,7 +20,7 @@ def test_the_default_is_the_root(vsacli, motion, command):
     assert "drift" not in default.out
 
 
-@COMMANDS
+@pytest.mark.parametrize("command", [slow("invdyn"), "check-feasibility"])
 def test_drift_is_reported(vsacli, motion, command):
     done = vsacli(command, ROBOT, motion, "--deflections", "integrate")
     assert done.code == 0
@@ -27,6 +28,7 @@ def test_drift_is_reported(vsacli, motion, command):
     assert line.count(" rad at ") == 3
 
 
+@pytest.mark.slow
 def test_end_of_the_way_is_reported(vsacli, too_soft):
     done = vsacli("invdyn", ROBOT, too_soft, "--deflections", "integrate")
     assert done.code == 3

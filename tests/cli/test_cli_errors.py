@@ -10,6 +10,7 @@ import subprocess
 import click
 import pytest
 from samples.command_line import COMMAND, REST_TO_REST, ROBOT, contents, edited, installed
+from samples.marks import slow
 
 from vsacli import __version__
 from vsacli.cli.exit_codes import Exit
@@ -106,7 +107,7 @@ def limit_file_size():
     resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
 
 
-@pytest.mark.parametrize("command", ["invdyn", "export", "plot"])
+@pytest.mark.parametrize("command", ["invdyn", "export", slow("plot")])
 def test_full_disk_leaves_the_old_file(tmp_path, motion, feasible_result, command):
     (tmp_path / "r.h5").write_bytes(b"old result")
     (tmp_path / "t.csv").write_bytes(b"old torques")

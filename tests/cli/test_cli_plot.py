@@ -11,6 +11,7 @@ from samples.command_line import ROBOT, contents, installed
 NAMES = ("motion", "motor-torque", "elastic-torque", "energy")
 
 
+@pytest.mark.slow
 def test_installed_command_draws_a_result(tmp_path, feasible_result):
     done = installed("plot", feasible_result, "-o", "figures", folder=tmp_path)
     assert (done.returncode, done.stdout) == (0, "")

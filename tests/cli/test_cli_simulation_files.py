@@ -72,6 +72,7 @@ def parsed(text: str) -> tuple[list[str], FloatArray]:
     return header, np.array(rows, dtype=float)
 
 
+@pytest.mark.slow
 def test_installed_command_draws_the_figures_that_simulate_drew(tmp_path: Path, simulated: Path) -> None:
     done = installed("plot", simulated / "s.h5", "-o", "later", folder=tmp_path)
     assert (done.returncode, done.stdout) == (0, "")
@@ -221,6 +222,7 @@ def test_a_name_of_a_result_leads_to_that_of_the_simulation(
     assert done.err == f"no variable is called {name!r}; did you mean '{name}_actual'?\n"
 
 
+@pytest.mark.slow
 def test_a_run_that_ended_early(vsacli: Callable[..., Any], too_soft: Path, tmp_path: Path) -> None:
     printed = vsacli("simulate", ROBOT, too_soft, "-o", "s.h5", "--plot", "figures").out
     assert vsacli("plot", "s.h5", "-o", "later").code == 0

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.generated_code import COMPILERS, Compiled, compile_c
+from samples.marks import slow
 from test_tracing import ELEMENTWISE, samples
 from test_tracing_control_flow import FUNCTIONS as NESTED
 
@@ -29,7 +30,7 @@ UNITS = 4
 EXACT = ("operators", "add", "subtract", "multiply", "divide", "sqrt", "small powers", "negative", "absolute")
 """Rounded as the norm of floating-point arithmetic says."""
 
-PROCESSORS = ("native", "x86-64", "x86-64-v3") if platform.machine() == "x86_64" else ("native",)
+PROCESSORS = ("native", slow("x86-64"), slow("x86-64-v3")) if platform.machine() == "x86_64" else ("native",)
 """Registers of different widths, and a processor for which there are no vector functions."""
 
 

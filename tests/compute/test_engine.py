@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from samples.drives import ALIKE, joint_with, springs
 from samples.engines import assert_agree, demands, kinds_of_steps, needs_compiler, random_wrench
+from samples.marks import slow, slow_but
 from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
 
 from vsacli import load_robot
@@ -66,6 +67,7 @@ def test_example_robots_agree(name: str):
     assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))
 
 
+@pytest.mark.slow
 def test_seven_joints_agree():
     """With the flags of a real run: contracted and vectorised."""
     robot = load_robot(ROBOTS / "lwr_7r_vsa.yaml")
@@ -93,7 +95,7 @@ STRETCHED = {"stiffness_upper": 1e-9}
 
 
 @pytest.mark.usefixtures("quickly")
-@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("pair", slow_but({"cubic", "sinh", "exponential", "quadratic"}, PAIRS))
 def test_spring_laws_agree(pair: str):
     robot = one_joint(*PAIRS[pair])
     motion = demands(robot, SAMPLES)
@@ -104,6 +106,7 @@ def test_spring_laws_agree(pair: str):
     assert_agree(found, expected, STRETCHED if pair == "four_bar" else None)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quickly")
 def test_measured_springs_agree():
     robot = load_robot(ROBOTS / "measured_1r.yaml")
@@ -161,7 +164,7 @@ def joined(robot: Robot, motion: MotionArrays, starts: list[int]) -> np.ndarray:
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names processors of that kind")
-@pytest.mark.parametrize("processor", ["x86-64", "haswell"])
+@pytest.mark.parametrize("processor", ["x86-64", slow("haswell")])
 def test_shorter_vectors_agree(processor: str, monkeypatch: pytest.MonkeyPatch):
     """2 lanes without, 4 with functions of math.h for vectors; any number of samples is left over."""
     flags = tuple(f"-march={processor}" if flag == compiler.NATIVE else flag for flag in compiler.FLAGS)
@@ -173,6 +176,7 @@ def test_shorter_vectors_agree(processor: str, monkeypatch: pytest.MonkeyPatch):
         assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))
 
 
+@pytest.mark.slow
 def test_results_depend_neither_on_blocks_nor_on_threads():
     """To the last bit: each sample is computed by the same instructions, in whatever lane."""
     robot = random_robot("RPR", seed=4)

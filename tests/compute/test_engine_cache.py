@@ -155,6 +155,7 @@ def test_the_first_of_two_libraries_stays(tmp_path: Path):
     assert not list(tmp_path.glob(f"{UNFINISHED}*"))
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_processes_at_once_do_not_meet_half_a_library(folder: Path):
     code = (

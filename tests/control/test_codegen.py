@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from samples.codegen import clear, commands, motion_of, shipped, with_springs
 from samples.generated_code import COMPILERS, STRICT, compile_c, compiled_robot, write_files
+from samples.marks import slow, slow_but
 from samples.robots import random_robot
 from samples.springs import SPRINGS
 
@@ -57,7 +58,7 @@ def self_test(name: str, folder: Path, *flags: str, compiler: str, precision: st
     return done.stdout
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", slow_but({"3R", "mixed", "sinh"}, ROBOTS))
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_it_compiles_without_a_warning_and_passes_its_own_test(
     compiler: str, name: str, tmp_path: Path
@@ -68,14 +69,14 @@ def test_it_compiles_without_a_warning_and_passes_its_own_test(
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", SANITIZED)
+@pytest.mark.parametrize("name", slow_but({"one joint"}, SANITIZED))
 def test_no_undefined_behaviour(name: str, tmp_path: Path) -> None:
     flags = ("-g", "-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
     assert self_test(name, tmp_path, *flags, compiler=COMPILERS[0]) == "all values agree\n"
 
 
 @needs_compiler
-@pytest.mark.parametrize("name", ["3R", "mixed", "sinh", "table", "four_bar"])
+@pytest.mark.parametrize("name", ["3R", *map(slow, ("mixed", "sinh", "table", "four_bar"))])
 def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_path: Path) -> None:
     flags = ("-Wconversion", "-Wdouble-promotion") if name == "3R" else ()
     folder = tmp_path / "library"
@@ -114,7 +115,7 @@ def test_the_makefile(tmp_path: Path) -> None:
 
 @needs_compiler
 @pytest.mark.skipif(not shutil.which("nm"), reason="no nm")
-@pytest.mark.parametrize("name", ["3R", "mixed", "sinh"])
+@pytest.mark.parametrize("name", [slow("3R"), "mixed", slow("sinh")])
 def test_the_code_keeps_nothing_and_calls_nothing_but_the_math_library(name: str, tmp_path: Path) -> None:
     write_files(project(name), tmp_path)
     prefix = prefix_of(ROBOTS[name])
@@ -129,7 +130,7 @@ def test_the_code_keeps_nothing_and_calls_nothing_but_the_math_library(name: str
     assert all(symbol.startswith(f"{prefix}_") for kind, symbol in symbols if kind == "T")
 
 
-@pytest.mark.parametrize("name", ["3R", "table"])
+@pytest.mark.parametrize("name", ["3R", slow("table")])
 def test_every_loop_is_bounded_by_a_constant(name: str) -> None:
     source = project(name).files[f"{prefix_of(ROBOTS[name])}.c"]
     assert not re.search(r"\b(goto|do|malloc|calloc|free|printf|static (?!const|inline))\b", source)
@@ -203,8 +204,8 @@ Springs whose stiffness grows tenfold over their range multiply what rounding do
 
 
 @needs_compiler
-@pytest.mark.parametrize(("name", "bound"), FLOAT_BOUND.items())
-def test_accuracy_in_single_precision(name: str, bound: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", slow_but({"rp_2"}, FLOAT_BOUND))
+def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
     robot = shipped(name)
     function, command = inverse_dynamics_function(robot), commands(robot, 200, seed=9)
     command = {key: values.astype(np.float32).astype(float) for key, values in command.items()}
@@ -219,4 +220,6 @@ def test_accuracy_in_single_precision(name: str, bound: float, tmp_path: Path) -
             np.testing.assert_array_equal(values[chosen], expected[chosen])
             continue
         scale = np.abs(expected[chosen]).max(initial=0.0)
-        np.testing.assert_allclose(values[chosen], expected[chosen], rtol=0, atol=bound * scale, err_msg=key)
+        np.testing.assert_allclose(
+            values[chosen], expected[chosen], rtol=0, atol=FLOAT_BOUND[name] * scale, err_msg=key
+        )

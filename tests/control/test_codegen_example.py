@@ -47,6 +47,7 @@ def test_the_commands_of_the_page_print_what_it_shows(folder: Path) -> None:
     assert done.stdout == shown
 
 
+@pytest.mark.slow
 def test_the_controller_follows_the_reference_and_would_not_alone(folder: Path) -> None:
     """From 0.02 rad to the rounding of what is printed; with gains of zero the error stays."""
     assert final_error(folder, SOURCE.read_text()) == 0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from samples.codegen import CLOSE, clear, commands, motion_of, shipped, with_springs
 from samples.generated_code import COMPILERS, compiled_robot
+from samples.marks import slow, slow_but
 from samples.plants import all_rigid, elastic, random_state, with_actuators
 from samples.robots import random_robot
 from samples.springs import SPRINGS
@@ -54,7 +55,7 @@ def check_inverse_dynamics(robot: Robot, folder: Path) -> Block:
     return block
 
 
-@pytest.mark.parametrize("law", SPRINGS)
+@pytest.mark.parametrize("law", slow_but({"cubic", "sinh", "exponential", "quadratic"}, SPRINGS))
 def test_inverse_dynamics_with_springs_of_each_law(law: str, tmp_path: Path) -> None:
     block = check_inverse_dynamics(with_springs(law), tmp_path)
     seen = Flag(int(np.bitwise_or.reduce(block.flags, axis=None)))
@@ -63,7 +64,7 @@ def test_inverse_dynamics_with_springs_of_each_law(law: str, tmp_path: Path) -> 
     assert np.isfinite(block.tau_motor).any(axis=(0, 2)).all()
 
 
-@pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "mixed_3r", "lwr_7r_vsa", "tendon_1r"])
+@pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "mixed_3r", slow("lwr_7r_vsa"), "tendon_1r"])
 def test_inverse_dynamics_of_arms(name: str, tmp_path: Path) -> None:
     check_inverse_dynamics(shipped(name), tmp_path)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracles.lagrange import chain_of
+from samples.marks import slow
 from samples.plants import all_rigid
 from samples.robots import random_robot, vsa_3r
 from samples.simulated import mixed_3r, short_motion
@@ -47,7 +48,7 @@ def balance(robot: Robot, past: History) -> FloatArray:
     ],
     ids=["3R", "RP", "elastic shoulder", "rigid"],
 )
-@pytest.mark.parametrize("measured", ["state", "positions"])
+@pytest.mark.parametrize("measured", ["state", slow("positions")])
 def test_the_motors_work_is_what_moves_lifts_deflects_and_is_lost(robot, gains, measured):
     trajectory = short_motion(len(robot.joints), rate=1000, duration=0.3, stiffness=(1900, 2100))
     error = InitialError(0.02)

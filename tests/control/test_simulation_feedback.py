@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 from oracles import pinocchio
 from samples.command_line import SEVEN_JOINTS
+from samples.marks import slow_but
 from samples.plants import all_rigid
 from samples.robots import random_robot, vsa_3r
 from samples.simulated import error_course, linearized_run, mixed_3r, short_motion
@@ -52,7 +53,10 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+QUICK = {"3R", "3R under a wrench at the tool", "R-P chain, sides that differ"}
+
+
+@pytest.mark.parametrize("case", slow_but(QUICK, CASES))
 def test_errors_obey_the_linear_dynamics(case):
     make, trajectory, stiffness_error = CASES[case]
     robot = make()

@@ -98,6 +98,7 @@ def test_a_tendon_that_goes_slack_ends_the_run():
     assert np.abs(phi * [1, -1]).min() == pytest.approx(0, abs=1e-9)  # the event's root in deflection
 
 
+@pytest.mark.slow
 def test_measured_positions_cost_accuracy_and_the_report_says_how_much():
     setup = Setup(gains=GAINS, initial_error=InitialError(0.01, 5), measured="positions")
     losses = {}

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from oracles.scalar_vsa import Actuation, Curve, Side, actuation
+from samples.marks import slow_but
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.antagonistic import Antagonistic
@@ -96,7 +97,7 @@ def recomputed(joint: Joint, result: Result, index: int, steps: FloatArray) -> I
         )
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", slow_but({"3R", "R-P"}, CASES))
 def test_motors_do_what_a_scalar_recomputation_says(case: str):
     robot, trajectory = CASES[case]()
     result = inverse_dynamics(robot, trajectory)

@@ -279,6 +279,7 @@ def test_a_comparison_shows_the_motors_that_any_of_the_results_has() -> None:
 # Deflections by integration, and advice
 
 
+@pytest.mark.slow
 def test_only_antagonistic_joints_are_followed(robot: Robot, motion: Trajectory) -> None:
     deflections = integrate_deflections(robot, motion)
     assert deflections.stops == (None, None, None)
@@ -289,6 +290,7 @@ def test_only_antagonistic_joints_are_followed(robot: Robot, motion: Trajectory)
     np.testing.assert_array_equal(result.tau_motor[:, :2], solved.tau_motor[:, :2])
 
 
+@pytest.mark.slow
 def test_a_stop_is_told_of_the_joint_that_stops(
     vsacli: Callable[..., Outcome], robot: Robot, tmp_path: Path
 ) -> None:

@@ -10,6 +10,7 @@ import pytest
 from samples.command_line import REPOSITORY
 from samples.drives import Stopped, joint_with, springs, with_joint
 from samples.drives import motion as arm_motion
+from samples.marks import slow
 from samples.robots import vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
@@ -145,11 +146,11 @@ def crossing() -> Result:
 @pytest.mark.parametrize(
     "case",
     [
-        pytest.param(lambda: example("vsa_3r", "rest_to_rest"), id="3R"),
-        pytest.param(lambda: example("vsa_3r", "rest_to_rest_soft"), id="3R soft"),
+        pytest.param(lambda: example("vsa_3r", "rest_to_rest"), id="3R", marks=pytest.mark.slow),
+        pytest.param(lambda: example("vsa_3r", "rest_to_rest_soft"), id="3R soft", marks=pytest.mark.slow),
         pytest.param(lambda: example("rp_2", "rp_2"), id="R-P"),
         pytest.param(lambda: unlike("positive"), id="sides differ"),
-        pytest.param(lambda: unlike("negative"), id="preload negative"),
+        pytest.param(lambda: unlike("negative"), id="preload negative", marks=pytest.mark.slow),
         pytest.param(tendons, id="tendons"),
     ],
 )
@@ -208,6 +209,7 @@ def test_recording_is_followed_from_breakpoint_to_breakpoint():
     assert max(drifts(result)) < TINY
 
 
+@pytest.mark.slow
 def test_long_recording_drifts_a_little(monkeypatch):
     monkeypatch.setattr("vsacli.dynamics.integrated_deflections.integration.MOST_PIECES", 20)
     smooth, rough = (followed(ARM, recorded(101, noise)) for noise in (0.0, 1e-5))
@@ -270,7 +272,7 @@ def test_stiffness_inside_the_corridor_is_not_called_out_of_reach(touching: Resu
     assert "its load allows" not in render(touching.report)
 
 
-@pytest.mark.parametrize("floor", [800.0 * (1 + 2e-9), 800.0 + 1e-4])
+@pytest.mark.parametrize("floor", [800.0 * (1 + 2e-9), slow(800.0 + 1e-4)])
 def test_passing_closely_by_goes_on(floor: float):
     trajectory = dipping(floor)
     result = followed(ARM, trajectory)
@@ -307,6 +309,7 @@ def test_another_sign_of_the_determinant_is_beyond_the_singular_set():
     assert (task.hindrances(joints, time, roots[:, ::-1]) == SINGULAR).all()
 
 
+@pytest.mark.slow
 def test_integration_that_stalls_ends_at_the_joint_to_blame(monkeypatch):
     trajectory = softening()
     expected = integrate_deflections(ARM, trajectory, COARSE).stops[1]

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from samples.command_line import contents
+from samples.marks import slow
 
 from vsacli import inverse_dynamics, load_trajectory
 from vsacli.base.errors import InputError, StorageError
@@ -18,12 +19,14 @@ from vsacli.files.examples import Example, Motion, copy_examples, examples
 
 EXAMPLES = examples()
 RUNS = [(example, motion) for example in EXAMPLES for motion in example.motions]
+RUN_NAMES = [f"{example.name} {motion.name}" for example, motion in RUNS]
+QUICK = ("mixed_3r", "tendon_1r")
+"""Examples that every command takes soon; together they have joints of each kind."""
+
 TRAJECTORIES = Path(RUNS[0][1].path).parent
 
 in_every_example = pytest.mark.parametrize("example", EXAMPLES, ids=[each.name for each in EXAMPLES])
-in_every_run = pytest.mark.parametrize(
-    ("example", "motion"), RUNS, ids=[f"{example.name} {motion.name}" for example, motion in RUNS]
-)
+in_every_run = pytest.mark.parametrize(("example", "motion"), RUNS, ids=RUN_NAMES)
 
 
 def test_every_robot_has_a_trajectory_and_every_trajectory_a_robot():
@@ -47,7 +50,11 @@ def test_example_says_where_its_numbers_come_from(example: Example):
     assert example.robot.description
 
 
-@in_every_run
+@pytest.mark.parametrize(
+    ("example", "motion"),
+    [run if run[0].name in QUICK else slow(*run) for run in RUNS],
+    ids=RUN_NAMES,
+)
 def test_every_command_takes_it(example: Example, motion: Motion, vsacli: Callable[..., Any]):
     copy_examples([example.name], ".")
     robot, trajectory = Path("robots", example.path.name), Path("trajectories", motion.path.name)

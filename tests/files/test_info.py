@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, ROBOT, rest_to_rest
+from samples.marks import slow
 
 from vsacli.base.errors import InputError
 from vsacli.dynamics.link_torques import link_torques
@@ -253,7 +254,7 @@ def test_result_on_the_command_line(vsacli: Any, feasible_result: Path) -> None:
 
 
 @pytest.mark.parametrize("end_stiffness", [1275, 790], ids=["feasible", "infeasible"])
-@pytest.mark.parametrize("options", ["", "--deflections integrate", "--stop-on-infeasible"])
+@pytest.mark.parametrize("options", ["", slow("--deflections integrate"), "--stop-on-infeasible"])
 def test_a_result_ends_with_what_invdyn_printed(
     vsacli: Any, tmp_path: Path, end_stiffness: float, options: str
 ) -> None:

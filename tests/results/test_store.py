@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
+from samples.marks import slow
 from samples.results import REPORT, SOURCE, PlannedTrajectory, part, random_block, robot, write_result
 
 from vsacli.actuators.laws import LAWS
@@ -152,7 +153,7 @@ def test_floats_are_plain_and_flags_compressed(path):
         assert file["flags"].compression == "gzip"
 
 
-@pytest.mark.parametrize(("joints", "samples"), [(1, 100), (3, 4001), (7, 400_000), (1000, 5000)])
+@pytest.mark.parametrize(("joints", "samples"), [(1, 100), (3, 4001), slow(7, 400_000), slow(1000, 5000)])
 def test_chunks_hold_about_a_megabyte_or_less(tmp_path, joints, samples):
     path = tmp_path / "r.h5"
     with ResultWriter(path, robot("R" * joints), PlannedTrajectory(samples)) as writer:

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from samples.marks import slow
 from samples.remedies import (
     BASE,
     CUBIC,
@@ -97,7 +98,7 @@ def test_deflection_limit_lowers_the_stiffness_to_its_closed_bound():
 
 @pytest.mark.parametrize(
     ("motor", "duration"),
-    [({"max_torque": 60.0}, 1.0), ({"max_torque": 20.0}, 4.0), ({"max_torque": 180.0}, 0.55)],
+    [slow({"max_torque": 60.0}, 1.0), slow({"max_torque": 20.0}, 4.0), ({"max_torque": 180.0}, 0.55)],
 )
 def test_motor_limit_takes_the_way_that_is_shorter(motor, duration):
     robot, trajectory = changed(BASE, motor=motor), rest_to_rest(duration)

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from samples.marks import slow
 from samples.remedies import (
     BASE,
     CUBIC,
@@ -46,7 +47,7 @@ def test_fast_motion_of_the_paper_ends_at_its_threshold_duration():
     assert 0.5 * factor == pytest.approx(0.53557, abs=0.5 * STEP + 1e-5)
 
 
-@pytest.mark.parametrize("duration", [0.5, 0.4])
+@pytest.mark.parametrize("duration", [0.5, slow(0.4)])
 def test_slow_down_agrees_with_a_dense_scan(duration):
     robot = vsa_3r()
     factors = np.arange(1.0, 0.6 / duration, 0.002)
