@@ -48,7 +48,8 @@ def test_result_file_and_json_hold_the_drift(vsacli, motion, tmp_path):
 
 def test_existing_file_is_refused_before_the_integration(vsacli, motion, tmp_path, monkeypatch):
     monkeypatch.setattr(
-        "vsacli.dynamics.integrated_deflections.follow", lambda *_: pytest.fail("has begun to integrate")
+        "vsacli.dynamics.integrated_deflections.integrate_deflections",
+        lambda *_: pytest.fail("has begun to integrate"),
     )
     (tmp_path / "out.h5").write_text("mine")
     done = vsacli("invdyn", ROBOT, motion, "--deflections", "integrate", "-o", "out.h5")
@@ -58,7 +59,8 @@ def test_existing_file_is_refused_before_the_integration(vsacli, motion, tmp_pat
 
 def test_bad_threshold_is_refused_before_the_integration(vsacli, motion, monkeypatch):
     monkeypatch.setattr(
-        "vsacli.dynamics.integrated_deflections.follow", lambda *_: pytest.fail("has begun to integrate")
+        "vsacli.dynamics.integrated_deflections.integrate_deflections",
+        lambda *_: pytest.fail("has begun to integrate"),
     )
     done = vsacli("check-feasibility", ROBOT, motion, "--deflections", "integrate", "--near-singular", "2")
     assert done.code == 2

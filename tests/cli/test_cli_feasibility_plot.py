@@ -80,7 +80,7 @@ def test_ways_that_end_are_shaded(vsacli, motion, figures, monkeypatch):
         """As if the shoulder could be followed for 1 s only."""
         return replace(follow(robot, trajectory, 1e-8), stops=(None, Stop(1.0, "it is told to"), None))
 
-    monkeypatch.setattr("vsacli.dynamics.integrated_deflections.follow", short)
+    monkeypatch.setattr("vsacli.dynamics.integrated_deflections.integrate_deflections", short)
     vsacli("check-feasibility", ROBOT, motion, "--plot", "figures", "--deflections", "integrate")
     assert [shaded(axes) for axes in figures[0].axes] == [[], [(pytest.approx(0.995), 4.0)], []]
 
