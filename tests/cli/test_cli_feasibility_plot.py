@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from samples.command_line import ROBOT, SEVEN_JOINTS, contents, seven_joint_motion
 from samples.figures import rest_to_rest
 
-from vsacli.dynamics.integrated_deflections import Following, Stop, follow
+from vsacli.dynamics.integrated_deflections import IntegratedDeflections, Stop, integrate_deflections
 from vsacli.results.plots import FEASIBILITY_VARIABLES, plot_feasibility
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -76,9 +76,11 @@ def test_bad_stretches_are_those_of_the_report(vsacli, too_soft, figures):
 
 
 def test_ways_that_end_are_shaded(vsacli, motion, figures, monkeypatch):
-    def short(robot, trajectory) -> Following:
+    def short(robot, trajectory) -> IntegratedDeflections:
         """As if the shoulder could be followed for 1 s only."""
-        return replace(follow(robot, trajectory, 1e-8), stops=(None, Stop(1.0, "it is told to"), None))
+        return replace(
+            integrate_deflections(robot, trajectory, 1e-8), stops=(None, Stop(1.0, "it is told to"), None)
+        )
 
     monkeypatch.setattr("vsacli.dynamics.integrated_deflections.integrate_deflections", short)
     vsacli("check-feasibility", ROBOT, motion, "--plot", "figures", "--deflections", "integrate")
