@@ -20,8 +20,9 @@ from vsacli.files.info import bare, select
 from vsacli.files.info.extremes import free_range
 from vsacli.files.info.robot_info import describe_robot
 from vsacli.files.info.trajectory_info import describe_trajectory
-from vsacli.files.info.workspace import reach, reach_bound, static_load, tip_position
+from vsacli.files.info.workspace import reach, reach_bound, static_load
 from vsacli.robot.file import load_robot
+from vsacli.robot.kinematics import tip_position
 from vsacli.robot.model import Joint, Limits, Pose, Robot
 from vsacli.trajectory.file import load_trajectory
 

@@ -15,18 +15,15 @@ from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
 from vsacli.compute.engine import Engine, choose
 from vsacli.compute.vector import (
     ZERO,
-    Matrix,
     Scalar,
     SymmetricTensor,
     Vector,
-    add,
     exact,
-    mul,
-    sub,
     trigonometric,
 )
 from vsacli.dynamics.recursion import JointState, LinkConstants, TipLoad, recursion
-from vsacli.robot.model import Joint, Pose, Robot
+from vsacli.robot.kinematics import base_gravity, rotation_matrix
+from vsacli.robot.model import Joint, Robot
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -51,11 +48,6 @@ def link_constants(joint: Joint) -> LinkConstants:
     )
 
 
-def base_gravity(robot: Robot) -> Vector:
-    """Gravity acceleration in DH frame 0, m/s^2."""
-    return _rotation(robot.base).transposed().times(Vector(*map(exact, robot.gravity)))
-
-
 def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> TipLoad:
     """What the end effector exerts while the environment exerts a wrench on it.
 
@@ -65,25 +57,13 @@ def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> Ti
         wrench: the six components, their first and their second derivatives; scalars of any kind.
     """
     in_base = frame == "base"
-    rotation = _rotation(robot.base).transposed() if in_base else _rotation(robot.tool)
+    rotation = rotation_matrix(robot.base).transposed() if in_base else rotation_matrix(robot.tool)
     exerted = [(ZERO - Vector(*components[:3]), ZERO - Vector(*components[3:])) for components in wrench]
     return TipLoad(
         force=[rotation.times(force) for force, _ in exerted],
         moment=[rotation.times(moment) for _, moment in exerted],
         point=Vector(*map(exact, robot.tool.xyz)),
         in_base=in_base,
-    )
-
-
-def _rotation(pose: Pose) -> Matrix:
-    """Rz(yaw) Ry(pitch) Rx(roll), with exact zeros and ones at right angles."""
-    (cr, cp, cy), (sr, sp, sy) = (
-        [trigonometric(function, angle) for angle in pose.rpy] for function in (math.cos, math.sin)
-    )
-    return Matrix(
-        Vector(mul(cy, cp), sub(mul(mul(cy, sp), sr), mul(sy, cr)), add(mul(mul(cy, sp), cr), mul(sy, sr))),
-        Vector(mul(sy, cp), add(mul(mul(sy, sp), sr), mul(cy, cr)), sub(mul(mul(sy, sp), cr), mul(cy, sr))),
-        Vector(sub(0, sp), mul(cp, sr), mul(cp, cr)),
     )
 
 

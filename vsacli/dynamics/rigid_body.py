@@ -20,8 +20,9 @@ from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
 from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray
 from vsacli.compute.tracing.linear_solve import solve_positive_definite
 from vsacli.compute.vector import ZERO, Scalar, Vector
-from vsacli.dynamics.link_torques import base_gravity, joint_state, link_constants, tip_load
+from vsacli.dynamics.link_torques import joint_state, link_constants, tip_load
 from vsacli.dynamics.recursion import TipLoad, TorqueDerivatives, recursion
+from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Limits, Robot
 
 SMALLEST_PIVOT = 1e-12

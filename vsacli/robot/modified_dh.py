@@ -16,9 +16,11 @@ import math
 from itertools import pairwise
 
 from vsacli.compute.vector import Scalar, Vector, add, exact, mul, sub, trigonometric
+from vsacli.robot.kinematics import rotation_matrix
 from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Pose, Robot
 
-LAST = DenavitHartenberg(a=0, alpha=0)
+AFTER_LAST = DenavitHartenberg(a=0, alpha=0)
+"""In place of the row that would follow the last one: nothing moves its frame."""
 
 
 def as_standard(robot: Robot) -> Robot:
@@ -29,28 +31,25 @@ def as_standard(robot: Robot) -> Robot:
     Raises:
         InvalidRecordError: a number becomes too large.
     """
-    rows = (*(joint.dh for joint in robot.joints), LAST)
+    rows = (*(joint.dh for joint in robot.joints), AFTER_LAST)
     joints = (
-        _standard_joint(joint, row, following)
-        for joint, (row, following) in zip(robot.joints, pairwise(rows), strict=True)
+        _standard_joint(joint, row, next_row)
+        for joint, (row, next_row) in zip(robot.joints, pairwise(rows), strict=True)
     )
     return dataclasses.replace(robot, base=_moved(robot.base, rows[0]), joints=tuple(joints))
 
 
 def _moved(base: Pose, row: DenavitHartenberg) -> Pose:
     """The pose followed by Rx(alpha) Tx(a); the roll of a pose is turned about its own x axis, too."""
+    shift = rotation_matrix(base).times(Vector(exact(row.a), 0, 0))
+    x, y, z = (float(start + step) for start, step in zip(base.xyz, shift, strict=True))
     roll, pitch, yaw = base.rpy
-    (cp, cy), (sp, sy) = (
-        [trigonometric(function, angle) for angle in (pitch, yaw)] for function in (math.cos, math.sin)
-    )
-    along_x = Vector(mul(cy, cp), mul(sy, cp), sub(0, sp)) * exact(row.a)
-    x, y, z = (float(start + shift) for start, shift in zip(base.xyz, along_x, strict=True))
     return Pose(xyz=(x, y, z), rpy=(roll + row.alpha, pitch, yaw))
 
 
-def _standard_joint(joint: Joint, row: DenavitHartenberg, following: DenavitHartenberg) -> Joint:
-    dh = DenavitHartenberg(a=following.a, alpha=following.alpha, d=row.d, theta=row.theta)
-    return dataclasses.replace(joint, dh=dh, link=_moved_link(joint.link, following))
+def _standard_joint(joint: Joint, row: DenavitHartenberg, next_row: DenavitHartenberg) -> Joint:
+    dh = DenavitHartenberg(a=next_row.a, alpha=next_row.alpha, d=row.d, theta=row.theta)
+    return dataclasses.replace(joint, dh=dh, link=_moved_link(joint.link, next_row))
 
 
 def _moved_link(link: Link, row: DenavitHartenberg) -> Link:

@@ -85,7 +85,7 @@ def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Fra
     scale = float(max(abs(pose[:3, 3]).max() for pose in (*poses, tip)))
     return Frames(
         base=poses[0],
-        rows=tuple(_row(inverse(pose) @ following, scale) for pose, following in pairwise(poses)),
+        rows=tuple(_row(inverse(pose) @ next_pose, scale) for pose, next_pose in pairwise(poses)),
         poses=tuple(poses[1:]),
         tool=inverse(poses[-1]) @ tip,
         snaps=snaps,

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Joint, Pose, Robot
+from vsacli.robot.kinematics import frames
+from vsacli.robot.model import Pose, Robot
 from vsacli.robot.urdf.rigid_motion import cross_matrix, inverse, pose_matrix
 from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
 
@@ -68,23 +69,10 @@ def _motions(joint: ChainJoint, positions: FloatArray) -> FloatArray:
 
 
 def _robot_tips(robot: Robot, q: FloatArray) -> FloatArray:
-    poses = np.broadcast_to(_matrix(robot.base), (len(q), 4, 4))
-    for joint, positions in zip(robot.joints, q.T, strict=True):
-        poses = poses @ _rows(joint, positions)
-    result: FloatArray = poses @ _matrix(robot.tool)
-    return result
-
-
-def _rows(joint: Joint, positions: FloatArray) -> FloatArray:
-    """Rz(theta) Tz(d) Tx(a) Rx(alpha) at each position, (samples, 4, 4)."""
-    dh, zero = joint.dh, np.zeros(len(positions))
-    turn, slide = (positions, zero) if joint.is_revolute else (zero, positions)
-    about_z = np.tile(np.eye(4), (len(positions), 1, 1))
-    cosine, sine = np.cos(dh.theta + turn), np.sin(dh.theta + turn)
-    about_z[:, 0, 0] = about_z[:, 1, 1] = cosine
-    about_z[:, 1, 0], about_z[:, 0, 1] = sine, -sine
-    about_z[:, 2, 3] = dh.d + slide
-    result: FloatArray = about_z @ pose_matrix((dh.a, 0, 0), (dh.alpha, 0, 0))
+    *_, last = frames(robot, q)
+    poses = np.tile(np.eye(4), (len(q), 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = last.axes, last.origin
+    result: FloatArray = _matrix(robot.base) @ poses @ _matrix(robot.tool)
     return result
 
 
