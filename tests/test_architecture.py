@@ -234,3 +234,13 @@ def test_oracles_know_nothing_of_what_they_judge() -> None:
         if name.startswith("vsacli") and name not in known
     ]
     assert strays == []
+
+
+def test_test_files_share_what_lies_in_samples() -> None:
+    strays = [
+        f"{source}:{line}: {name}"
+        for source in sorted(TESTS.rglob("*.py"))
+        for name, line in imports(source)
+        if name.startswith("test_")
+    ]
+    assert strays == []

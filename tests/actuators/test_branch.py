@@ -7,7 +7,7 @@ import pytest
 from oracles.scalar_vsa import Curve, Side
 from samples.drives import Stopped
 from samples.marks import slow
-from test_springs import residuals
+from samples.springs import residuals, stiffness_under
 
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.pair import PairSolution
@@ -52,12 +52,6 @@ def dense_scan(springs: Springs, tau_e: float) -> float:
     # Steps smaller than rounding are none.
     rising = np.flatnonzero(np.diff(stiffness) > 4 * EPS * stiffness[1:])
     return float(stiffness[rising[0] if rising.size else -1])
-
-
-def stiffness_under(spring: Cubic, torque: FloatArray) -> FloatArray:
-    peak = np.sqrt(spring.k / (3 * spring.k_c))
-    x = 2 * np.sinh(np.arcsinh(1.5 * torque / (spring.k * peak)) / 3)
-    return spring.k * (1 + x * x)
 
 
 # The branch that is meant

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_springs import residuals
+from samples.springs import residuals
 
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.exponential import Exponential, ExponentialPair

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from samples.springs import SPRINGS, measured, on_side_2
-from test_branch import stiffness_under
+from samples.springs import SPRINGS, measured, on_side_2, stiffness_under
 
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from oracles.spring_scan import Curve, Springs
 from samples.drives import springs
-from samples.springs import SPRINGS, Spring, measured, on_side_2
-from test_springs import residuals
+from samples.springs import SPRINGS, Spring, measured, on_side_2, residuals
 
 from vsacli.actuators.antagonistic import solve_deflections
 from vsacli.actuators.laws import SpringLaw

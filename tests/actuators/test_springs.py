@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from samples.springs import residuals
 from scipy.optimize import brentq
 
-from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import AlikeCubics, Cubic
-from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.pairs.iterated import IteratedPair
 from vsacli.base.arrays import FloatArray
@@ -43,17 +42,6 @@ def lowest_stiffness(tau_e: FloatArray) -> FloatArray:
         return 2 * k + 6 * k_c * p**2
 
     return np.array([end(load) for load in np.abs(tau_e)])
-
-
-def residuals(
-    pair: tuple[SpringLaw, SpringLaw], found: PairSolution, tau_e: FloatArray, stiffness: FloatArray
-) -> float:
-    """Largest scaled residual of (14)."""
-    phi = (found.phi_1, found.phi_2)
-    tau_1, tau_2 = (law.torque(deflection) for law, deflection in zip(pair, phi, strict=True))
-    sigma_1, sigma_2 = (law.stiffness(deflection) for law, deflection in zip(pair, phi, strict=True))
-    torque = np.abs(tau_1 + tau_2 - tau_e) / (np.abs(tau_1) + np.abs(tau_2))
-    return float(np.max([torque, np.abs(sigma_1 + sigma_2 - stiffness) / stiffness]))
 
 
 # The law

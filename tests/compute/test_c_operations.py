@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from samples.generated_code import COMPILERS, Compiled, compile_c
 from samples.marks import slow
-from test_tracing import ELEMENTWISE, samples
-from test_tracing_control_flow import FUNCTIONS as NESTED
+from samples.recorded_functions import CONTROL_FLOW, ELEMENTWISE, operands
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.engine.kernel import record
@@ -45,12 +44,12 @@ class Everything:
     """All operations of two values, and all loops, branches and tables, as one kernel."""
 
     inputs = 2
-    outputs = len(ELEMENTWISE) + sum(len(np.atleast_2d(function(np.ones(1)))) for function in NESTED)
+    outputs = len(ELEMENTWISE) + sum(len(np.atleast_2d(function(np.ones(1)))) for function in CONTROL_FLOW)
 
     def __call__(self, rows: Sequence[Any]) -> list[Any]:
         x, y = rows
         values = [as_number(name, x, y) for name in ELEMENTWISE]
-        for function in NESTED:
+        for function in CONTROL_FLOW:
             results = function(x)
             values += results if isinstance(results, list) else [results]
         return values
@@ -83,7 +82,7 @@ def test_of_single_samples(tmp_path: Path) -> None:
         "void each_all(const each_values *values, each_results *results);\n"
     )
     (tmp_path / "each.c").write_text(source_text("each", [function], "double", "/* all */"))
-    x, y = samples()
+    x, y = operands()
     found, _ = Compiled(tmp_path, "each")(function, {"x": np.column_stack([x, y])})
     assert wrong(found["y"].T, x, y) == []
 
@@ -95,5 +94,5 @@ def test_of_lanes(compiler: str, processor: str, tmp_path: Path) -> None:
     machine = ["-std=gnu11", "-O1", "-fno-math-errno", "-fPIC", "-shared", f"-march={processor}"]
     compile_c(tmp_path, *machine, "lanes.c", "-o", "lanes.so", "-lm", compiler=compiler)
     library = Library(tmp_path / "lanes.so", Everything.outputs)
-    x, y = samples()
+    x, y = operands()
     assert wrong(library([x, y], 1), x, y) == []

@@ -9,67 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.listings import carry_out, recorded
+from samples.recorded_functions import ELEMENTWISE, NODES, SPECIAL, operands
 
-from vsacli.base.arrays import FloatArray
 from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray
-
-SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, 1e308, 1.0, -1.0]
-"""Where functions have their limits, poles, and ends."""
-
-NODES = np.array([-1.0, 0.0, 0.5, 2.0])
-HEIGHTS = np.array([7.0, -3.0, math.nan, math.inf, 4.0])
-
-
-def of_one(ufunc: np.ufunc) -> Callable[[Any, Any], Any]:
-    return lambda x, _y: ufunc(x)
-
-
-ELEMENTWISE: dict[str, Callable[[Any, Any], Any]] = {
-    **{
-        name: of_one(getattr(np, name))
-        for name in (
-            *("negative", "positive", "absolute", "fabs", "square", "reciprocal", "sqrt", "cbrt"),
-            *("exp", "expm1", "log", "log1p", "sin", "cos", "tan", "arcsin", "arccos", "arctan"),
-            *("sinh", "cosh", "tanh", "arcsinh", "isnan", "isfinite", "isinf"),
-        )
-    },
-    **{
-        name: getattr(np, name)
-        for name in (
-            *("add", "subtract", "multiply", "divide", "maximum", "minimum", "power", "arctan2"),
-            *("hypot", "copysign", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal"),
-        )
-    },
-    "operators": lambda x, y: 2 * x - y / 3 + (-x) * (1 - y) + 4 / x,
-    "small powers": lambda x, _y: x**2,
-    "and": lambda x, y: (x < y) & (y > 0),
-    "or": lambda x, y: (x < y) | np.isnan(y),
-    "not": lambda x, y: ~(x < y),
-    "logical functions": lambda x, y: np.logical_and(x < y, np.logical_not(np.isnan(y))),
-    "where": lambda x, y: np.where(x < y, x, 2.0),
-    "where of truths": lambda x, y: np.where(x < y, x < 0, np.isnan(y)),
-    "clip": lambda x, _y: np.clip(x, -0.5, 2.0),
-    "clip between values": lambda x, y: np.clip(x, y, 2 * y),
-    "search": lambda x, _y: np.searchsorted(NODES, x, side="right"),
-    "bits": lambda x, y: (x < y).astype(np.uint16) * np.uint16(4) | (y < 0).astype(np.uint16) * np.uint16(16),
-    "any": lambda x, y: np.logical_or.reduce(np.stack([x < y, y < 0])),
-    "hypot of NaN": lambda x, _y: np.hypot(x, np.nan),
-    "sign of NaN": lambda x, _y: np.copysign(x, np.nan),
-    "power of NaN": lambda x, _y: np.power(x, np.nan),
-}
-
-
-def samples() -> tuple[FloatArray, FloatArray]:
-    """Every pair of special values, and some random ones of any size."""
-    rng = np.random.default_rng(0)
-    x, y = (grid.ravel() for grid in np.meshgrid(SPECIAL, SPECIAL))
-    drawn = rng.normal(size=(2, 200)) * 10.0 ** rng.integers(-3, 4, (2, 200))
-    return np.concatenate([x, drawn[0]]), np.concatenate([y, drawn[1]])
 
 
 @pytest.mark.parametrize("name", ELEMENTWISE)
 def test_functions_mean_what_they_mean_in_numpy(name: str) -> None:
-    function, (x, y) = ELEMENTWISE[name], samples()
+    function, (x, y) = ELEMENTWISE[name], operands()
     (found,) = carry_out(recorded(function, 2), [x, y])
     with np.errstate(all="ignore"):
         expected = function(x, y)
@@ -92,7 +39,7 @@ def test_a_constant_beside_a_value_is_simplified_only_if_the_result_is_the_same(
         sides = [ufunc(x, constant) for constant in SPECIAL], [ufunc(constant, x) for constant in SPECIAL]
         return [result for side in sides for result in side]
 
-    x, _ = samples()
+    x, _ = operands()
     with np.errstate(all="ignore"):
         expected = with_constants(x)
     for found, right in zip(carry_out(recorded(with_constants, 1), [x]), expected, strict=True):
@@ -102,7 +49,7 @@ def test_a_constant_beside_a_value_is_simplified_only_if_the_result_is_the_same(
 @pytest.mark.parametrize("ufunc", BINARY, ids=lambda ufunc: ufunc.__name__)
 def test_the_order_of_operands_counts(ufunc: np.ufunc) -> None:
     """An operation that was recorded is taken for another only if it is the same."""
-    x, y = samples()
+    x, y = operands()
     found = carry_out(recorded(lambda x, y: [ufunc(x, y), ufunc(y, x)], 2), [x, y])
     with np.errstate(all="ignore"):
         np.testing.assert_array_equal(found, [ufunc(x, y), ufunc(y, x)])
@@ -111,7 +58,7 @@ def test_the_order_of_operands_counts(ufunc: np.ufunc) -> None:
 @pytest.mark.parametrize(("exponent", "units"), [(3, 2), (4, 2), (1.5, 2)])
 def test_powers_by_products_are_off_by_rounding_alone(exponent: float, units: int) -> None:
     """Each product or root rounds by half a unit in the last place, NumPy's power by one."""
-    x = np.abs(samples()[0][len(SPECIAL) ** 2 :])
+    x = np.abs(operands()[0][len(SPECIAL) ** 2 :])
     (found,) = carry_out(recorded(lambda x: x**exponent, 1), [x])
     np.testing.assert_array_max_ulp(found, x**exponent, units)
 

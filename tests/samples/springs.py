@@ -9,6 +9,7 @@ from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.exponential import Exponential
 from vsacli.actuators.laws.four_bar import FourBar
+from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.laws.quadratic import Quadratic
 from vsacli.actuators.laws.sinh import Sinh
@@ -73,3 +74,21 @@ def on_side_2(spring: Spring) -> Spring:
     """The spring as it acts on side 2."""
     law, curve = spring
     return law.as_second(), scan.turned(curve) if law.pulls_only else curve
+
+
+def residuals(
+    pair: tuple[SpringLaw, SpringLaw], found: PairSolution, tau_e: FloatArray, stiffness: FloatArray
+) -> float:
+    """Largest scaled residual of (14)."""
+    phi = (found.phi_1, found.phi_2)
+    tau_1, tau_2 = (law.torque(deflection) for law, deflection in zip(pair, phi, strict=True))
+    sigma_1, sigma_2 = (law.stiffness(deflection) for law, deflection in zip(pair, phi, strict=True))
+    torque = np.abs(tau_1 + tau_2 - tau_e) / (np.abs(tau_1) + np.abs(tau_2))
+    return float(np.max([torque, np.abs(sigma_1 + sigma_2 - stiffness) / stiffness]))
+
+
+def stiffness_under(spring: Cubic, torque: FloatArray) -> FloatArray:
+    """Stiffness of a cubic spring that carries a torque, by the formula for roots of cubics."""
+    peak = np.sqrt(spring.k / (3 * spring.k_c))
+    x = 2 * np.sinh(np.arcsinh(1.5 * torque / (spring.k * peak)) / 3)
+    return spring.k * (1 + x * x)
