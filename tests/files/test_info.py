@@ -14,9 +14,7 @@ import pytest
 from samples.command_line import REPOSITORY, ROBOT, rest_to_rest
 from samples.marks import slow
 
-from vsacli.base.errors import InputError
 from vsacli.dynamics.link_torques import link_torques
-from vsacli.files.info import bare, select
 from vsacli.files.info.extremes import free_range
 from vsacli.files.info.robot_info import describe_robot
 from vsacli.files.info.trajectory_info import describe_trajectory
@@ -181,30 +179,6 @@ def test_ranges_go_over_all_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     assert describe_trajectory(trajectory, ARM.joint_names) == whole
 
 
-def test_select() -> None:
-    content = {"joints": [{"name": "a", "x": 1.5}, {"name": "b", "x": None}], "n": "text"}
-    assert select(content, "joints.1.x") is None
-    assert select(content, "joints.a.x") == select(content, "joints.0.x") == 1.5
-    assert (bare("text"), bare(1.5), bare(None), bare([1])) == ("text", "1.5", "null", "[1]")
-
-
-@pytest.mark.parametrize(
-    ("path", "message"),
-    [
-        ("joint", "--field: there is no 'joint'; did you mean 'joints'?"),
-        ("joints.2", "--field: joints has no '2'; valid: a, b, 0, 1"),
-        ("joints.0.y", "--field: joints.0 has no 'y'; valid: name, x"),
-        ("n.0", "--field: n has no '0'; it is a single value"),
-        ("", "--field: there is no ''; valid: joints, n"),
-    ],
-)
-def test_a_path_that_leads_nowhere(path: str, message: str) -> None:
-    content = {"joints": [{"name": "a", "x": 1.5}, {"name": "b", "x": None}], "n": "text"}
-    with pytest.raises(InputError) as caught:
-        select(content, path)
-    assert str(caught.value) == message
-
-
 def test_robot_on_the_command_line(vsacli: Any) -> None:
     done = vsacli("info", ROBOT)
     assert (done.code, done.err) == (0, "")
@@ -217,6 +191,15 @@ def test_robot_on_the_command_line(vsacli: Any) -> None:
     assert described["joints"][2]["link"]["mass"] == 5.0894
     assert described["joints"][0]["stiffness_range"]["unloaded"] == [800, None]
     assert vsacli("info", ROBOT, "--field", "joints.elbow.link.mass").out == "5.0894\n"
+    assert vsacli("info", ROBOT, "--field", "joints.elbow.name").out == "elbow\n"
+    assert vsacli("info", ROBOT, "--field", "joints.*.name").out == '["base", "shoulder", "elbow"]\n'
+    assert vsacli("info", ROBOT, "--field", "joints.1.stiffness_range.unloaded.1").out == "null\n"
+
+
+def test_a_field_that_is_not_there(vsacli: Any) -> None:
+    done = vsacli("info", ROBOT, "--field", "joint")
+    assert (done.code, done.out) == (2, "")
+    assert "--field: there is no 'joint'; did you mean 'joints'?" in done.err
 
 
 def test_trajectory_on_the_command_line(vsacli: Any) -> None:

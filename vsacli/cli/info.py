@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import click
 
+from vsacli.base.errors import InputError
 from vsacli.cli.options import example
 
 
@@ -20,7 +22,8 @@ from vsacli.cli.options import example
 @click.option(
     "--field",
     metavar="PATH",
-    help="Print one value of the JSON, e.g. reach.found; entries of lists by number, from 0, or by name.",
+    help="Print one value of the JSON, e.g. reach.found; entries of lists by number, from 0, by name, "
+    "or all by *.",
 )
 def info(file: str, robot: str | None, as_json: bool, field: str | None) -> None:
     """Show what a FILE holds: a robot, a trajectory, a result or a simulation.
@@ -29,10 +32,21 @@ def info(file: str, robot: str | None, as_json: bool, field: str | None) -> None
     trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report.
     """
     from vsacli.base.json_values import finite
-    from vsacli.files.info import bare, describe_file, render, select
+    from vsacli.files.info import describe_file, render
 
     description = describe_file(file, robot)
     if field is not None:
-        click.echo(bare(select(finite(description), field)))
+        click.echo(_found(finite(description), field))
     else:
         click.echo(json.dumps(finite(description), indent=1) if as_json else render(description))
+
+
+def _found(content: Any, field: str) -> str:
+    """The value at a path as a script wants it: texts without quotes, everything else as JSON."""
+    from vsacli.documents.paths import find
+
+    try:
+        value = find(content, field)
+    except InputError as error:
+        raise InputError.one(f"--field: {error}") from None
+    return value if isinstance(value, str) else json.dumps(value)

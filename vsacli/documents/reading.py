@@ -29,6 +29,8 @@ from vsacli.documents.source import Source, read_source
 from vsacli.documents.values import INVALID, Scope, all_valid, read_value, unexpected
 from vsacli.documents.yaml_tree import parse_yaml
 
+__all__ = ["read_document", "read_value", "survey_document"]
+
 _Document = TypeVar("_Document")
 
 

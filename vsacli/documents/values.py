@@ -53,6 +53,10 @@ class Scope(NamedTuple):
         """Unit of a quantity here; an unknown variant is a problem of its own and must not make others."""
         return quantity.unit(self.variant or "revolute")
 
+    def of_member(self, name: str) -> Scope:
+        """The scope of the value of one joint; the same if none is called so."""
+        return self._replace(variant=self.members.get(name, self.variant))
+
     def inside(self, cls: type, node: tree.Mapping) -> Scope:
         """The scope of the values in a record."""
         key, variant = getattr(cls, "unit_variant_with", (None, None))

@@ -1,7 +1,6 @@
 """What a file holds, as JSON values and as text."""
 
 from vsacli.files.info.describe import describe_file
-from vsacli.files.info.selection import bare, select
 from vsacli.files.info.text import render
 
-__all__ = ["bare", "describe_file", "render", "select"]
+__all__ = ["describe_file", "render"]

@@ -1,0 +1,218 @@
+"""Paths into files: what they lead to in plain data, and another value there in a declared record."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from typing import Any
+
+import pytest
+from samples.command_line import REPOSITORY
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.base.errors import InputError
+from vsacli.documents.paths import find, replace
+from vsacli.robot.file import load_robot
+from vsacli.robot.model import Robot
+from vsacli.trajectory.declared.via_points import PositionVia
+
+ROBOT = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")
+CONTENT = {
+    "joints": [{"name": "a", "x": 1.5}, {"name": "b", "x": None}],
+    "n": "text",
+    "row": [[1, 2], [3, 4]],
+}
+
+
+@pytest.mark.parametrize(
+    ("path", "found"),
+    [
+        ("joints.1.x", None),
+        ("joints.a.x", 1.5),
+        ("joints.0.x", 1.5),
+        ("joints.*.name", ["a", "b"]),
+        ("row.*.1", [2, 4]),
+        ("row.*.*", [[1, 2], [3, 4]]),
+        ("n", "text"),
+    ],
+)
+def test_find(path: str, found: Any) -> None:
+    assert find(CONTENT, path) == found
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("joint", "there is no 'joint'; did you mean 'joints'?"),
+        ("joints.2", "joints has no '2'; valid: a, b, 0, 1"),
+        ("joints.0.y", "joints.0 has no 'y'; valid: name, x"),
+        ("joints.*.nam", "joints.0 has no 'nam'; did you mean 'name'?"),
+        ("n.0", "n has no '0'; it is a single value"),
+        ("n.*", "n has no '*'; it is a single value"),
+        ("*", "there is no '*'; valid: joints, n, row"),
+        ("", "there is no ''; valid: joints, n, row"),
+    ],
+)
+def test_a_path_that_leads_nowhere(path: str, message: str) -> None:
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        find(CONTENT, path)
+
+
+def springs(robot: Robot, joint: int = 2) -> tuple[Any, Any]:
+    actuator = robot.joints[joint].actuator
+    assert isinstance(actuator, Antagonistic)
+    return actuator.spring
+
+
+def with_springs(first: Cubic, second: Cubic) -> Robot:
+    *others, elbow = ROBOT.joints
+    elbow = dataclasses.replace(elbow, actuator=dataclasses.replace(elbow.actuator, spring=(first, second)))
+    return dataclasses.replace(ROBOT, joints=(*others, elbow))
+
+
+@pytest.mark.parametrize("path", ["joints.elbow.actuator.spring.k", "joints.2.actuator.spring.*.k"])
+def test_sides_that_are_the_same_change_together_and_stay_one(path: str) -> None:
+    first, second = springs(replace(ROBOT, path, 500))
+    assert first is second
+    assert first == dataclasses.replace(springs(ROBOT)[0], k=500)
+    assert springs(ROBOT)[0].k != 500
+
+
+def test_one_side() -> None:
+    first, second = springs(replace(ROBOT, "joints.elbow.actuator.spring.1.k", 500))
+    assert (first, second.k) == (springs(ROBOT)[0], 500)
+
+
+DIFFERENT = (Cubic(k=400, k_c=2000), Cubic(k=300, k_c=2000))
+LIMITED = (Cubic(k=400, k_c=2000), Cubic(k=400, k_c=2000, max_deflection=0.5))
+
+
+@pytest.mark.parametrize("sides", [DIFFERENT, LIMITED], ids=["constant", "limit"])
+def test_sides_that_differ_change_only_if_it_is_said_which(sides: tuple[Cubic, Cubic]) -> None:
+    robot = with_springs(*sides)
+    both = replace(robot, "joints.elbow.actuator.spring.*.k", 500)
+    assert [spring.k for spring in springs(both)] == [500, 500]
+    assert [spring.max_deflection for spring in springs(both)] == [spring.max_deflection for spring in sides]
+    message = (
+        "joints.elbow.actuator.spring: its two sides differ; say which by 0, 1 or *, as in "
+        "joints.elbow.actuator.spring.0.k"
+    )
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        replace(robot, "joints.elbow.actuator.spring.k", 500)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "content"),
+    [
+        ("name", "other", "other"),
+        ("name", "on", "on"),
+        ("gravity", [0, 0, "-9.81/2"], (0, 0, -4.905)),
+        ("gravity.2", -1.62, (0, 0, -1.62)),
+        ("gravity.*", 0, (0, 0, 0)),
+        ("base", {"xyz": [0, 0, 1]}, dataclasses.replace(ROBOT.base, xyz=(0, 0, 1))),
+        ("base.rpy.0", "90 deg", dataclasses.replace(ROBOT.base, rpy=(math.pi / 2, 0, 0))),
+    ],
+)
+def test_values_are_what_a_file_could_hold(path: str, value: Any, content: Any) -> None:
+    changed = replace(ROBOT, path, value)
+    attribute = path.partition(".")[0]
+    assert getattr(changed, attribute) == content
+    assert changed == dataclasses.replace(ROBOT, **{attribute: content})
+    assert changed.sources == ROBOT.sources
+
+
+def test_all_joints() -> None:
+    changed = replace(ROBOT, "joints.*.limits.position", "90 deg")
+    assert [joint.limits.position for joint in changed.joints] == [(-math.pi / 2, math.pi / 2)] * 3
+    changed = replace(changed, "joints.shoulder.limits.position.1", 3)
+    assert changed.joints[1].limits.position == (-math.pi / 2, 3)
+
+
+def test_units_follow_the_joint_and_the_gear() -> None:
+    robot = load_robot(REPOSITORY / "robots" / "rp_2.yaml")
+    names = {joint.type: joint.name for joint in robot.joints}
+    assert replace(robot, f"joints.{names['revolute']}.limits.position.1", "90 deg")
+    message = f"joints.{names['prismatic']}.limits.position.1: expected a number in m, found '90 deg'"
+    with pytest.raises(InputError, match=f"^{re.escape(message)}"):
+        replace(robot, f"joints.{names['prismatic']}.limits.position.1", "90 deg")
+
+
+def test_a_variant_is_replaced_as_a_whole() -> None:
+    changed = replace(ROBOT, "joints.elbow.actuator.spring", {"type": "cubic", "k": 100, "k_c": 200})
+    assert springs(changed) == (Cubic(k=100, k_c=200),) * 2
+
+
+MOVE = PositionVia(degree=9, points=((0.0, 0.0), (1.0, 1.0), (2.0, 0.0)), times=(0.0, 1.0, 2.0))
+MEMBERS = {"left": "revolute", "right": "prismatic"}
+
+
+def test_values_per_joint() -> None:
+    assert replace(MOVE, "points.1.left", "180 deg", MEMBERS).points == ((0, 0), (math.pi, 1), (2, 0))
+    assert replace(MOVE, "points.*.right", 3, MEMBERS).points == ((0, 3), (1, 3), (2, 3))
+    assert replace(MOVE, "points.0", {"left": 7, "right": 8}, MEMBERS).points[0] == (7, 8)
+    assert replace(MOVE, "times.2", 4).times == (0, 1, 4)
+    with pytest.raises(InputError, match=r"^points\.1\.right: expected a number in m, found '180 deg'"):
+        replace(MOVE, "points.1.right", "180 deg", MEMBERS)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        ("joint", 1, "there is no 'joint'; did you mean 'joints'?"),
+        ("joints.elbw.damping", 1, "joints has no 'elbw'; did you mean 'elbow'?"),
+        ("joints.3", 1, "joints has no '3'; valid: base, shoulder, elbow, 0, 1, 2"),
+        ("joints.elbow.link.mas", 1, "joints.elbow.link has no 'mas'; did you mean 'mass'?"),
+        ("joints.elbow.link.mass.0", 1, "joints.elbow.link.mass has no '0'; it is a single value"),
+        ("gravity.z", 1, "gravity has no 'z'; valid: 0, 1, 2"),
+        (
+            "joints.elbow.actuator.spring.kc",
+            1,
+            "joints.elbow.actuator.spring has no 'kc'; did you mean 'k_c'?",
+        ),
+        (
+            "joints.elbow.actuator.type",
+            "rigid",
+            "joints.elbow.actuator.type: decides which keys stand beside it; "
+            "replace joints.elbow.actuator as a whole",
+        ),
+        ("joints.elbow.link.mass", -1, "joints.elbow.link.mass: must be zero or positive, not -1"),
+        ("joints.elbow.link.mass", "x", "joints.elbow.link.mass: expected a number in kg, found 'x'"),
+        ("joints.elbow.link.mass", None, "joints.elbow.link.mass: expected a number in kg, found nothing"),
+        ("joints.elbow.link.mass", True, "joints.elbow.link.mass: expected a number in kg, found 'True'"),
+        ("joints.elbow.link.mass", math.inf, "joints.elbow.link.mass: expected a number in kg, found 'inf'"),
+        ("joints.elbow.name", "a b", "joints.elbow.name: must be made of letters"),
+        ("joints.elbow.name", "base", "joints.2.name: 'base' is taken by another entry; each needs its own"),
+        ("joints.0.actuator.preload", "up", "joints.0.actuator.preload: unknown word 'up'; valid: positive"),
+        (
+            "joints.0.actuator.spring",
+            {"type": "cubic", "k": 1, "kc": 2},
+            "joints.0.actuator.spring: unknown key 'kc'; did you mean 'k_c'?",
+        ),
+        (
+            "joints.0.actuator.spring.*.k_c",
+            0,
+            "joints.0.actuator.spring.k_c: must be positive, not 0",
+        ),
+        (
+            "joints.0.limits.position",
+            [1, -1],
+            "joints.0.limits.position: the lower bound 1 exceeds",
+        ),
+        ("joints.*.link.inertia.xy", 9, "joints.0.link.inertia: the tensor has the negative eigenvalue"),
+    ],
+)
+def test_what_cannot_be_replaced(path: str, value: Any, message: str) -> None:
+    with pytest.raises(InputError, match=f"^{re.escape(message)}"):
+        replace(ROBOT, path, value)
+
+
+def test_nothing_is_found_in_what_is_not_there() -> None:
+    with pytest.raises(InputError, match=r"^there is nothing at times; replace it as a whole$"):
+        replace(dataclasses.replace(MOVE, times=None), "times.1", 1)
+
+
+def test_every_problem_of_a_value_is_told() -> None:
+    with pytest.raises(InputError, match=r"(?s)^joints\.0\.link: com: expected.*joints\.0\.link: mass: must"):
+        replace(ROBOT, "joints.0.link", {"mass": -1, "com": [1, 2], "inertia": {"xx": 1, "yy": 1, "zz": 1}})

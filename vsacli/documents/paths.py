@@ -1,0 +1,225 @@
+"""Paths into files, such as `joints.elbow.actuator.spring.k`: what they lead to, and another value there.
+
+The words of a path are keys of mappings. An entry of a list goes by its index, from 0, or by the name that it
+has, and `*` stands for all entries.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple, TypeVar
+
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError, InvalidRecordError, Problem
+from vsacli.documents import tree
+from vsacli.documents.fields import (
+    Interval,
+    Items,
+    Kind,
+    Number,
+    OneOf,
+    Pair,
+    PerJoint,
+    Record,
+    Vector,
+    declared,
+)
+from vsacli.documents.problems import Problems
+from vsacli.documents.reading import read_value
+from vsacli.documents.values import Scope
+
+ALL = "*"
+SIDES = ("0", "1")
+
+_Record = TypeVar("_Record")
+
+
+def find(content: Any, path: str) -> Any:
+    """What a path leads to in plain data; a list of what is found where `*` is a word of the path.
+
+    Args:
+        content: mappings, lists, numbers and texts, as of JSON.
+        path: e.g. `joints.0.link.mass`, `joints.elbow.link.mass` or `joints.*.link.mass`.
+
+    Raises:
+        InputError: naming the first word that leads nowhere, and the nearest one that does.
+    """
+    return _found(content, path.split("."), ())
+
+
+def _found(content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    if not words:
+        return content
+    word, *rest = words
+    if word == ALL and isinstance(content, list):
+        return [_found(entry, rest, (*place, str(index))) for index, entry in enumerate(content)]
+    entries = _entries(content)
+    if word not in entries:
+        raise _nowhere(word, entries, place)
+    return _found(entries[word], rest, (*place, word))
+
+
+def _entries(content: Any) -> dict[str, Any]:
+    match content:
+        case Mapping():
+            return dict(content)
+        case list():
+            names = [str(entry.get("name", "")) if isinstance(entry, Mapping) else "" for entry in content]
+            return {word: content[index] for word, index in _indices(names).items()}
+    return {}
+
+
+def _indices(names: Iterable[str]) -> dict[str, int]:
+    """Index of each entry of a list by the words for it: its name, if that is not empty, and the index."""
+    numbered = list(enumerate(names))
+    named = {name: index for index, name in numbered if name}
+    return named | {str(index): index for index, _ in numbered}
+
+
+def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputError:
+    """The error of a word that is none of those there are at a place."""
+    words = list(there)
+    where = f"{_joined(place)} has" if place else "there is"
+    hint = did_you_mean(word, words) if words else "; it is a single value"
+    return InputError.one(f"{where} no {word!r}{hint}")
+
+
+def _joined(place: Iterable[str]) -> str:
+    return ".".join(place)
+
+
+def replace(record: _Record, path: str, value: Any, members: Mapping[str, str] | None = None) -> _Record:
+    """A record of declared fields with another value at a path; the given record stays as it is.
+
+    This is all that a method `Robot.replace(path, value)` has to call, with itself as the record:
+    `replace(robot, "joints.elbow.actuator.spring.k", 500)`. Of a pair of sides that are the same, a path
+    without side changes both; if they differ, it needs 0, 1 or `*`. Every record on the way is built anew,
+    and so checks itself.
+
+    Args:
+        record: a robot, for example; its undeclared fields, such as the sources of a robot, are kept.
+        path: to a declared field, or to an entry of its list.
+        value: what a file could hold there: a number, a text such as `90 deg`, a list or a mapping of those.
+        members: name and unit variant of every joint, where the document has PerJoint values.
+
+    Raises:
+        InputError: the path leads nowhere, saying what there is instead; or the value cannot stand there,
+            with every problem and the path to it.
+    """
+    scope = Scope(Problems(""), members or {}, {})
+    found: _Record = _Replacement(_node(value), scope).in_record(record, path.split("."), ())
+    return found
+
+
+def _node(value: Any) -> tree.Node:
+    """A value as if it had been read from a file; texts as if in quotes."""
+    match value:
+        case str():
+            return tree.Scalar(0, value, plain=False)
+        case Mapping():
+            entries = {str(key): _node(entry) for key, entry in value.items()}
+            return tree.Mapping(0, entries, dict.fromkeys(entries, 0))
+        case Iterable():
+            return tree.Sequence(0, tuple(map(_node, value)))
+    return tree.Scalar(0, "" if value is None else str(value), plain=True)
+
+
+class _Replacement(NamedTuple):
+    """What is to stand somewhere in a record, and what its meaning depends on there.
+
+    Methods return what they are given with this in it. The words lead on from there, the place is the way
+    that was gone, for messages.
+    """
+
+    node: tree.Node
+    scope: Scope
+
+    def in_record(self, record: Any, words: list[str], place: tuple[str, ...]) -> Any:
+        """A record with the value in it."""
+        word, *rest = words
+        fields = declared(type(record))
+        if word not in fields:
+            raise _nowhere(word, fields, place)
+        kind = fields[word][0].kind
+        inside = self._replace(scope=self.scope.inside(type(record), _written(record)))
+        content = inside.in_value(kind, getattr(record, word), rest, (*place, word))
+        try:
+            return dataclasses.replace(record, **{word: content})
+        except InvalidRecordError as error:
+            problems = [str(problem.inside(*place)) for problem in error.fields]
+            raise InputError(Problem("", 0, message) for message in problems) from None
+
+    def in_value(self, kind: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+        """A value of a kind with this in it, or this in its place."""
+        if not words:
+            return self._read(kind, place)
+        if content is None:
+            raise InputError.one(f"there is nothing at {_joined(place)}; replace it as a whole")
+        match kind:
+            case OneOf() if words == ["type"]:
+                reason = f"decides which keys stand beside it; replace {_joined(place)} as a whole"
+                raise InputError.one(f"{_joined(place)}.type: {reason}")
+            case Record() | OneOf():
+                return self.in_record(content, words, place)
+            case Pair(item):
+                return self._in_pair(item, content, words, place)
+            case Items(item):
+                names = [getattr(entry, "name", "") for entry in content]
+                return self._in_list(item, names, content, words, place)
+            case Vector(unit=unit) | Interval(unit=unit):
+                return self._in_list(Number(unit), [""] * len(content), content, words, place)
+            case PerJoint(unit):
+                return self._in_list(Number(unit), list(self.scope.members), content, words, place)
+        raise _nowhere(words[0], (), place)
+
+    def _read(self, kind: Kind, place: tuple[str, ...]) -> Any:
+        label, problems = _joined(place), Problems("")
+        content = read_value(kind, self.node, label, self.scope._replace(problems=problems))
+        try:
+            problems.check()
+        except InputError as error:
+            messages = [found.message.removeprefix(f"{label}: ") for found in error.problems]
+            raise InputError(Problem("", 0, f"{label}: {message}") for message in messages) from None
+        return content
+
+    def _in_pair(self, item: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+        """Both sides of a joint; where they are the same they stay one."""
+        word, *rest = words
+        if word not in SIDES and _same(*content):
+            both = self.in_value(item, content[0], rest if word == ALL else words, place)
+            return both, both
+        if word not in (*SIDES, ALL):
+            choices = f"0, 1 or {ALL}, as in {_joined((*place, '0', *words))}"
+            raise InputError.one(f"{_joined(place)}: its two sides differ; say which by {choices}")
+        return self._in_list(item, ["", ""], content, words, place)
+
+    def _in_list(
+        self, item: Kind, names: list[str], content: Any, words: list[str], place: tuple[str, ...]
+    ) -> Any:
+        """The entry of a list that a word names, or all of them."""
+        word, *rest = words
+        indices = _indices(names)
+        if word != ALL and word not in indices:
+            raise _nowhere(word, indices, place)
+        entries = list(content)
+        for index in range(len(entries)) if word == ALL else [indices[word]]:
+            inside = self._replace(scope=self.scope.of_member(names[index]))
+            entries[index] = inside.in_value(
+                item, content[index], rest, (*place, str(index) if word == ALL else word)
+            )
+        return tuple(entries)
+
+
+def _written(record: Any) -> tree.Mapping:
+    """What a file would say in the fields of a record that are texts or numbers."""
+    contents = {name: getattr(record, name) for name in declared(type(record))}
+    simple = {name: _node(entry) for name, entry in contents.items() if isinstance(entry, str | int | float)}
+    return tree.Mapping(0, simple, dict.fromkeys(simple, 0))
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two records are the same in every declared field, also those that do not count as equality."""
+    if type(one) is not type(other):
+        return False
+    return one is other or all(getattr(one, name) == getattr(other, name) for name in declared(type(one)))
