@@ -8,8 +8,8 @@ import re
 
 import pytest
 
-from vsacli.analysis import report_text
-from vsacli.analysis.report import COUNTED, JointReport, Report, Worst
+from vsacli.analysis.joint_report import COUNTED, JointReport, Worst
+from vsacli.analysis.report import Report
 from vsacli.analysis.report_text import sentences
 from vsacli.analysis.self_check import SelfCheck
 from vsacli.dynamics.energy import JointEnergy
@@ -38,9 +38,9 @@ QUIET = JointReport(
 
 def render(found: Report) -> str:
     """The text of a report, and of what a file would make of it."""
-    text = report_text.render(found)
+    text = str(found)
     again = Report.from_json(json.loads(json.dumps(found.as_json(), allow_nan=False)))
-    assert report_text.render(again) == text
+    assert str(again) == text
     return text
 
 

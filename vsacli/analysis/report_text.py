@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
-from vsacli.analysis.report import JointDrift, JointReport, Report, Worst
-from vsacli.analysis.self_check import LADDER_BOUND
+from vsacli.analysis.joint_report import JointDrift, JointReport, Worst
+from vsacli.analysis.self_check import LADDER_BOUND, SelfCheck
 from vsacli.base.flags import Flag
 from vsacli.base.units import POSITION, TORQUE
 from vsacli.dynamics.energy import JointEnergy
@@ -30,23 +30,6 @@ TROUBLE = ("infeasible", "singular", "over_limit")
 """Kinds that make the verdict worse than ok."""
 
 
-def render(report: Report) -> str:
-    """The report as lines of text, without a final newline."""
-    return "\n".join(
-        [
-            _headline(report),
-            *_table(report),
-            *warnings_and_notes(report.warnings, report.notes),
-            *(sentence for joint in report.joints for sentence in sentences(joint)),
-            *_stops(report),
-            *_start(report),
-            *energy_lines([(joint.name, joint.type, joint.energy) for joint in report.joints]),
-            *_drift(report),
-            _self_check(report),
-        ]
-    )
-
-
 def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
     """A line each, marked as what it is."""
     yield from (f"warning: {warning}" for warning in warnings)
@@ -59,25 +42,21 @@ def sentences(joint: JointReport) -> Iterator[str]:
         yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, worst)}"
 
 
-def _headline(report: Report) -> str:
-    left = f"{report.robot}, {report.trajectory}: {_count(report.samples)}, {report.duration:g} s"
-    if not report.complete:
-        left += " planned, stopped early"
-    return f"{left:<{WIDTH - 32}} {_verdict(report):>31}".rstrip()
-
-
-def _verdict(report: Report) -> str:
-    verdict = report.verdict
+def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
+    """What was run at the left, the verdict in capitals at the right."""
     words = verdict.upper().replace("_", " ")
-    concerned = sum(1 for joint in report.joints if joint.steps.get(verdict))
-    return f"{words} ({concerned} of {len(report.joints)} joints)" if verdict in TROUBLE else words
+    if verdict in TROUBLE:
+        concerned = sum(1 for joint in joints if joint.steps.get(verdict))
+        words = f"{words} ({concerned} of {len(joints)} joints)"
+    return f"{left:<{WIDTH - 32}} {words:>31}".rstrip()
 
 
-def _table(report: Report) -> Iterator[str]:
+def joint_table(joints: Iterable[JointReport]) -> Iterator[str]:
+    """Peaks, stiffness, and what of it can be reached."""
     rows: list[tuple[str, ...]] = [
         ("joint", "peak tau_e", "peak motor 1 / 2", "stiffness", "reachable", "margin")
     ]
-    return aligned(rows + [_row(joint) for joint in report.joints])
+    return aligned(rows + [_row(joint) for joint in joints])
 
 
 def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
@@ -155,18 +134,19 @@ def _time(time: float) -> str:
     return f"{time:.3f} s" if abs(time - round(time, 3)) < 5e-7 else f"{time:.6f} s"
 
 
-def _count(steps: int) -> str:
+def count(steps: int) -> str:
+    """Steps by number."""
     return f"{steps} step" if steps == 1 else f"{steps} steps"
 
 
 def _steps(joint: JointReport, kind: str) -> str:
-    count = joint.steps[kind]
-    return _count(count) if count == 1 else f"{_count(count)}, from {_time(joint.first_time[kind])}"
+    found = joint.steps[kind]
+    return count(found) if found == 1 else f"{count(found)}, from {_time(joint.first_time[kind])}"
 
 
 def _infeasible(joint: JointReport, worst: Worst) -> str:
     steps = _steps(joint, "infeasible")
-    slack = f"; a tendon goes slack at {_count(joint.steps['slack'])}" if joint.steps["slack"] else ""
+    slack = f"; a tendon goes slack at {count(joint.steps['slack'])}" if joint.steps["slack"] else ""
     preload = "; the opposite preload would reach it" if joint.other_preload else ""
     hints = f"({steps}){slack}{preload}"
     if math.isnan(worst.bound):
@@ -213,9 +193,10 @@ def _limit(joint: JointReport, worst: Worst) -> str:
 _SENTENCES = {"infeasible": _infeasible, "singular": _singular, "near_singular": _near_singular}
 
 
-def _start(report: Report) -> Iterator[str]:
-    yield _by_joint("start motors at: ", [_start_of(joint) for joint in report.joints])
-    steps = [(max(_of_motors(joint, joint.torque_step)), joint) for joint in report.joints]
+def start(joints: Sequence[JointReport]) -> Iterator[str]:
+    """Where the motors stand at the first step, and the largest step of a torque there."""
+    yield _by_joint("start motors at: ", [_start_of(joint) for joint in joints])
+    steps = [(max(_of_motors(joint, joint.torque_step)), joint) for joint in joints]
     defined = [entry for entry in steps if not math.isnan(entry[0])]
     if defined:
         step, joint = max(defined, key=lambda entry: entry[0])
@@ -247,18 +228,20 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
         yield f"co-contraction: up to {effort} rms for each motor ({name}), its load takes {load}"
 
 
-def _stops(report: Report) -> Iterator[str]:
-    infeasible = {joint.name: joint.steps["infeasible"] for joint in report.joints}
-    for drift in report.drifts:
+def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterator[str]:
+    """From when on deflections could not be followed."""
+    infeasible = {joint.name: joint.steps["infeasible"] for joint in joints}
+    for drift in drifts:
         if drift.stop is not None:
             time, reason = _time(drift.stop.time), drift.stop.reason
-            steps = f"infeasible: {_count(infeasible[drift.joint])}"
+            steps = f"infeasible: {count(infeasible[drift.joint])}"
             yield f"{drift.joint}: its deflections cannot be followed beyond t = {time}: {reason} ({steps})"
 
 
-def _drift(report: Report) -> Iterator[str]:
-    if report.drifts:
-        yield _by_joint("drift of the integration: ", [_drift_of(drift) for drift in report.drifts])
+def drift_lines(drifts: Sequence[JointDrift]) -> Iterator[str]:
+    """How far the deflections that were followed drifted, if they were."""
+    if drifts:
+        yield _by_joint("drift of the integration: ", [_drift_of(drift) for drift in drifts])
 
 
 def _drift_of(drift: JointDrift) -> str:
@@ -276,8 +259,8 @@ def _by_joint(label: str, entries: Sequence[str]) -> str:
     return label + (",\n" + " " * len(label)).join(lines)
 
 
-def _self_check(report: Report) -> str:
-    check = report.self_check
+def self_check_line(check: SelfCheck) -> str:
+    """Whether the self-check passed, and by how much."""
     if check.passed:
         return f"self-check passed ({check.ladder:.1g}, bound {LADDER_BOUND:.0e})"
     return (

@@ -11,7 +11,7 @@ import numpy as np
 from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do, solve_deflections
 from vsacli.actuators.reach import TOUCHING, excess, has, margin
 from vsacli.actuators.rigid import Rigid
-from vsacli.analysis.report import COUNTED, JointDrift, JointReport, Worst
+from vsacli.analysis.joint_report import COUNTED, JointDrift, JointReport, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy

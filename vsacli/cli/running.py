@@ -92,12 +92,10 @@ def described(result: StoredResult) -> str:
 
 def show_report(report: Report, as_json: bool, suggestions: Suggestions | None = None) -> Exit:
     """Print the report, and suggestions if there are; the exit code says what the report says."""
-    from vsacli.analysis.report_text import render
-
     if as_json:
         extra = {} if suggestions is None else {"suggestions": suggestions.as_json()}
         click.echo(json.dumps({**report.as_json(), **extra}, indent=1))
     else:
         extra_lines = [] if suggestions is None else suggestions.lines()
-        click.echo("\n".join([render(report), *extra_lines]))
+        click.echo("\n".join([str(report), *extra_lines]))
     return OF_VERDICT[report.verdict]

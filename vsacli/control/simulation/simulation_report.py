@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from vsacli.actuators.reach import excess, has
-from vsacli.analysis.report import VERDICTS, Worst
+from vsacli.analysis.joint_report import Worst
+from vsacli.analysis.report import VERDICTS
 from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_values import JsonObject, finite, number, pair

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from vsacli.analysis.report import Worst
+from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.report_text import QUANTITY_OF_LIMIT, WIDTH, aligned, energy_lines, warnings_and_notes
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
 from vsacli.control.simulation.simulation_report import JointTracking, SimulationReport

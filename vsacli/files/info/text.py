@@ -128,7 +128,7 @@ def _report(kind: str, report: Description) -> str:
     try:
         if kind == "simulation":
             return simulation_text.render(SimulationReport.from_json(report))
-        return report_text.render(Report.from_json(report))
+        return str(Report.from_json(report))
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError):
         return "its report has another form than this version writes; --json shows it"
 
