@@ -18,9 +18,9 @@ from samples.springs import SPRINGS, Spring, measured, on_side_2, residuals
 from vsacli.actuators.antagonistic import solve_deflections
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.pairs import make_pair, search
-from vsacli.actuators.reach import TOUCHING, has, margin, reach_flags
+from vsacli.actuators.reach import TOUCHING, margin, reach_flags
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, has
 
 DRAWS = 400
 """Points on the two curves for each pair; about half of them lie on the branch."""

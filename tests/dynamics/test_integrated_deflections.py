@@ -18,11 +18,11 @@ from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.exponential import Exponential
 from vsacli.actuators.motor import Motor
-from vsacli.actuators.reach import TOUCHING, has
+from vsacli.actuators.reach import TOUCHING
 from vsacli.analysis.result import Result
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, has
 from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.dynamics.integrated_deflections.task import REASONS, SINGULAR, STALLED, UNREACHABLE, Task
 from vsacli.robot.model import Robot

@@ -18,10 +18,9 @@ from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.laws.quadratic import Quadratic
 from vsacli.actuators.laws.sinh import Sinh
-from vsacli.actuators.reach import has
 from vsacli.analysis.result import Result
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, has
 from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
 from vsacli.trajectory.curves import POSITION, RestToRest
 from vsacli.trajectory.trajectory import Trajectory

@@ -11,16 +11,13 @@ import numpy as np
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, marked
 
 TOUCHING = 1e-9
 """Relative margin that counts as zero: deflections are good to about 1e-16/margin, so to 1e-7 at this one."""
 
 NEAR_SINGULAR = 0.01
 """Relative margin to a critical point below which a step is near-singular; the paper's runs keep 3 %."""
-
-LIMIT_ROUNDING = 1e-9
-"""Relative excess over a limit that is none, so that a motion may run along its limit."""
 
 
 def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
@@ -52,7 +49,7 @@ class Reach(NamedTuple):
     def flags(self) -> FlagArray:
         """The bits of the same names."""
         bits = (Flag.INFEASIBLE, Flag.SLACK, Flag.SINGULAR, Flag.NEAR_SINGULAR)
-        first, *others = (_bit(flag, where) for flag, where in zip(bits, self, strict=True))
+        first, *others = (marked(flag, where) for flag, where in zip(bits, self, strict=True))
         return reduce(operator.or_, others, first)
 
 
@@ -75,40 +72,3 @@ def reach_flags(
 ) -> FlagArray:
     """Bits INFEASIBLE, SLACK, SINGULAR and NEAR_SINGULAR of the steps of a joint, (samples,)."""
     return reach(stiffness, solution, near_singular).flags
-
-
-class LimitCheck(NamedTuple):
-    """A finite limit of a joint: which result variable must stay in which range.
-
-    Attributes:
-        flag: the bit that says it does not.
-        variable: name of the variable.
-        motor: 1 or 2 if the variable is one of a motor, else None.
-        range: lower and upper bound.
-    """
-
-    flag: Flag
-    variable: str
-    motor: int | None
-    range: tuple[float, float]
-
-
-def excess(values: FloatArray, bounds: tuple[float, float]) -> FloatArray:
-    """How far values lie outside [lower, upper]; zero or negative inside, NaN for NaN."""
-    return np.maximum(bounds[0] - values, values - bounds[1])
-
-
-def limit_flags(check: LimitCheck, values: FloatArray) -> FlagArray:
-    """The bit of a limit where the values leave its range by more than rounding; NaN does not."""
-    largest = max(abs(bound) for bound in check.range if np.isfinite(bound))
-    return _bit(check.flag, excess(values, check.range) > LIMIT_ROUNDING * largest)
-
-
-def has(flags: FlagArray, bits: Flag) -> BoolArray:
-    """Where any of the bits is set."""
-    hit: BoolArray = (flags & np.uint16(bits)) != 0
-    return hit
-
-
-def _bit(flag: Flag, where: BoolArray) -> FlagArray:
-    return where.astype(np.uint16) * np.uint16(flag)

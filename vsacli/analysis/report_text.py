@@ -17,15 +17,6 @@ JOINTS_PER_LINE = 3
 HUGE = 1e8
 """Torque or stiffness shown with an exponent, as next to a singular step."""
 
-QUANTITY_OF_LIMIT = {
-    Flag.POSITION_LIMIT.label: "position",
-    Flag.VELOCITY_LIMIT.label: "velocity",
-    Flag.STIFFNESS_LIMIT.label: "stiffness",
-    Flag.DEFLECTION_LIMIT.label: "deflection of spring",
-    Flag.MOTOR_VELOCITY_LIMIT.label: "joint-side velocity of motor",
-    Flag.MOTOR_TORQUE_LIMIT.label: "joint-side torque of motor",
-}
-
 TROUBLE = ("infeasible", "singular", "over_limit")
 """Kinds that make the verdict worse than ok."""
 
@@ -178,9 +169,7 @@ def _near_singular(joint: JointReport, worst: Worst) -> str:
 
 
 def _limit(joint: JointReport, worst: Worst) -> str:
-    whose = QUANTITY_OF_LIMIT[worst.kind]
-    if worst.motor is not None:
-        whose += f" {worst.motor}"
+    whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     value, bound = _apart(worst.value, worst.bound)
     relation = "below" if worst.value < worst.bound else "above"
     first = joint.first_time[worst.kind]

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular, has
+from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, has
 from vsacli.base.variables import Block
 from vsacli.compute.engine import choose
 from vsacli.dynamics.energy import RunEnergy

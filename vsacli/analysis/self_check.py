@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES, motors_and_springs
-from vsacli.actuators.reach import has, margin
+from vsacli.actuators.reach import margin
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, has
 from vsacli.base.variables import Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.inverse import compute_block

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do, solve_deflections
-from vsacli.actuators.reach import TOUCHING, excess, has, margin
+from vsacli.actuators.reach import TOUCHING, margin
 from vsacli.actuators.rigid import Rigid
 from vsacli.analysis.joint_report import COUNTED, JointDrift, JointReport, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.flags import has
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.limits import limit_checks
@@ -129,19 +130,15 @@ class JointSummary:
                 self._keep(-gap[step], Worst(kind, float(block.time[step]), value, bound, unit))
 
     def _record_limits(self, flags: FlagArray, block: Block) -> None:
+        values = block.of_joint(self._index)
         for check in limit_checks(self._joint):
-            values = getattr(block, check.variable)[:, self._index]
-            values = values if check.motor is None else values[:, check.motor - 1]
-            over = np.nan_to_num(excess(values, check.range), nan=-np.inf)
-            hit = has(flags, check.flag) & (over > 0)
-            for step in _worst_step(hit, over):
-                label = check.flag.label
-                value, (lower, upper) = float(values[step]), check.range
-                bound = lower if value < lower else upper
-                unit = VARIABLES[check.variable].quantity.unit(self._joint.type)
-                first = float(block.time[hit.argmax()])
+            excess, label = check.worst(values, flags), check.flag.label
+            if excess is not None:
+                first, time = float(block.time[excess.first]), float(block.time[excess.step])
                 self._first_time[label] = min(first, self._first_time.get(label, first))  # either motor
-                self._keep(over[step], Worst(label, float(block.time[step]), value, bound, unit, check.motor))
+                unit = check.unit(self._joint.type)
+                worst = Worst(label, time, excess.value, excess.bound, unit, check.motor)
+                self._keep(excess.size, worst)
 
     def _torque_step(self, block: Block) -> FloatArray:
         """Of motors behind springs, whose torques do not jump."""

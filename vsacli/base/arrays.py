@@ -7,6 +7,7 @@ runs along the samples of one joint.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,3 +36,8 @@ def by_joint(array: ArrayLike) -> FloatArray:
 def evenly(length: int, count: int) -> IndexArray:
     """At most `count` indices of `length`, evenly chosen, both ends included."""
     return np.linspace(0, length - 1, min(length, count)).round().astype(np.intp)
+
+
+def of_joint(arrays: Mapping[str, AnyArray], index: int) -> dict[str, AnyArray]:
+    """Views of one joint, (samples,) or (2, samples), of arrays (samples, joints) or (samples, joints, 2)."""
+    return {name: array[:, index].T for name, array in arrays.items()}

@@ -3,52 +3,74 @@
 from __future__ import annotations
 
 import enum
+from functools import reduce
+from operator import or_
+from typing import Self
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FlagArray
 
 
 class Flag(enum.IntFlag):
-    """Bits of the variable `flags`; each meaning is a sentence that fits after "this step is"/"has"."""
+    """Bits of the variable `flags`, each with its meaning and, if it marks a limit, what that bounds.
 
-    INFEASIBLE = 1
-    SINGULAR = 2
-    NEAR_SINGULAR = 4
-    SLACK = 8
-    DEFLECTION_LIMIT = 16
-    MOTOR_TORQUE_LIMIT = 32
-    MOTOR_VELOCITY_LIMIT = 64
-    POSITION_LIMIT = 128
-    VELOCITY_LIMIT = 256
-    STIFFNESS_LIMIT = 512
+    Attributes:
+        meaning: what the bit says, for people: a sentence that fits after "this step is"/"has".
+        quantity: what is beyond the limit, followed by the number of the motor if it is one of a motor; None
+            if the bit does not mean "over a limit".
+    """
+
+    meaning: str
+    quantity: str | None
+
+    INFEASIBLE = 1, "the stiffness cannot be reached while the joint carries its elastic torque", None
+    SINGULAR = (
+        2,
+        "the decoupling matrix is singular: deflection rates and motor torques are undefined",
+        None,
+    )
+    NEAR_SINGULAR = 4, "the relative margin to a singular decoupling matrix is below the threshold", None
+    SLACK = 8, "a tendon that can only pull would have to push", None
+    DEFLECTION_LIMIT = 16, "a transmission is deflected beyond its max_deflection", "deflection of spring"
+    MOTOR_TORQUE_LIMIT = 32, "a motor torque exceeds max_torque", "joint-side torque of motor"
+    MOTOR_VELOCITY_LIMIT = 64, "a motor velocity exceeds max_velocity", "joint-side velocity of motor"
+    POSITION_LIMIT = 128, "the commanded position leaves the joint's range", "position"
+    VELOCITY_LIMIT = 256, "the commanded velocity exceeds the joint's limit", "velocity"
+    STIFFNESS_LIMIT = 512, "the commanded stiffness leaves the joint's allowed range", "stiffness"
+
+    def __new__(cls, bit: int, meaning: str, quantity: str | None) -> Self:
+        """A bit with all that is said of it, none of which can be left out."""
+        flag = int.__new__(cls, bit)
+        flag._value_ = bit
+        flag.meaning, flag.quantity = meaning, quantity
+        return flag
 
     @property
     def label(self) -> str:
         """Lower-case name, as in `flag_meanings` and the report."""
         return str(self.name).lower()
 
-    @property
-    def meaning(self) -> str:
-        """What the bit says, for people."""
-        return _MEANING[self]
+    def quantity_of(self, motor: int | None) -> str:
+        """What is beyond the limit, of motor 1 or 2 if it is one of a motor."""
+        return f"{self.quantity}" if motor is None else f"{self.quantity} {motor}"
+
+    @classmethod
+    def labelled(cls, label: str) -> Flag:
+        """The bit of a label."""
+        return cls[label.upper()]
 
 
-_MEANING = {
-    Flag.INFEASIBLE: "the stiffness cannot be reached while the joint carries its elastic torque",
-    Flag.SINGULAR: "the decoupling matrix is singular: deflection rates and motor torques are undefined",
-    Flag.NEAR_SINGULAR: "the relative margin to a singular decoupling matrix is below the threshold",
-    Flag.SLACK: "a tendon that can only pull would have to push",
-    Flag.DEFLECTION_LIMIT: "a transmission is deflected beyond its max_deflection",
-    Flag.MOTOR_TORQUE_LIMIT: "a motor torque exceeds max_torque",
-    Flag.MOTOR_VELOCITY_LIMIT: "a motor velocity exceeds max_velocity",
-    Flag.POSITION_LIMIT: "the commanded position leaves the joint's range",
-    Flag.VELOCITY_LIMIT: "the commanded velocity exceeds the joint's limit",
-    Flag.STIFFNESS_LIMIT: "the commanded stiffness leaves the joint's allowed range",
-}
-
-LIMITS = (
-    Flag.DEFLECTION_LIMIT
-    | Flag.MOTOR_TORQUE_LIMIT
-    | Flag.MOTOR_VELOCITY_LIMIT
-    | Flag.POSITION_LIMIT
-    | Flag.VELOCITY_LIMIT
-    | Flag.STIFFNESS_LIMIT
-)
+LIMITS = reduce(or_, (flag for flag in Flag if flag.quantity is not None))
 """The bits that mean "over a limit"."""
+
+
+def has(flags: FlagArray, bits: Flag) -> BoolArray:
+    """Where any of the bits is set."""
+    hit: BoolArray = (flags & np.uint16(bits)) != 0
+    return hit
+
+
+def marked(flag: Flag, where: BoolArray) -> FlagArray:
+    """The bit where it shall be set, else 0."""
+    return where.astype(np.uint16) * np.uint16(flag)

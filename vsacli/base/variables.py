@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from vsacli.base import units
-from vsacli.base.arrays import AnyArray, FlagArray, FloatArray
+from vsacli.base.arrays import AnyArray, FlagArray, FloatArray, of_joint
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.units import Quantity
@@ -157,6 +157,12 @@ class Block:
     flags: FlagArray = _of_joint(
         units.DIMENSIONLESS, "what is wrong with this step of the joint", "margins of (14)"
     )
+
+    def of_joint(self, index: int) -> dict[str, AnyArray]:
+        """The variables of one joint by name, (samples,), those of its motors (2, samples)."""
+        joints = (name for name, variable in VARIABLES.items() if "joint" in variable.dims)
+        there = {name: array for name in joints if (array := getattr(self, name)) is not None}
+        return of_joint(there, index)
 
     def arrays(self) -> dict[str, AnyArray]:
         """The variables there are, by name."""

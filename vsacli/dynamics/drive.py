@@ -11,11 +11,11 @@ from vsacli.actuators import antagonistic, elastic, rigid
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.drivetrain import SIDES, motors_and_springs
 from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.reach import NEAR_SINGULAR, limit_flags
+from vsacli.actuators.reach import NEAR_SINGULAR
 from vsacli.actuators.rigid import Rigid
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import FlagArray, FloatArray
-from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Joint
 
 
@@ -73,7 +73,9 @@ def drive(
         tau_motor=tau_motor,
         motor_power=tau_motor * dtheta,
     )
-    return driven._replace(flags=driven.flags | _limit_flags(joint, command, driven))
+    of_joint = {**command._asdict(), **driven._asdict()}
+    exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
+    return driven._replace(flags=driven.flags | exceeded)
 
 
 def _transmit(
@@ -91,12 +93,3 @@ def _transmit(
 def _by_motor(values: list[float]) -> FloatArray:
     """(2, 1), NaN for a motor there is not."""
     return np.array([*values, *[math.nan] * (SIDES - len(values))])[:, None]
-
-
-def _limit_flags(joint: Joint, command: Command, driven: Drive) -> FlagArray:
-    values = {**command._asdict(), **driven._asdict()}
-    flags = np.zeros_like(driven.flags)
-    for check in limit_checks(joint):
-        of_joint = values[check.variable]
-        flags = flags | limit_flags(check, of_joint if check.motor is None else of_joint[check.motor - 1])
-    return flags

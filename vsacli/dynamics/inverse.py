@@ -11,7 +11,8 @@ import numpy as np
 
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.reach import NEAR_SINGULAR, LimitCheck
+from vsacli.actuators.limit_check import LimitCheck
+from vsacli.actuators.reach import NEAR_SINGULAR
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError

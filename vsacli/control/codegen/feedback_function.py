@@ -8,15 +8,14 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.reach import limit_flags
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, marked
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.control.codegen.robot_functions import command_structure, variable_array
 from vsacli.control.feedback_linearization import control_law, position_order
 from vsacli.control.gains import STIFFNESS_ORDER, Gains
 from vsacli.control.linear_control import Integral
 from vsacli.dynamics.forward import Plant
-from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
@@ -125,15 +124,9 @@ class _Law:
 
     def _flags(self, index: int, values: Arrays) -> Any:
         """What is wrong with a joint: no torque, or a limit that state or torque break."""
-        joint = self._robot.joints[index]
-        flags = np.isnan(values["tau_motor"][index, 0]).astype(np.uint16) * np.uint16(Flag.SINGULAR)
-        for check in limit_checks(joint):
-            if check.variable in values:
-                of_joint = values[check.variable][index]
-                flags = flags | limit_flags(
-                    check, of_joint if check.motor is None else of_joint[check.motor - 1]
-                )
-        return flags
+        flags = marked(Flag.SINGULAR, np.isnan(values["tau_motor"][index, 0]))
+        of_joint = {name: array[index] for name, array in values.items()}
+        return limit_flags(self._robot.joints[index], of_joint, flags)
 
 
 def _state_arrays(robot: Robot) -> tuple[Array, ...]:

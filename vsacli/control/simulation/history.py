@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.actuators.reach import limit_flags
-from vsacli.base.arrays import FlagArray, FloatArray
+from vsacli.base.arrays import FlagArray, FloatArray, of_joint
 from vsacli.base.simulation_variables import COMMANDED, ERRORS, actual, error
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.integrator import Course
-from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot
 
 
@@ -120,10 +119,7 @@ def _flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -
     """Limits exceeded by what was, or was asked of the motors; at the last step, what ended the run."""
     flags = np.zeros(values["q"].shape, dtype=np.uint16)
     for index, joint in enumerate(robot.joints):
-        for check in limit_checks(joint):
-            of_joint = values[check.variable][:, index]
-            found = of_joint if check.motor is None else of_joint[:, check.motor - 1]
-            flags[:, index] |= limit_flags(check, found)
+        flags[:, index] = limit_flags(joint, of_joint(values, index), flags[:, index])
     if ending is not None and ending.joint is not None and ending.flag is not None:
         flags[-1, ending.joint] |= np.uint16(ending.flag)
     return flags

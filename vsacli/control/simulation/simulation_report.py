@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.reach import excess, has
 from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.report import VERDICTS
-from vsacli.base.arrays import FloatArray, by_joint
-from vsacli.base.flags import LIMITS, Flag
+from vsacli.base.arrays import FloatArray, by_joint, of_joint
+from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.json_values import JsonObject, finite, number, pair
-from vsacli.base.simulation_variables import SIMULATION_VARIABLES, actual
+from vsacli.base.simulation_variables import actual
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
 from vsacli.dynamics.limits import limit_checks
@@ -143,25 +142,26 @@ def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
     """The worst excess of each limit of a joint; of either motor."""
     worst: dict[str, Worst] = {}
     most: dict[str, float] = {}
-    for check in limit_checks(joint):
-        name = check.variable if check.variable == "tau_motor" else actual(check.variable)
-        values = getattr(history, name)[:, index]
-        values = values if check.motor is None else values[:, check.motor - 1]
-        hit = has(history.flags[:, index], check.flag)
-        over = np.where(hit, np.nan_to_num(excess(values, check.range), nan=-np.inf), -np.inf)
-        step, label = int(over.argmax()), check.flag.label
-        if over[step] > most.get(label, 0.0):
-            value, (lower, upper) = float(values[step]), check.range
-            bound = lower if value < lower else upper
-            unit = SIMULATION_VARIABLES[name].quantity.unit(joint.type)
-            worst[label] = Worst(label, float(history.time[step]), value, bound, unit, check.motor)
-            most[label] = float(over[step])
+    checks = limit_checks(joint)
+    names = {check.variable: _checked(check.variable) for check in checks}
+    values = of_joint({variable: getattr(history, name) for variable, name in names.items()}, index)
+    for check in checks:
+        excess, label = check.worst(values, history.flags[:, index]), check.flag.label
+        if excess is not None and excess.size > most.get(label, 0.0):
+            time, unit = float(history.time[excess.step]), check.unit(joint.type)
+            worst[label] = Worst(label, time, excess.value, excess.bound, unit, check.motor)
+            most[label] = excess.size
     return worst
+
+
+def _checked(variable: str) -> str:
+    """Where the values lie that a limit bounds: of the torque what is asked for, else what was."""
+    return variable if variable == "tau_motor" else actual(variable)
 
 
 def verdict_on(history: History, *, complete: bool) -> str:
     """The worst of `VERDICTS` that a flag of any step speaks for, or "diverged" if none explains the end."""
-    flags = Flag(int(np.bitwise_or.reduce(history.flags, axis=None)))
+    flags = int(np.bitwise_or.reduce(history.flags, axis=None))
     applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
     worst = next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
     return worst if complete or worst not in ("ok", "over_limit") else "diverged"

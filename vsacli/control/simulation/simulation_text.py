@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator
 
 from vsacli.analysis.joint_report import Worst
-from vsacli.analysis.report_text import QUANTITY_OF_LIMIT, WIDTH, aligned, energy_lines, warnings_and_notes
+from vsacli.analysis.report_text import WIDTH, aligned, energy_lines, warnings_and_notes
+from vsacli.base.flags import Flag
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
 from vsacli.control.simulation.simulation_report import JointTracking, SimulationReport
 
@@ -56,7 +57,7 @@ def _number(value: float) -> str:
 
 
 def _limit(joint: JointTracking, worst: Worst) -> str:
-    whose = QUANTITY_OF_LIMIT[worst.kind] + ("" if worst.motor is None else f" {worst.motor}")
+    whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     relation = "below" if worst.value < worst.bound else "above"
     return (
         f"{joint.name}: {whose} is {worst.value:.6g} {worst.unit} at t = {worst.time:.3f} s, "

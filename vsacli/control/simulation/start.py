@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.actuators.reach import has
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, has
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot

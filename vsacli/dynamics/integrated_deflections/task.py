@@ -14,10 +14,10 @@ from vsacli.actuators.antagonistic import (
     deflection_rates,
     solve_deflections,
 )
-from vsacli.actuators.reach import has, reach_flags
+from vsacli.actuators.reach import reach_flags
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, has
 from vsacli.dynamics.inverse import command_of, elastic_torques
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from vsacli.actuators.reach import LimitCheck, excess, has, limit_flags, margin
+from vsacli.actuators.limit_check import Excess, LimitCheck, OfJoint
+from vsacli.actuators.reach import margin
 from vsacli.actuators.transmission import Command
-from vsacli.analysis.report_text import QUANTITY_OF_LIMIT
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import VsacliError
-from vsacli.base.flags import LIMITS, Flag
+from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.units import STIFFNESS
-from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.inverse import command_of, compute_block, elastic_torques, usual_block
 from vsacli.dynamics.limits import limit_checks
@@ -102,15 +101,11 @@ def path_reason(joint: Joint, time: FloatArray, command: Command) -> str:
     return _limit_reason(joint, time, {"q": command.q, "dq": command.dq})
 
 
-def _limit_reason(joint: Joint, time: FloatArray, computed: Mapping[str, FloatArray]) -> str:
+def _limit_reason(joint: Joint, time: FloatArray, computed: OfJoint) -> str:
     """The first kind of limit that is exceeded, of those on variables that were computed."""
     for check in limit_checks(joint):
-        if check.variable in computed:
-            rows = computed[check.variable]
-            values = rows if check.motor is None else rows[check.motor - 1]
-            if limit_flags(check, values).any():
-                step = int(np.nanargmax(excess(values, check.range)))
-                return _limit_text(joint, time[step], check, values[step])
+        if check.variable in computed and (excess := check.worst(computed, check.flags(computed))):
+            return _limit_text(joint, time[excess.step], check, excess)
     return ""
 
 
@@ -128,14 +123,11 @@ def _corridor_reason(joint: Joint, time: float, asked: float, low: float, high: 
     return f"{joint.name} needs {side} {stiffness_text(joint, bound)} {when} and is asked for {asked:.6g}"
 
 
-def _limit_text(joint: Joint, time: float, check: LimitCheck, value: float) -> str:
+def _limit_text(joint: Joint, time: float, check: LimitCheck, excess: Excess) -> str:
     """A step that exceeds a limit."""
-    quantity = QUANTITY_OF_LIMIT[check.flag.label]
-    whose = quantity if check.motor is None else f"{quantity} {check.motor}"
-    unit = VARIABLES[check.variable].quantity.unit(joint.type)
-    side, bound = ("below", check.range[0]) if value < check.range[0] else ("above", check.range[1])
-    asked = f"{value:.6g} {unit} at t = {time:.3f} s"
-    return f"the {whose} of {joint.name}, {asked}, is {side} its limit {bound:g}"
+    whose, side = check.flag.quantity_of(check.motor), "below" if excess.value < excess.bound else "above"
+    asked = f"{excess.value:.6g} {check.unit(joint.type)} at t = {time:.3f} s"
+    return f"the {whose} of {joint.name}, {asked}, is {side} its limit {excess.bound:g}"
 
 
 class Candidates(Protocol):

@@ -1,0 +1,86 @@
+"""One finite limit of a joint: what it bounds, where it is exceeded, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import AnyArray, FlagArray, FloatArray
+from vsacli.base.flags import Flag, has, marked
+from vsacli.base.variables import VARIABLES
+
+LIMIT_ROUNDING = 1e-9
+"""Relative excess over a limit that is none, so that a motion may run along its limit."""
+
+OfJoint = Mapping[str, AnyArray]
+"""Variables of one joint by name, (samples,), those of its motors (2, samples)."""
+
+
+class Excess(NamedTuple):
+    """Where a limit is exceeded most.
+
+    Attributes:
+        first: index of the first step beyond the limit.
+        step: index of the worst one.
+        value: of the variable there.
+        bound: the end of the range that it is beyond.
+        size: how far.
+    """
+
+    first: int
+    step: int
+    value: float
+    bound: float
+    size: float
+
+
+class LimitCheck(NamedTuple):
+    """A finite limit of a joint: which result variable must stay in which range.
+
+    Attributes:
+        flag: the bit that says it does not.
+        variable: name of the variable.
+        motor: 1 or 2 if the variable is one of a motor, else None.
+        range: lower and upper bound.
+    """
+
+    flag: Flag
+    variable: str
+    motor: int | None
+    range: tuple[float, float]
+
+    def unit(self, joint_type: str) -> str:
+        """Unit of the variable at a joint of this type."""
+        return VARIABLES[self.variable].quantity.unit(joint_type)
+
+    def values(self, of_joint: OfJoint) -> FloatArray:
+        """What is bounded, (samples,), out of the variables of the joint."""
+        rows = of_joint[self.variable]
+        return rows if self.motor is None else rows[self.motor - 1]
+
+    def flags(self, of_joint: OfJoint) -> FlagArray:
+        """The bit where the range is left by more than rounding; NaN does not leave it."""
+        largest = max(abs(bound) for bound in self.range if np.isfinite(bound))
+        return marked(self.flag, self._outside(self.values(of_joint)) > LIMIT_ROUNDING * largest)
+
+    def worst(self, of_joint: OfJoint, flags: FlagArray) -> Excess | None:
+        """The worst of the steps that have the bit among these flags, (samples,); None if there is none."""
+        values = self.values(of_joint)
+        outside = np.nan_to_num(self._outside(values), nan=-np.inf)
+        hit = has(flags, self.flag) & (outside > 0)
+        if not hit.any():
+            return None
+        step = int(np.where(hit, outside, -np.inf).argmax())
+        value, (lower, upper) = float(values[step]), self.range
+        return Excess(int(hit.argmax()), step, value, lower if value < lower else upper, float(outside[step]))
+
+    def _outside(self, values: FloatArray) -> FloatArray:
+        """How far values lie outside the range; zero or negative inside, NaN for NaN."""
+        return np.maximum(self.range[0] - values, values - self.range[1])
+
+
+def within(bound: float) -> tuple[float, float]:
+    """The range of a quantity whose size is bounded."""
+    return -bound, bound
