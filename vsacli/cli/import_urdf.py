@@ -90,14 +90,14 @@ def import_urdf(
     Prints the rows, what was left out or changed, and how far the kinematics stray from the URDF's. A URDF
     says nothing about motors and springs: these are placeholders, marked in the file.
     """
-    from vsacli.base.atomic_files import check_target
-    from vsacli.robot.urdf import Placeholders, convert, render, write_robot
+    from vsacli.base.atomic_files import check_target, write_text
+    from vsacli.robot.urdf import Placeholders, convert, render, robot_text
 
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
     refuse_input_as_output(path, [urdf])
     placeholders = Placeholders(actuator, motor_inertia, stiffness, spring)
     check_target(path, overwrite=overwrite)
     conversion = convert(urdf, base, tip, placeholders, snap)
-    write_robot(conversion, path, overwrite=overwrite)
+    write_text(path, robot_text(conversion), overwrite=overwrite)
     click.echo(render(conversion))
     talk.note(f"wrote {path}")

@@ -1,8 +1,6 @@
 """From URDF files: a serial chain as a robot file with standard Denavit-Hartenberg rows."""
 
-from vsacli.robot.urdf.conversion import Conversion, convert
-from vsacli.robot.urdf.conversion_text import render
-from vsacli.robot.urdf.drives import Placeholders
-from vsacli.robot.urdf.robot_text import robot_text, write_robot
+from vsacli.robot.urdf.conversion import Conversion, Placeholders, convert
+from vsacli.robot.urdf.conversion_text import render, robot_text
 
-__all__ = ["Conversion", "Placeholders", "convert", "render", "robot_text", "write_robot"]
+__all__ = ["Conversion", "Placeholders", "convert", "render", "robot_text"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -10,13 +11,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.kinds import ACTUATORS, Actuator
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.rigid import Rigid
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError
 from vsacli.documents.problems import Problems
 from vsacli.documents.tree import quoted
 from vsacli.robot.model import UNBOUNDED, DenavitHartenberg, Inertia, Joint, Limits, Link, Pose, Robot
-from vsacli.robot.urdf.dh import SNAP, Frames, Snap, dh_frames, tidy, tidy_angle
-from vsacli.robot.urdf.drives import Placeholders
+from vsacli.robot.urdf.dh import SNAP_ANGLE, Frames, Snap, dh_frames, tidy, tidy_angle
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.residual import Residual, kinematic_residual
 from vsacli.robot.urdf.rigid_motion import Body, inverse, roll_pitch_yaw
@@ -25,8 +31,39 @@ from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain, serial_chain
 STANDARD_GRAVITY = 9.81
 """m/s^2, along -z of the root link; a URDF does not give any."""
 
-NEGLIGIBLE = 1e-15
+NEGLIGIBLE_INERTIA = 1e-15
 """Inertia, over mass times the arm's size squared, that is rounding of a zero in the file."""
+
+
+@dataclass(frozen=True)
+class Placeholders:
+    """What a URDF does not say: the actuator of every joint and its constants, in SI units of the joint.
+
+    Attributes:
+        actuator: a key of `vsacli.actuators.kinds.ACTUATORS`.
+        motor_inertia: of each motor, joint side of the gear.
+        stiffness: of an elastic transmission.
+        spring: k and k_c of the cubic springs of an antagonistic one.
+    """
+
+    actuator: str = "antagonistic"
+    motor_inertia: float = 1.0
+    stiffness: float = 1000.0
+    spring: tuple[float, float] = (400.0, 2000.0)
+
+    def of_joint(self, effort: float | None) -> Actuator:
+        """The actuator of a joint that bears this effort; with two motors that bounds neither of them.
+
+        Raises:
+            InvalidRecordError: a constant is not positive.
+        """
+        if ACTUATORS[self.actuator] is Antagonistic:
+            motor, spring = Motor(inertia=self.motor_inertia), Cubic(k=self.spring[0], k_c=self.spring[1])
+            return Antagonistic(motor=(motor, motor), spring=(spring, spring))
+        motor = Motor(inertia=self.motor_inertia, max_torque=effort or math.inf)
+        if ACTUATORS[self.actuator] is Elastic:
+            return Elastic(motor=motor, stiffness=self.stiffness)
+        return Rigid(motor=motor)
 
 
 @dataclass(frozen=True)
@@ -67,7 +104,7 @@ def convert(
     base: str | None = None,
     tip: str | None = None,
     placeholders: Placeholders | None = None,
-    snap: float = SNAP,
+    snap: float = SNAP_ANGLE,
 ) -> Conversion:
     """Convert a serial chain of a URDF.
 
@@ -143,7 +180,11 @@ def _links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> list[Link
 
 def _link(body: Body, scale: float) -> Link:
     largest = float(abs(body.inertia).max())
-    inertia = tidy(body.inertia, largest) if largest > NEGLIGIBLE * body.mass * scale**2 else np.zeros((3, 3))
+    inertia = (
+        tidy(body.inertia, largest)
+        if largest > NEGLIGIBLE_INERTIA * body.mass * scale**2
+        else np.zeros((3, 3))
+    )
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tolist()
     x, y, z = tidy(body.com, scale).tolist()
     mass = tidy(np.array(body.mass), body.mass).item()

@@ -19,16 +19,16 @@ from vsacli.robot.model import DenavitHartenberg
 from vsacli.robot.urdf.rigid_motion import inverse, transform
 from vsacli.robot.urdf.serial_chain import ChainJoint
 
-SNAP = 1e-4
+SNAP_ANGLE = 1e-4
 """rad; by default, axes closer to parallel are made parallel if their common normal is far away."""
 
-FAR = 10.0
+FAR_NORMAL = 10.0
 """m; a common normal this close to the joints needs no snapping, however small the angle."""
 
-ROUNDING = 1e-11
+FILE_ROUNDING = 1e-11
 """rad, or relative to the largest number; less to a right angle or a short number is rounding of the file."""
 
-SHORT = 9
+SHORT_DECIMALS = 9
 """Decimals, relative to the largest number, that a short number has at most."""
 
 
@@ -95,8 +95,8 @@ def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Fra
 
 def tidy(numbers: FloatArray, scale: float) -> FloatArray:
     """The numbers, each replaced by the short one of which it is rounding; `scale` is the largest."""
-    short = np.round(numbers, SHORT - _exponent(scale))
-    return np.where(abs(numbers - short) <= ROUNDING * scale, short, numbers) + 0.0  # no negative zero
+    short = np.round(numbers, SHORT_DECIMALS - _exponent(scale))
+    return np.where(abs(numbers - short) <= FILE_ROUNDING * scale, short, numbers) + 0.0  # no negative zero
 
 
 def _exponent(scale: float) -> int:
@@ -107,7 +107,7 @@ def tidy_angle(angle: float) -> float:
     """The angle, or the multiple of pi/2 of which it is rounding."""
     right_angles = round(angle / (math.pi / 2))
     nearest = right_angles * (math.pi / 2)
-    return nearest if abs(angle - nearest) <= ROUNDING else angle
+    return nearest if abs(angle - nearest) <= FILE_ROUNDING else angle
 
 
 def _axes(joints: Sequence[ChainJoint]) -> list[Axis]:
@@ -127,16 +127,16 @@ def _parallelled(
     for joint, axis in zip(joints[1:], axes[1:], strict=True):
         before = result[-1]
         sine = float(np.linalg.norm(np.cross(before.direction, axis.direction)))
-        if sine <= ROUNDING or (sine < snap and _normal_is_far(before, axis)):
+        if sine <= FILE_ROUNDING or (sine < snap and _normal_is_far(before, axis)):
             direction = before.direction * math.copysign(1, before.direction @ axis.direction)
             axis = Axis(axis.point, direction)
-            snaps += [Snap(joint.urdf.name, sine)] if sine > ROUNDING else []
+            snaps += [Snap(joint.urdf.name, sine)] if sine > FILE_ROUNDING else []
         result.append(axis)
     return result, tuple(snaps)
 
 
 def _normal_is_far(first: Axis, second: Axis) -> bool:
-    return max(map(abs, _feet(first, second))) > FAR
+    return max(map(abs, _feet(first, second))) > FAR_NORMAL
 
 
 def _feet(first: Axis, second: Axis) -> tuple[float, float]:
@@ -162,7 +162,7 @@ def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
     """The frame on an axis, by the common normal with the z axis of the frame before."""
     before = Axis(frame[:3, 3], frame[:3, 2])
     normal = np.cross(before.direction, axis.direction)
-    if np.linalg.norm(normal) <= ROUNDING:
+    if np.linalg.norm(normal) <= FILE_ROUNDING:
         return _parallel_frame(frame, axis)
     foot_before, foot = _feet(before, axis)
     origin = axis.point + foot * axis.direction
@@ -187,7 +187,7 @@ def _parallel_frame(frame: FloatArray, axis: Axis) -> FloatArray:
 def _turns_back(x: FloatArray, frame: FloatArray) -> bool:
     """Whether -x is closer to the x axis before, or to its y axis if x is at right angles to that."""
     along_x, along_y = float(x @ frame[:3, 0]), float(x @ frame[:3, 1])
-    return along_x < -ROUNDING or (abs(along_x) <= ROUNDING and along_y < 0)
+    return along_x < -FILE_ROUNDING or (abs(along_x) <= FILE_ROUNDING and along_y < 0)
 
 
 def _negligible(point: FloatArray) -> float:

@@ -20,7 +20,7 @@ from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
 MAX_BYTES = 10_000_000
 MAX_LINKS = 1000
-LARGEST = 1e9
+LARGEST_NUMBER = 1e9
 """Numbers beyond are no length, mass or inertia of a robot, and products of them would overflow."""
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -154,7 +154,7 @@ class _Reader:
         element = self._child(joint, "axis")
         axis = np.array((1.0, 0.0, 0.0) if element is None else self._vector(element, "xyz"))
         length = float(np.linalg.norm(axis))
-        if element is not None and not length > 1 / LARGEST:
+        if element is not None and not length > 1 / LARGEST_NUMBER:
             self._problems.add(element.line, f"axis: {axis.tolist()} has no direction")
             return np.array([1.0, 0.0, 0.0])
         return axis / length
@@ -165,16 +165,18 @@ class _Reader:
             return UrdfLimit()
         lower, upper = (self._bound(element, name) for name in ("lower", "upper"))
         velocity, effort = (self._bound(element, name) for name in ("velocity", "effort"))
-        bounds = kind != "continuous" and lower < upper and (lower, upper) != (-LARGEST, LARGEST)
+        bounds = (
+            kind != "continuous" and lower < upper and (lower, upper) != (-LARGEST_NUMBER, LARGEST_NUMBER)
+        )
         return UrdfLimit(
             position=(lower, upper) if bounds else None,
-            velocity=velocity if 0 < velocity < LARGEST else None,
-            effort=effort if 0 < effort < LARGEST else None,
+            velocity=velocity if 0 < velocity < LARGEST_NUMBER else None,
+            effort=effort if 0 < effort < LARGEST_NUMBER else None,
         )
 
     def _bound(self, element: Element, name: str) -> float:
         """A limit, which may be infinite or, for want of one, very large."""
-        return max(-LARGEST, min(LARGEST, self._float(element, name, 0.0, math.inf)))
+        return max(-LARGEST_NUMBER, min(LARGEST_NUMBER, self._float(element, name, 0.0, math.inf)))
 
     def _origin(self, element: Element) -> FloatArray:
         origin = self._child(element, "origin")
@@ -184,14 +186,14 @@ class _Reader:
 
     def _vector(self, element: Element, name: str) -> list[float]:
         words = element.attributes.get(name, "0 0 0").split()
-        numbers = [self._parsed(element, name, word, LARGEST) for word in words]
+        numbers = [self._parsed(element, name, word, LARGEST_NUMBER) for word in words]
         if len(numbers) != 3:
             self._problems.add(element.line, f"{name}: expected 3 numbers, found {len(numbers)}")
             return [0.0, 0.0, 0.0]
         return numbers
 
     def _number(self, element: Element, name: str, default: float | None = None) -> float:
-        return self._float(element, name, default, LARGEST)
+        return self._float(element, name, default, LARGEST_NUMBER)
 
     def _non_negative(self, element: Element, name: str, default: float | None = None) -> float:
         number = self._number(element, name, default)

@@ -15,8 +15,8 @@ from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
 
 SAMPLES = 256
 SEED = 1
-REACH = {True: np.pi, False: 1.0}
-"""Half-width of the drawn positions of a revolute (rad) or prismatic (m) joint without limits."""
+DRAWN_HALF_WIDTH = {True: np.pi, False: 1.0}
+"""Half the range of the drawn positions of a revolute (rad) or prismatic (m) joint without limits."""
 
 
 class Residual(NamedTuple):
@@ -38,7 +38,7 @@ def kinematic_residual(chain: SerialChain, robot: Robot) -> Residual:
 def _positions(joints: Sequence[ChainJoint]) -> FloatArray:
     """Random positions, (samples, joints)."""
     rng = np.random.default_rng(SEED)
-    reach = np.array([REACH[joint.is_revolute] for joint in joints])
+    reach = np.array([DRAWN_HALF_WIDTH[joint.is_revolute] for joint in joints])
     given = [joint.urdf.limit.position for joint in joints]
     bounds = [limits or (-1e9, 1e9) for limits in given]
     lower, upper = np.clip(np.array(bounds).T, -reach, reach)
