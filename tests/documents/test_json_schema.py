@@ -22,8 +22,7 @@ from vsacli.documents import fields
 from vsacli.documents.expression import ExpressionError, evaluate
 from vsacli.documents.fields import Check, Kind, declared
 from vsacli.documents.json_schema import json_schema
-from vsacli.files.kinds import FileKind
-from vsacli.files.schemas import DOCUMENTS
+from vsacli.files.file_kinds import DOCUMENTS, FileKind
 from vsacli.robot.file import load_robot
 
 ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))

@@ -1,4 +1,4 @@
-"""Damaged files of every kind, as `validate` and `info` meet them: findings, soon, and never an exception."""
+"""Damaged files of every kind, as `validate` and `info` meet them: messages, soon, and never an exception."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ URDF = """<robot name="arm">
 """
 TRAJECTORIES = sorted((REPOSITORY / "trajectories").glob("*.yaml"))
 LONGEST = 10_000
-"""Characters of all findings on one small file."""
+"""Characters of all messages on one small file."""
 
 
 @pytest.fixture(autouse=True)
@@ -50,7 +50,7 @@ def look_at(name: str, text: str) -> None:
     Path(name).write_text(text, encoding="utf-8", errors="surrogatepass", newline="")
     for paths in ([name], [str(ROBOT), name]):
         checked = check_files(paths)[-1]
-        assert len("\n".join(map(str, checked.findings))) < LONGEST
+        assert len("\n".join(map(str, checked.messages))) < LONGEST
         assert bool(checked.summary) == checked.passed
     try:
         description = describe_file(name, str(ROBOT) if "base" in text else None)
@@ -98,7 +98,7 @@ def test_any_bytes_under_any_name(content: bytes, name: str) -> None:
     Path(name).write_bytes(content)
     (checked,) = check_files([name])
     assert checked.passed is False
-    assert all(finding.problem.file == name for finding in checked.findings)
+    assert all(message.file == name for message in checked.messages)
 
 
 BOMB = "<!DOCTYPE r [<!ENTITY a0 'ha'>" + "".join(

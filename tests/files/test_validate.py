@@ -14,7 +14,7 @@ import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited
 
 from vsacli.base.errors import InputError
-from vsacli.files.kinds import FileKind, recognise
+from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.placeholder_robot import stand_in
 from vsacli.trajectory.file import load_trajectory
 

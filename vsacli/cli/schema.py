@@ -17,6 +17,6 @@ from vsacli.cli.options import example
 @click.argument("kind", type=click.Choice(["robot", "trajectory", "poles"]))
 def schema(kind: str) -> None:
     """Print the JSON Schema of a YAML format, with which editors complete keys and mark mistakes."""
-    from vsacli.files.schemas import DOCUMENTS
+    from vsacli.files.file_kinds import DOCUMENTS
 
     click.echo(json.dumps(DOCUMENTS[kind].schema(), indent=1))

@@ -36,8 +36,8 @@ def validate(files: tuple[str, ...], as_json: bool, talk: Talk) -> int:
 
     checked = check_files(list(dict.fromkeys(files)))
     if as_json:
-        findings = [finding.as_json() for file in checked for finding in file.findings]
-        click.echo(json.dumps(findings, indent=1))
+        messages = [message.as_json() for file in checked for message in file.messages]
+        click.echo(json.dumps(messages, indent=1))
     else:
         for line in _lines(checked, talk):
             click.echo(line)
@@ -50,4 +50,4 @@ def _lines(checked: Sequence[Checked], talk: Talk) -> Iterator[str]:
             continue
         if file.passed:
             yield f"{file.path}: ok, {file.summary}"
-        yield from map(str, file.findings)
+        yield from map(str, file.messages)

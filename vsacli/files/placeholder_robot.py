@@ -26,14 +26,19 @@ MOST_JOINTS = 1000
 _POSITION, _STIFFNESS = ".q", ".stiffness"
 
 
-class StandIn(NamedTuple):
-    """A robot, and whether its joints are surely in the order of the lists in the trajectory."""
+class PlaceholderRobot(NamedTuple):
+    """A robot in place of an unknown one.
+
+    Attributes:
+        robot: it has the joints that the trajectory speaks of.
+        ordered: whether they are surely in the order of the lists in the trajectory.
+    """
 
     robot: Robot
     ordered: bool
 
 
-def stand_in(path: str | os.PathLike[str]) -> StandIn:
+def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     """A robot of revolute joints that a trajectory would fit if it fits any.
 
     Names and number of the joints are those that the file speaks of; one joint if it says nothing. Joints
@@ -45,7 +50,7 @@ def stand_in(path: str | os.PathLike[str]) -> StandIn:
     if Path(path).suffix.lower() == ".csv":
         columns = read_table(path).columns
         names = _of_columns(columns) or _numbered(1)
-        return StandIn(_robot(names, _with_stiffness(columns, names)), ordered=True)
+        return PlaceholderRobot(_robot(names, _with_stiffness(columns, names)), ordered=True)
     root, survey = survey_document(path, OF_ANY_ROBOT)
     folder = Path(path).parent
     columns = tuple(column for file in _tables(root) for column in read_table(folder / file).columns)
@@ -59,7 +64,7 @@ def stand_in(path: str | os.PathLike[str]) -> StandIn:
     else:
         stiffened = _stiffened(stiffnesses, names) if stiffnesses else _with_stiffness(columns, names)
     ordered = bool(columns or _keys(positions)) or not _keys(stiffnesses)
-    return StandIn(_robot(names, stiffened), ordered)
+    return PlaceholderRobot(_robot(names, stiffened), ordered)
 
 
 def _tables(root: tree.Mapping) -> Iterator[str]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from vsacli.base.errors import InputError
+from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.info.robot_info import describe_robot
 from vsacli.files.info.stored import describe_result
 from vsacli.files.info.trajectory_info import describe_trajectory
-from vsacli.files.kinds import FileKind, recognise
-from vsacli.files.placeholder_robot import stand_in
+from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.simulation import open_stored
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
@@ -42,7 +42,7 @@ def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:
     if robot_path is not None:
         robot = load_robot(robot_path)
     else:
-        robot, ordered = stand_in(path)
+        robot, ordered = placeholder_robot(path)
         if not ordered:
             hint = "name the robot with --robot ROBOT"
             raise InputError.one(f"does not say which joint is which in its lists; {hint}", path)

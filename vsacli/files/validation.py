@@ -1,8 +1,9 @@
-"""Checking files of any kind, each as the command that reads it would."""
+"""Everything that is wrong with files of any kind, each checked as the command that reads it would."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from vsacli.actuators.laws.table import MeasuredSpring
@@ -10,9 +11,8 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.control.poles import FORMAT, PolesFile, load_gains
 from vsacli.documents.reading import read_document
 from vsacli.documents.table import read_table
-from vsacli.files.kinds import FileKind, recognise
-from vsacli.files.placeholder_robot import stand_in
-from vsacli.files.validation.finding import Checked, failed, usable
+from vsacli.files.file_kinds import FileKind, recognise
+from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.simulation import open_stored
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
@@ -20,13 +20,76 @@ from vsacli.robot.urdf.reader import read_urdf
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
-BLOCK = 8192
-MOST_SHOWN = 3
+BLOCK_SAMPLES = 8192
+MOST_ROBOTS_SHOWN = 3
 SPRING_COLUMNS = {"deflection", "torque"}
 WITHOUT_ROBOT = "no usable robot is among the files, so joint names, units and limits are not checked"
 
 Robots = Mapping[str, Robot]
 """Robots by the paths of their files."""
+
+ERROR, WARNING, NOTE = "error", "warning", "note"
+
+
+@dataclass(frozen=True)
+class Message:
+    """One thing to say about a file.
+
+    Attributes:
+        severity: ERROR if the file cannot be used, WARNING if it may not say what was meant, NOTE otherwise.
+        file: path as given.
+        line: line number from 1, or 0 if the whole file is concerned.
+        text: what there is to say, a clause.
+    """
+
+    severity: str
+    file: str
+    line: int
+    text: str
+
+    def __str__(self) -> str:
+        text = self.text if self.severity == ERROR else f"{self.severity}: {self.text}"
+        return str(Problem(self.file, self.line, text))
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON values under the published keys; a line of None concerns the whole file."""
+        return {
+            "file": self.file,
+            "line": self.line or None,
+            "message": self.text,
+            "severity": self.severity,
+        }
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A file that was checked.
+
+    Attributes:
+        path: as given.
+        summary: what it is, a few words; empty if it cannot be used.
+        messages: all there is to say.
+    """
+
+    path: str
+    summary: str
+    messages: tuple[Message, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing keeps it from being used."""
+        return all(message.severity != ERROR for message in self.messages)
+
+
+def _failed(path: str, error: InputError) -> Checked:
+    """A file that cannot be used."""
+    return Checked(path, "", tuple(Message(ERROR, *problem) for problem in error.problems))
+
+
+def _usable(path: str, summary: str, warnings: Iterable[str] = (), notes: Iterable[str] = ()) -> Checked:
+    """A file that can be used, with what is to be known about it."""
+    told = [*((WARNING, text) for text in warnings), *((NOTE, text) for text in notes)]
+    return Checked(path, summary, tuple(Message(severity, path, 0, text) for severity, text in told))
 
 
 def check_files(paths: Sequence[str]) -> list[Checked]:
@@ -47,7 +110,7 @@ def _kind(path: str) -> FileKind | Checked:
     try:
         return recognise(path)
     except InputError as error:
-        return failed(path, error)
+        return _failed(path, error)
 
 
 def _checked(path: str, kind: FileKind, robots: dict[str, Robot]) -> Checked:
@@ -57,23 +120,23 @@ def _checked(path: str, kind: FileKind, robots: dict[str, Robot]) -> Checked:
             robots[path] = load_robot(path)
         return _CHECKS[kind](path, robots)
     except InputError as error:
-        return failed(path, error)
+        return _failed(path, error)
 
 
 def _robot(path: str, robots: Robots) -> Checked:
     robot = robots[path]
-    return usable(path, f"robot {robot.name}, {_count(len(robot.joints), 'joint')}", robot.warnings)
+    return _usable(path, f"robot {robot.name}, {_count(len(robot.joints), 'joint')}", robot.warnings)
 
 
 def _trajectory(path: str, robots: Robots) -> Checked:
     if not robots:
-        return _described(path, load_trajectory(path, stand_in(path).robot), WITHOUT_ROBOT)
+        return _described(path, load_trajectory(path, placeholder_robot(path).robot), WITHOUT_ROBOT)
     return _described(path, *_fitting(path, lambda robot: load_trajectory(path, robot), robots))
 
 
 def _described(path: str, trajectory: Trajectory, note: str) -> Checked:
     steps = f"{_count(trajectory.samples, 'step')} over {trajectory.duration:g} s"
-    return usable(
+    return _usable(
         path, f"trajectory {trajectory.name}, {steps}", trajectory.warnings, [*trajectory.notes, note]
     )
 
@@ -82,9 +145,9 @@ def _poles(path: str, robots: Robots) -> Checked:
     document, _ = read_document(path, PolesFile, FORMAT)
     summary = f"poles of {_count(len(document.joints), 'joint')}"
     if not robots:
-        return usable(path, summary, notes=[WITHOUT_ROBOT])
+        return _usable(path, summary, notes=[WITHOUT_ROBOT])
     _, note = _fitting(path, lambda robot: _gains(path, robot), robots)
-    return usable(path, summary, notes=[note])
+    return _usable(path, summary, notes=[note])
 
 
 def _gains(path: str, robot: Robot) -> Any:
@@ -111,7 +174,7 @@ def _fitting(path: str, read: Callable[[Robot], Any], robots: Robots) -> tuple[A
     if not fitting:
         best = min(errors, key=lambda robot_path: len(errors[robot_path].problems))
         raise InputError([*errors[best].problems, *_misfit(path, len(errors), best)])
-    shown = ", ".join([*fitting][:MOST_SHOWN]) + (", ..." if len(fitting) > MOST_SHOWN else "")
+    shown = ", ".join([*fitting][:MOST_ROBOTS_SHOWN]) + (", ..." if len(fitting) > MOST_ROBOTS_SHOWN else "")
     return next(iter(fitting.values())), f"fits {len(fitting)} of {_count(len(robots), 'robot')}: {shown}"
 
 
@@ -126,23 +189,23 @@ def _table(path: str, robots: Robots) -> Checked:
     if set(table.columns) != SPRING_COLUMNS:
         return _trajectory(path, robots)
     spring = MeasuredSpring(file=table)
-    return usable(path, f"spring of {_count(len(table.values), 'row')}", spring.notes)
+    return _usable(path, f"spring of {_count(len(table.values), 'row')}", spring.notes)
 
 
 def _urdf(path: str, _: Robots) -> Checked:
     urdf = read_urdf(path)
-    return usable(path, f"URDF of {urdf.name}, {_count(len(urdf.joints), 'joint')}")
+    return _usable(path, f"URDF of {urdf.name}, {_count(len(urdf.joints), 'joint')}")
 
 
 def _stored(path: str, _: Robots) -> Checked:
     """Read every value once: damage inside the file shows only then."""
     with open_stored(path) as result:
         for name in result.variables:
-            for start in range(0, result.samples, BLOCK):
-                result.read(name, start, start + BLOCK)
+            for start in range(0, result.samples, BLOCK_SAMPLES):
+                result.read(name, start, start + BLOCK_SAMPLES)
         result.provenance()
         names = f"{result.robot_name}, {result.trajectory_name}"
-        return usable(path, f"{result.kind} of {names}, {_count(result.samples, 'step')}, {result.verdict}")
+        return _usable(path, f"{result.kind} of {names}, {_count(result.samples, 'step')}, {result.verdict}")
 
 
 def _count(number: int, word: str) -> str:

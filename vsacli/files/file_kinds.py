@@ -1,0 +1,126 @@
+"""The kinds of files: how each is recognised, and the JSON Schema of those in YAML.
+
+The content decides, and the ending of the name where that says nothing.
+"""
+
+from __future__ import annotations
+
+import enum
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vsacli.base.did_you_mean import nearest
+from vsacli.base.errors import InputError
+from vsacli.control import poles
+from vsacli.documents import tree
+from vsacli.documents.json_schema import json_schema
+from vsacli.documents.problems import Problems
+from vsacli.documents.source import HDF5_SIGNATURE, check_input_file, read_source
+from vsacli.documents.yaml_tree import parse_yaml
+from vsacli.robot import file as robot_file
+from vsacli.trajectory import file as trajectory_file
+
+
+class FileKind(enum.StrEnum):
+    """The kinds of files that the program reads."""
+
+    ROBOT = "robot"
+    TRAJECTORY = "trajectory"
+    POLES = "poles"
+    TABLE = "table"
+    URDF = "urdf"
+    RESULT = "result"
+    SIMULATION = "simulation"
+
+
+@dataclass(frozen=True)
+class Document:
+    """A kind of YAML file.
+
+    Attributes:
+        format: what its key `format` says.
+        record: the record class of the whole document.
+        title: a few words.
+    """
+
+    format: str
+    record: type
+    title: str
+
+    def schema(self) -> dict[str, Any]:
+        """Its JSON Schema, draft 2020-12."""
+        return json_schema(self.record, self.format, self.title)
+
+
+DOCUMENTS = {
+    "robot": Document(robot_file.FORMAT, robot_file.RobotFile, "robot of vsacli"),
+    "trajectory": Document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, "trajectory of vsacli"),
+    "poles": Document(poles.FORMAT, poles.PolesFile, "poles of a vsacli controller"),
+}
+"""By the word for the kind."""
+
+
+_DOCUMENT_KINDS = {document.format: FileKind(word) for word, document in DOCUMENTS.items()}
+_BEGINNING_BYTES = 64
+
+
+def recognise(path: str | os.PathLike[str]) -> FileKind:
+    """The kind of a file.
+
+    Raises:
+        InputError: it cannot be read, or is none of the kinds.
+        StorageError: the operating system refuses to read a result file.
+    """
+    check_input_file(path)
+    start = _beginning(path)
+    suffix = Path(path).suffix.lower()
+    if start.startswith(HDF5_SIGNATURE) or suffix == ".h5":
+        return _stored_kind(path)
+    if suffix == ".csv":
+        return FileKind.TABLE
+    if start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
+        return FileKind.URDF
+    return _document_kind(path)
+
+
+def _beginning(path: str | os.PathLike[str]) -> bytes:
+    try:
+        with open(path, "rb") as file:
+            return file.read(_BEGINNING_BYTES)
+    except OSError as error:
+        raise InputError.one(f"cannot be read: {error.strerror}", os.fspath(path)) from None
+
+
+def _stored_kind(path: str | os.PathLike[str]) -> FileKind:
+    from vsacli.results.store import schema, simulation
+    from vsacli.results.store.reader import stored_format
+
+    kinds = {schema.FORMAT: FileKind.RESULT, simulation.FORMAT: FileKind.SIMULATION}
+    found = stored_format(Path(path))
+    if found not in kinds:
+        raise InputError.one(
+            f"is an HDF5 file, but its format is none of {', '.join(kinds)}", os.fspath(path)
+        )
+    return kinds[found]
+
+
+def _document_kind(path: str | os.PathLike[str]) -> FileKind:
+    source, text = read_source(path)
+    problems = Problems(source.path)
+    root = parse_yaml(text, problems)
+    formats = ", ".join(_DOCUMENT_KINDS)
+    node = root.entries.get("format") if isinstance(root, tree.Mapping) else None
+    if node is None:
+        problems.fail(root.line, f"is no file of vsacli: a YAML file begins with `format:`, one of {formats}")
+    word = node.text if isinstance(node, tree.Scalar) else ""
+    if word not in _DOCUMENT_KINDS:
+        problems.fail(node.line, f"format: expected one of {formats}, found {node}{_hint(word)}")
+    return _DOCUMENT_KINDS[word]
+
+
+def _hint(word: str) -> str:
+    """The nearest format, if one is near."""
+    near = nearest(word, _DOCUMENT_KINDS)
+    return f"; did you mean {near!r}?" if near else ""
