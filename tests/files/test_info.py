@@ -15,10 +15,9 @@ from samples.command_line import REPOSITORY, ROBOT, rest_to_rest
 from samples.marks import slow
 
 from vsacli.dynamics.link_torques import link_torques
+from vsacli.files.info.describe import describe_trajectory
 from vsacli.files.info.extremes import free_range
-from vsacli.files.info.robot_info import describe_robot
-from vsacli.files.info.trajectory_info import describe_trajectory
-from vsacli.files.info.workspace import reach, reach_bound, static_load
+from vsacli.files.info.robot_info import describe_robot, reach, reach_bound, static_load
 from vsacli.robot.file import load_robot
 from vsacli.robot.kinematics import tip_position
 from vsacli.robot.model import Joint, Limits, Pose, Robot
@@ -175,7 +174,7 @@ def test_peaks_of_a_polynomial_are_the_published_ones() -> None:
 def test_ranges_go_over_all_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     trajectory = load_trajectory(REPOSITORY / "trajectories" / "rest_to_rest.yaml", ARM)
     whole = describe_trajectory(trajectory, ARM.joint_names)
-    monkeypatch.setattr("vsacli.files.info.trajectory_info.BLOCK", 100)
+    monkeypatch.setattr("vsacli.files.info.describe.BLOCK_SAMPLES", 100)
     assert describe_trajectory(trajectory, ARM.joint_names) == whole
 
 

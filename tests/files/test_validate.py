@@ -15,7 +15,7 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited
 
 from vsacli.base.errors import InputError
 from vsacli.files.file_kinds import FileKind, recognise
-from vsacli.files.placeholder_robot import stand_in
+from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.trajectory.file import load_trajectory
 
 ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))
@@ -184,7 +184,7 @@ def test_a_pipe_is_not_waited_for(vsacli: Any) -> None:
 
 def joints_of(text: str, path: Path) -> list[tuple[str, str]]:
     path.write_text("format: vsacli-trajectory/1\nname: t\nduration: 1\n" + text)
-    robot = stand_in(path).robot
+    robot = placeholder_robot(path).robot
     load_trajectory(path, robot)
     return [(joint.name, joint.actuator_type) for joint in robot.joints]
 
@@ -214,19 +214,19 @@ SOFT, STIFF, RIGID = "antagonistic", "elastic", "rigid"
         ),
     ],
 )
-def test_a_stand_in_has_the_joints_that_a_trajectory_speaks_of(
+def test_a_placeholder_has_the_joints_that_a_trajectory_speaks_of(
     text: str, joints: list[tuple[str, str]], tmp_path: Path
 ) -> None:
     assert joints_of(text, tmp_path / "move.yaml") == joints
 
 
-def test_a_stand_in_has_the_joints_of_a_table(tmp_path: Path) -> None:
-    assert stand_in(samples(tmp_path / "motion.csv")).robot.joint_names == ("base", "shoulder", "elbow")
+def test_a_placeholder_has_the_joints_of_a_table(tmp_path: Path) -> None:
+    assert placeholder_robot(samples(tmp_path / "motion.csv")).robot.joint_names == ("base", "shoulder", "elbow")
     numbered = {f"{joint}.q": f"q{i}" for i, joint in enumerate(("base", "shoulder", "elbow"), 1)}
     numbered |= {
         f"{joint}.stiffness": f"stiffness{i}" for i, joint in enumerate(("base", "shoulder", "elbow"), 1)
     }
-    assert len(stand_in(samples(tmp_path / "numbered.csv", **numbered)).robot.joints) == 3
+    assert len(placeholder_robot(samples(tmp_path / "numbered.csv", **numbered)).robot.joints) == 3
 
 
 def test_what_does_not_fit_any_robot_is_found_without_one(tmp_path: Path) -> None:

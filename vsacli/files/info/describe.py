@@ -1,18 +1,28 @@
-"""The description of a file of any kind."""
+"""What a file holds, as JSON values: of a trajectory the ranges of its signals, of a result its report."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.units import Quantity
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.info.robot_info import describe_robot
-from vsacli.files.info.stored import describe_result
-from vsacli.files.info.trajectory_info import describe_trajectory
 from vsacli.files.placeholder_robot import placeholder_robot
+from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import open_stored
 from vsacli.robot.file import load_robot
+from vsacli.trajectory.curves import POSITION, STIFFNESS
 from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.trajectory import Trajectory
+
+BLOCK_SAMPLES = 8192
+SIGNALS = (*POSITION.names, *STIFFNESS.names)
 
 
 def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
@@ -47,3 +57,92 @@ def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:
             hint = "name the robot with --robot ROBOT"
             raise InputError.one(f"does not say which joint is which in its lists; {hint}", path)
     return describe_trajectory(load_trajectory(path, robot), robot.joint_names)
+
+
+def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> dict[str, Any]:
+    """A trajectory as JSON values: times, and of each joint the range and the peak of each quantity.
+
+    `min`, `max` and `peak`, the largest absolute value, are those at the steps. What a joint does not have,
+    such as the stiffness of a rigid one, is NaN.
+    """
+    ranges = _Ranges()
+    for start in range(0, trajectory.samples, BLOCK_SAMPLES):
+        motion = trajectory.block(start, start + BLOCK_SAMPLES)
+        ranges.take(motion.variables())
+    description: dict[str, Any] = {
+        "kind": "trajectory",
+        "name": trajectory.name,
+        "duration": trajectory.duration,
+        "samples": trajectory.samples,
+        "start": trajectory.times.span[0],
+        "joints": [
+            {"name": joint, **{name: ranges.of(name, index) for name in SIGNALS}}
+            for index, joint in enumerate(joint_names)
+        ],
+        "warnings": list(trajectory.warnings),
+        "notes": list(trajectory.notes),
+    }
+    if trajectory.wrench is not None:
+        axes = {axis: _axis(ranges, index) for index, axis in enumerate(WRENCH_AXES)}
+        description["wrench"] = {"frame": trajectory.wrench.frame, **axes}
+    return description
+
+
+def _axis(ranges: _Ranges, index: int) -> dict[str, Any]:
+    return {name: ranges.of(name, index) for name in WRENCH_NAMES}
+
+
+class _Ranges:
+    """Smallest and largest value of quantities, (columns,), over the blocks taken so far."""
+
+    def __init__(self) -> None:
+        self._low: dict[str, FloatArray] = {}
+        self._high: dict[str, FloatArray] = {}
+
+    def take(self, block: dict[str, FloatArray]) -> None:
+        for name, values in block.items():
+            low, high = values.min(axis=0), values.max(axis=0)
+            self._low[name] = np.minimum(low, self._low.get(name, low))
+            self._high[name] = np.maximum(high, self._high.get(name, high))
+
+    def of(self, name: str, column: int) -> dict[str, float]:
+        low, high = float(self._low[name][column]), float(self._high[name][column])
+        return {"min": low, "max": high, "peak": max(abs(low), abs(high))}
+
+
+def describe_result(result: StoredResult) -> dict[str, Any]:
+    """A result or simulation as JSON values: provenance, inputs with their SHA-256, variables, report.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    return {
+        "kind": result.kind,
+        "robot": result.robot_name,
+        "trajectory": result.trajectory_name,
+        "verdict": result.verdict,
+        "complete": result.complete,
+        "samples": result.samples,
+        "joints": [
+            {"name": name, "type": joint_type, "actuator": actuator}
+            for name, joint_type, actuator in zip(
+                result.joint_names, result.joint_types, result.actuators, strict=True
+            )
+        ],
+        "provenance": result.provenance(),
+        "variables": [
+            {
+                "name": name,
+                "dims": ["time", *result.declared[name].dims],
+                "units": _units(result.declared[name].quantity, result.joint_types),
+                "meaning": result.declared[name].long_name,
+            }
+            for name in result.variables
+        ],
+        "report": result.report,
+    }
+
+
+def _units(quantity: Quantity, joint_types: tuple[str, ...]) -> str:
+    found = {quantity.unit(joint_type) for joint_type in joint_types}
+    return found.pop() if len(found) == 1 else str(quantity)

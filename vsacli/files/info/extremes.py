@@ -17,17 +17,17 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Joint, Robot
 
-STARTS = 16
+MOST_STARTS = 16
 """Random configurations to start from, for each goal; fewer in long chains."""
 
 MOST_SWEEPS = 50
-SETTLED = 1e-11
+SETTLED_GAIN = 1e-11
 """Relative gain of a sweep over all joints below which the search ends."""
 
-MOST_WORK = 1e7
+MOST_EVALUATIONS = 1e7
 """Samples times joints that a search may evaluate; beyond, the random configurations have to do."""
 
-LEAST_SAMPLES = 300
+SAMPLES_AT_NO_COST = 300
 """Fewer samples at once cost as much as so many."""
 
 SEED = 0
@@ -74,7 +74,7 @@ def largest(objective: Objective, goals: int, robot: Robot) -> Extremes:
 def _random(goals: int, robot: Robot) -> FloatArray:
     """Configurations to start from, (goals, starts, joints)."""
     count = len(robot.joints)
-    starts = min(STARTS, max(2, 200 // count))
+    starts = min(MOST_STARTS, max(2, 200 // count))
     low, high = np.array([free_range(joint) for joint in robot.joints]).T
     return np.random.default_rng(SEED).uniform(low, high, (goals, starts, count))
 
@@ -82,14 +82,14 @@ def _random(goals: int, robot: Robot) -> FloatArray:
 def _searched(objective: Objective, q: FloatArray, robot: Robot) -> FloatArray:
     """The configurations after sweeps over all joints, until nothing is gained."""
     count = len(robot.joints)
-    work = max(q[..., 0].size * len(_ANGLES), LEAST_SAMPLES) * count * count
+    work = max(q[..., 0].size * len(_ANGLES), SAMPLES_AT_NO_COST) * count * count
     before = np.zeros(len(q))
-    for _ in range(min(MOST_SWEEPS, int(MOST_WORK / work))):
+    for _ in range(min(MOST_SWEEPS, int(MOST_EVALUATIONS / work))):
         for index, joint in enumerate(robot.joints):
             best = _best_angle if joint.is_revolute else _best_end
             q[..., index] = best(objective, q, index, np.array(free_range(joint)))
         sizes = np.abs(_own_values(objective, q)).max(axis=1)
-        if np.all(sizes - before <= SETTLED * sizes):
+        if np.all(sizes - before <= SETTLED_GAIN * sizes):
             break
         before = sizes
     return q

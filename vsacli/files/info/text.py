@@ -13,7 +13,7 @@ from vsacli.base.units import POSITION, STIFFNESS, TORQUE
 
 Description = Mapping[str, Any]
 
-DIGITS = 5
+SHOWN_DIGITS = 5
 MOTION = ("dq", "ddq", "d3q", "d4q")
 
 
@@ -145,7 +145,7 @@ def _row(values: Iterable[float]) -> str:
 
 
 def _short(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value:.{DIGITS}g}"
+    return "-" if math.isnan(value) else f"{value:.{SHOWN_DIGITS}g}"
 
 
 def _range(ends: Mapping[str, float]) -> str:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from vsacli.files.info.robot_info import stiffness_ranges
-from vsacli.files.info.workspace import static_load
+from vsacli.files.info.robot_info import static_load, stiffness_ranges
 from vsacli.files.templates.commented import document
 from vsacli.robot.model import Joint, Robot
 from vsacli.trajectory.file import DEFAULT_RATE, FORMAT, OF_ANY_ROBOT
