@@ -221,7 +221,8 @@ def test_a_placeholder_has_the_joints_that_a_trajectory_speaks_of(
 
 
 def test_a_placeholder_has_the_joints_of_a_table(tmp_path: Path) -> None:
-    assert placeholder_robot(samples(tmp_path / "motion.csv")).robot.joint_names == ("base", "shoulder", "elbow")
+    robot = placeholder_robot(samples(tmp_path / "motion.csv")).robot
+    assert robot.joint_names == ("base", "shoulder", "elbow")
     numbered = {f"{joint}.q": f"q{i}" for i, joint in enumerate(("base", "shoulder", "elbow"), 1)}
     numbered |= {
         f"{joint}.stiffness": f"stiffness{i}" for i, joint in enumerate(("base", "shoulder", "elbow"), 1)
