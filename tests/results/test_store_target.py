@@ -1,0 +1,128 @@
+"""The name that a result gets: free until the file is whole, never that of another run."""
+
+from __future__ import annotations
+
+import os
+import stat
+
+import pytest
+from samples.results import (
+    REPORT,
+    PlannedTrajectory,
+    ordinary_user,
+    robot,
+    write_result,
+)
+
+from vsacli.base.atomic_files import AtomicFile
+from vsacli.base.errors import StorageError
+from vsacli.results.store.reader import open_result
+from vsacli.results.store.writer import ResultWriter
+
+
+def test_an_exception_of_the_caller_passes_through_and_leaves_nothing(tmp_path, block):
+    def run():
+        with ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(99)) as writer:
+            writer.write(block)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_leaving_without_finish_leaves_nothing(tmp_path, block):
+    with ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
+        writer.write(block)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_name_is_free_until_finish(tmp_path, block):
+    with ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
+        writer.write(block)
+        assert not (tmp_path / "r.h5").exists()
+        writer.finish(REPORT)
+        assert (tmp_path / "r.h5").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
+
+
+def test_an_existing_file_is_refused_before_the_first_step(tmp_path, old):
+    writer = ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(50))
+    with pytest.raises(StorageError, match=r"r\.h5: exists already; .*--overwrite"), writer:
+        pytest.fail("the writer was opened")
+    assert (tmp_path / "r.h5").read_bytes() == old
+
+
+@pytest.mark.usefixtures("old")
+def test_an_existing_file_is_replaced_on_request(tmp_path, block):
+    with open_result(write_result(tmp_path / "r.h5", block, overwrite=True)) as result:
+        assert result.samples == 50
+    assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
+
+
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_that_appears_during_the_run_is_not_replaced(tmp_path, block, monkeypatch, links):
+    if not links:
+        monkeypatch.setattr(os, "link", no_links)
+    with ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
+        writer.write(block)
+        (tmp_path / "r.h5").write_bytes(b"another run")
+        with pytest.raises(StorageError, match="exists already"):
+            writer.finish(REPORT)
+    assert (tmp_path / "r.h5").read_bytes() == b"another run"
+    assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
+
+
+def no_links(*_, **__):
+    raise PermissionError(1, "Operation not permitted")
+
+
+def test_file_systems_without_hard_links(tmp_path, block, monkeypatch):
+    monkeypatch.setattr(os, "link", no_links)
+    with open_result(write_result(tmp_path / "r.h5", block)) as result:
+        assert result.samples == 50
+
+
+def test_the_file_obeys_the_umask(tmp_path, block):
+    before = os.umask(0o027)
+    try:
+        path = write_result(tmp_path / "r.h5", block)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+
+
+def test_a_link_goes_on_pointing_to_the_file(tmp_path, block):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "real" / "r.h5").write_bytes(b"old")
+    (tmp_path / "link.h5").symlink_to("real/r.h5")
+    write_result(tmp_path / "link.h5", block, overwrite=True)
+    assert (tmp_path / "link.h5").is_symlink()
+    with open_result(tmp_path / "real" / "r.h5") as result:
+        assert result.samples == 50
+
+
+@pytest.mark.parametrize(
+    ("name", "match"),
+    [
+        ("", "is a folder; give the name of a file"),
+        ("missing/r.h5", r"there is no folder .*missing; create it"),
+        ("fifo", "is not a regular file and cannot be replaced"),
+        ("x" * 300, "cannot be written: the file name is too long"),
+    ],
+)
+def test_targets_that_cannot_be(tmp_path, name, match):
+    os.mkfifo(tmp_path / "fifo")
+    with pytest.raises(StorageError, match=match), AtomicFile(tmp_path / name, overwrite=True):
+        pytest.fail("the file was opened")
+    assert [path.name for path in tmp_path.iterdir()] == ["fifo"]
+
+
+def test_a_folder_that_may_not_be_written(tmp_path):
+    tmp_path.chmod(0o500)
+    with (
+        ordinary_user(),
+        pytest.raises(StorageError, match="cannot be written: no permission to write into this folder"),
+        AtomicFile(tmp_path / "r.h5"),
+    ):
+        pytest.fail("the file was opened")
