@@ -15,6 +15,7 @@ from samples.robots import (
     robot_of_ones,
     vsa_3r,
 )
+from samples.wrenches import random_wrench
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -123,7 +124,7 @@ def test_a_wrong_shape_is_refused_with_the_one_expected(position: int, wrong: tu
     name = ("q", "dq", "ddq", "d3q", "d4q")[position]
     with pytest.raises(InputError) as refusal:
         link_torques(robot, *motion)
-    assert str(refusal.value) == f"{name} must have the shape (samples, 2), not {wrong}"
+    assert str(refusal.value) == f"{name} must have the shape (2) or (samples, 2), not {wrong}"
 
 
 def test_unequal_numbers_of_samples_are_refused() -> None:
@@ -131,3 +132,56 @@ def test_unequal_numbers_of_samples_are_refused() -> None:
     q, dq, ddq, d3q, d4q = random_motion(robot, 5, seed=1)
     with pytest.raises(InputError, match=r"must have one shape, not \(5, 2\), \(5, 2\), \(4, 2\), \(5, 2\)"):
         link_torques(robot, q, dq, ddq[:4], d3q, d4q)
+
+
+def test_a_robot_that_holds_still_needs_its_position_alone() -> None:
+    robot = random_robot("RPR", seed=2)
+    q, *_ = random_motion(robot, 5, seed=2)
+    still = np.zeros_like(q)
+    held = link_torques(robot, q)
+    np.testing.assert_array_equal(held.tau_e, link_torques(robot, q, still, still, still, still).tau_e)
+    assert held.dtau_e is None
+    assert held.ddtau_e is None
+
+
+def test_derivatives_are_computed_from_what_is_given_alone() -> None:
+    robot = random_robot("RPR", seed=2)
+    motion = random_motion(robot, 5, seed=2)
+    whole = link_torques(robot, *motion)
+    for given, computed in ((3, 1), (4, 2), (5, 3)):
+        found = link_torques(robot, *motion[:given])
+        for array, expected in zip(found[:computed], whole, strict=False):
+            np.testing.assert_array_equal(array, expected)
+        assert found[computed:] == (None,) * (3 - computed)
+
+
+@pytest.mark.parametrize(
+    ("names", "clause"),
+    [
+        (["dq"], "dq is given without ddq"),
+        (["ddq"], "ddq is given without dq"),
+        (["d3q"], "d3q is given without dq and ddq"),
+        (["dq", "ddq", "d4q"], "d4q is given without d3q"),
+    ],
+)
+def test_a_motion_with_a_gap_is_refused(names: list[str], clause: str) -> None:
+    robot = random_robot("RPR", seed=2)
+    q = np.zeros((5, 3))
+    with pytest.raises(InputError, match=f"{clause}; give q alone if the robot holds still, else q, dq and"):
+        link_torques(robot, q, **dict.fromkeys(names, q))
+
+
+def test_one_instant_is_a_row_of_many() -> None:
+    robot = random_robot("RPR", seed=2)
+    motion, wrench = random_motion(robot, 1, seed=2), random_wrench(1, "base", seed=2)
+    once = link_torques(robot, *(array[0] for array in motion), wrench.mapped(lambda rows, _: rows[0]))
+    for array, expected in zip(once, link_torques(robot, *motion, wrench), strict=True):
+        np.testing.assert_array_equal(array, expected[0])
+
+
+def test_an_instant_and_samples_do_not_mix() -> None:
+    robot = random_robot("RPR", seed=2)
+    with pytest.raises(InputError, match=r"q, dq, ddq must have one shape, not \(5, 3\), \(3,\), \(3,\)"):
+        link_torques(robot, np.zeros((5, 3)), np.zeros(3), np.zeros(3))
+    with pytest.raises(InputError, match=r"wrench must have the shape \(6,\), not \(5, 6\)"):
+        link_torques(robot, np.zeros(3), wrench=random_wrench(5, "base", seed=2))

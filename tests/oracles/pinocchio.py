@@ -31,6 +31,27 @@ def torques(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Flo
     return np.array(rows) + damping * dq
 
 
+def poses(robot: Robot, q: FloatArray) -> FloatArray:
+    """Link frames and tool frame in the base frame, (samples, joints + 1, 4, 4)."""
+    model, data = build(robot), build(robot).createData()
+    rows = []
+    for row in q:
+        pin.forwardKinematics(model, data, row)
+        links = [data.oMi[joint + 1] * _row(each.dh) for joint, each in enumerate(robot.joints)]
+        rows.append([pose.homogeneous for pose in (*links, links[-1] * _pose(robot.tool))])
+    return np.array(rows)
+
+
+def jacobians(robot: Robot, q: FloatArray, *, in_base: bool) -> FloatArray:
+    """Of the tool's origin, velocity first, (samples, 6, joints), along the axes of base or tool."""
+    model = build(robot)
+    placement = _row(robot.joints[-1].dh) * _pose(robot.tool)
+    index = model.addFrame(pin.Frame("tool", len(robot.joints), 0, placement, pin.OP_FRAME))
+    data, axes = model.createData(), pin.LOCAL_WORLD_ALIGNED if in_base else pin.LOCAL
+    rows = [pin.computeFrameJacobian(model, data, row, index, axes).copy() for row in q]
+    return np.array(rows).reshape(len(q), 6, -1)  # Pinocchio leaves out the axis of a single joint
+
+
 def torques_under_wrench(
     robot: Robot, motion: tuple[FloatArray, FloatArray, FloatArray], wrench: FloatArray, *, in_base: bool
 ) -> FloatArray:

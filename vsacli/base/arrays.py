@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vsacli.base.errors import InputError
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike  # numpy.typing takes as long to import as all of this package's types
 
@@ -31,6 +33,24 @@ def over_time(rows: FloatArray) -> FloatArray:
 def by_joint(array: ArrayLike) -> FloatArray:
     """The inverse of `over_time`, with contiguous samples; copies only an array laid out otherwise."""
     return np.ascontiguousarray(np.moveaxis(np.asarray(array, dtype=np.float64), 0, -1))
+
+
+def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:
+    """The array as float64, if it has this shape, or one axis of samples before it.
+
+    Raises:
+        InputError: it has another shape, or holds something else than numbers.
+    """
+    try:
+        values = np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError.one(f"{name} must be an array of numbers: {error}") from None
+    if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1:
+        expected = ", ".join(map(str, shape))
+        raise InputError.one(
+            f"{name} must have the shape ({expected}) or (samples, {expected}), not {values.shape}"
+        )
+    return values
 
 
 def evenly(length: int, count: int) -> IndexArray:

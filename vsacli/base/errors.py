@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -40,6 +41,34 @@ class InputError(VsacliError, ValueError):
     def one(cls, message: str, file: str | Path = "", line: int = 0) -> InputError:
         """An error with a single problem."""
         return cls([Problem(str(file), line, message)])
+
+
+def check_type(argument: str, value: object, expected: type, remedy: str) -> None:
+    """Refuse an argument of another type than a function expects.
+
+    Args:
+        argument: its name.
+        value: what was given.
+        expected: the type.
+        remedy: a clause with the call that would do; `{}` stands for a path.
+
+    Raises:
+        TypeError: with a sentence of all of these.
+    """
+    if isinstance(value, expected):
+        return
+    path, given = f"{argument}.yaml", _described(value)
+    if isinstance(value, str | os.PathLike):
+        path = os.fspath(value)
+        given = f"the path {path!r}"
+    raise TypeError(f"{argument} must be a {expected.__name__}, not {given}; {remedy.format(repr(path))}")
+
+
+def _described(value: object) -> str:
+    if isinstance(value, type):
+        return f"the class {value.__name__} itself"
+    name = type(value).__name__
+    return name if value is None else f"{'an' if name[0] in 'AEIOUaeio' else 'a'} {name}"
 
 
 class FieldProblem(NamedTuple):

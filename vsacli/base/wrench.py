@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, check_type
 
 WRENCH_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Components: the force, and the moment about the origin of the tool frame."""
@@ -45,14 +45,23 @@ class Wrench:
         return Wrench(*arrays, frame=self.frame)
 
 
-def check_frame(frame: str) -> None:
-    """Refuse a word that is no frame of a wrench.
+def check_frame(frame: str, of: str = "wrench") -> None:
+    """Refuse a word that is no frame of a wrench, or of what acts like one.
 
     Raises:
         InputError: naming the nearest one that is.
     """
     if frame not in WRENCH_FRAMES:
-        raise InputError.one(f"unknown frame {frame!r} of the wrench{did_you_mean(frame, WRENCH_FRAMES)}")
+        raise InputError.one(f"unknown frame {frame!r} of the {of}{did_you_mean(frame, WRENCH_FRAMES)}")
+
+
+def check_wrench(value: object) -> None:
+    """Refuse an argument that is no wrench.
+
+    Raises:
+        TypeError: saying how to make one.
+    """
+    check_type("wrench", value, Wrench, "make one by Wrench(wrench, dwrench, ddwrench), each ([samples,] 6)")
 
 
 def wrench_columns(name: str) -> list[str]:

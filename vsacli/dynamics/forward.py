@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.base.wrench import Wrench
+from vsacli.base.arrays import FloatArray, checked_shape
+from vsacli.base.errors import InputError, check_type
+from vsacli.base.wrench import Wrench, check_wrench
 from vsacli.dynamics.rigid_body import chain_of
-from vsacli.robot.model import Robot
+from vsacli.robot.model import Robot, check_robot
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,9 @@ def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
 
     Raises:
         InputError: q has another shape.
+        TypeError: robot is none.
     """
+    check_robot(robot)
     return chain_of(robot).mass_matrix(checked_shape("q", q, len(robot.joints)))
 
 
@@ -67,7 +69,12 @@ def state_derivative(
 
     Raises:
         InputError: shapes that do not fit, or a mass matrix that is not positive definite.
+        TypeError: robot or state is none.
     """
+    check_robot(robot)
+    check_type("state", state, State, "make one by State(q, dq, theta, dtheta)")
+    if wrench is not None:
+        check_wrench(wrench)
     plant = Plant(robot, None if wrench is None else wrench.frame)
     q, dq, theta, dtheta = plant.unpacked(state)
     torque = plant.drivetrain.of_motors(checked_shape("tau_motor", tau_motor, len(robot.joints), 2))
@@ -156,18 +163,3 @@ class Plant:
         """
         of_rotors = self._rigid_inertia * ddq + self._rigid_damping * dq
         return self.drivetrain.joint_sum(spring) + self.drivetrain.rigid_sum(torque) - of_rotors
-
-
-def checked_shape(name: str, array: npt.ArrayLike, *shape: int) -> FloatArray:
-    """The array as float64, if it has this shape, or one axis of samples before it.
-
-    Raises:
-        InputError: it has another shape.
-    """
-    values = np.asarray(array, dtype=np.float64)
-    if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1:
-        expected = ", ".join(map(str, shape))
-        raise InputError.one(
-            f"{name} must have the shape ({expected}) or (samples, {expected}), not {values.shape}"
-        )
-    return values

@@ -15,7 +15,7 @@ from vsacli.actuators.limit_check import LimitCheck
 from vsacli.actuators.reach import NEAR_SINGULAR
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, by_joint, over_time
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, check_type
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
@@ -23,7 +23,7 @@ from vsacli.compute.vector import Scalar
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.link_torques import MOTION_NAMES, LinkTorques, link_torques
-from vsacli.robot.model import Robot
+from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -150,8 +150,9 @@ def _named(shapes: Mapping[str, tuple[int, ...]], rows: FloatArray) -> dict[str,
 
 def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
     """tau_e, dtau_e and ddtau_e, (58)-(60), by name, each (samples, joints); the stiffness plays no part."""
-    torques = link_torques(robot, motion.q, motion.dq, motion.ddq, motion.d3q, motion.d4q, motion.wrench)
-    return dict(zip(TORQUES, torques, strict=True))
+    return link_torques(
+        robot, motion.q, motion.dq, motion.ddq, motion.d3q, motion.d4q, motion.wrench
+    )._asdict()
 
 
 def check_fit(robot: Robot, trajectory: Trajectory) -> None:
@@ -159,7 +160,11 @@ def check_fit(robot: Robot, trajectory: Trajectory) -> None:
 
     Raises:
         InputError: it has another number of joints, or no stiffness for an antagonistic one.
+        TypeError: one of both is none.
     """
+    check_robot(robot)
+    remedy = "load_trajectory({}, robot) reads one; it comes after the robot"
+    check_type("trajectory", trajectory, Trajectory, remedy)
     if trajectory.joints != len(robot.joints):
         joints = f"{trajectory.joints} joints, the robot {robot.name} {len(robot.joints)}"
         raise InputError.one(f"the trajectory {trajectory.name} has {joints}")

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, by_joint, over_time
+from vsacli.base.arrays import FloatArray, by_joint, checked_shape, over_time
 from vsacli.base.errors import InputError
-from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
 from vsacli.compute.engine import Engine, choose
 from vsacli.compute.vector import (
     ZERO,
@@ -23,7 +23,7 @@ from vsacli.compute.vector import (
 )
 from vsacli.dynamics.recursion import JointState, LinkConstants, TipLoad, recursion
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.model import Joint, Robot, check_robot
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -113,67 +113,97 @@ class LinkTorques:
         return tip_load(self.robot, self.frame, wrench)
 
 
+class ElasticTorques(NamedTuple):
+    """What the links demand of the joints, each ([samples,] joints), N m (N) per s^k.
+
+    Attributes:
+        tau_e: total elastic torque (58).
+        dtau_e: its first derivative (59); None if d3q was not given.
+        ddtau_e: its second derivative (60); None if d4q was not given.
+    """
+
+    tau_e: FloatArray
+    dtau_e: FloatArray | None
+    ddtau_e: FloatArray | None
+
+
 def link_torques(
     robot: Robot,
     q: ArrayLike,
-    dq: ArrayLike,
-    ddq: ArrayLike,
-    d3q: ArrayLike,
-    d4q: ArrayLike,
+    dq: ArrayLike | None = None,
+    ddq: ArrayLike | None = None,
+    d3q: ArrayLike | None = None,
+    d4q: ArrayLike | None = None,
     wrench: Wrench | None = None,
     *,
     engine: str | Engine = "numpy",
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+) -> ElasticTorques:
     """Torques that the links demand of the joints, and their first two derivatives, (36)-(60).
+
+    With q alone the robot holds still. A derivative of the torques is computed from what is given, never from
+    zeros in place of what is not: tau_e takes dq and ddq, dtau_e also d3q, ddtau_e also d4q.
 
     Args:
         robot: the chain.
-        q: joint positions, (samples, joints), rad (m).
+        q: joint positions, ([samples,] joints), rad (m).
         dq: their first derivative.
         ddq: their second derivative.
         d3q: their third derivative.
         d4q: their fourth derivative.
-        wrench: what the environment exerts on the end effector, over the same samples; nothing if None.
+        wrench: what the environment exerts on the end effector, arrays ([samples,] 6); nothing if None.
         engine: what computes, one of `vsacli.compute.engine.NAMES`, or one that was chosen before.
 
     Returns:
-        tau_e, dtau_e, ddtau_e, each (samples, joints), N m (N) per s^k.
+        tau_e, dtau_e, ddtau_e, each of the shape of q; None for those derivatives that lack their input.
 
     Raises:
-        InputError: an array has another shape than (samples, joints), or not that of `q`; one of the wrench
-            another than (samples, 6); there is no such engine, or no C compiler for it.
+        InputError: an array has another shape than the joints of the robot ask for, or than `q` and the
+            wrench; a derivative of q is missing; there is no such engine, or no C compiler for it.
+        TypeError: robot or wrench is none.
     """
-    motion = [_checked(robot, name, array) for name, array in _named(q, dq, ddq, d3q, d4q)]
-    shape = motion[0].shape
-    if len({array.shape for array in motion}) > 1:
-        shapes = ", ".join(str(array.shape[::-1]) for array in motion)
-        raise InputError.one(f"q, dq, ddq, d3q, d4q must have one shape, not {shapes}")
+    check_robot(robot)
+    if wrench is not None:
+        check_wrench(wrench)
+    given = _given(robot, dict(zip(MOTION_NAMES, (q, dq, ddq, d3q, d4q), strict=True)))
+    shape = given[0].shape
+    motion = [by_joint(np.atleast_2d(array)) for array in given]
+    motion += [np.zeros_like(motion[0])] * (len(MOTION_NAMES) - len(motion))
 
     kernel = LinkTorques(robot, None if wrench is None else wrench.frame)
-    rows = [row for array in (*motion, *_wrench_rows(wrench, shape[1])) for row in array]
-    chosen = choose(engine, kernel, shape[1]).engine if isinstance(engine, str) else engine
-    tau_e, dtau_e, ddtau_e = map(over_time, chosen.run(kernel, rows).reshape(3, *shape))
-    return tau_e, dtau_e, ddtau_e
+    rows = [row for array in (*motion, *_wrench_rows(wrench, shape[:-1])) for row in array]
+    chosen = choose(engine, kernel, motion[0].shape[1]).engine if isinstance(engine, str) else engine
+    torques = map(over_time, chosen.run(kernel, rows).reshape(3, *motion[0].shape))
+    tau_e, dtau_e, ddtau_e = (torque.reshape(shape) for torque in torques)
+    return ElasticTorques(tau_e, dtau_e if len(given) > 3 else None, ddtau_e if len(given) > 4 else None)
 
 
-def _named(*motion: ArrayLike) -> Iterator[tuple[str, ArrayLike]]:
-    return zip(MOTION_NAMES, motion, strict=True)
+def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
+    """The arrays there are, checked: of one shape, and none left out before the last."""
+    given = [
+        checked_shape(name, array, len(robot.joints)) for name, array in motion.items() if array is not None
+    ]
+    names = [name for name, array in motion.items() if array is not None]
+    missing = [name for name in MOTION_NAMES[: max(len(names), 3)] if name not in names]
+    if missing and names != ["q"]:
+        raise InputError.one(
+            f"{names[-1]} is given without {' and '.join(missing)}; give q alone if the robot holds still, "
+            "else q, dq and ddq, then d3q for dtau_e, then d4q for ddtau_e"
+        )
+    if len({array.shape for array in given}) > 1:
+        shapes = ", ".join(str(array.shape) for array in given)
+        raise InputError.one(f"{', '.join(names)} must have one shape, not {shapes}")
+    return given
 
 
-def _checked(robot: Robot, name: str, array: ArrayLike) -> FloatArray:
-    shape = np.shape(array)
-    if len(shape) != 2 or shape[1] != len(robot.joints):
-        raise InputError.one(f"{name} must have the shape (samples, {len(robot.joints)}), not {shape}")
-    return by_joint(array)
-
-
-def _wrench_rows(wrench: Wrench | None, samples: int) -> Iterator[FloatArray]:
-    """The components, and each of their derivatives."""
-    for name in WRENCH_NAMES if wrench is not None else ():
-        array = getattr(wrench, name)
-        if (shape := np.shape(array)) != (samples, len(WRENCH_AXES)):
-            raise InputError.one(f"{name} must have the shape ({samples}, {len(WRENCH_AXES)}), not {shape}")
-        yield by_joint(array)
+def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[FloatArray]:
+    """The components, and each of their derivatives; `samples` is the shape before the last axis."""
+    if wrench is None:
+        return
+    for name in WRENCH_NAMES:
+        array, expected = getattr(wrench, name), (*samples, len(WRENCH_AXES))
+        if (shape := np.shape(array)) != expected:
+            raise InputError.one(f"{name} must have the shape {expected}, not {shape}")
+        yield by_joint(np.atleast_2d(array))
 
 
 def joint_state(joint: Joint, q: Scalar, rates: tuple[Scalar, Scalar, Scalar, Scalar]) -> JointState:

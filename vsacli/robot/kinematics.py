@@ -1,20 +1,24 @@
-"""Where the frames of a robot lie: forward kinematics by its rows, rotations of poses, gravity in frame 0."""
+"""Where the frames of a robot lie, and how they move: forward kinematics by its rows, and the Jacobian."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, checked_shape
+from vsacli.base.wrench import WRENCH_AXES, check_frame
 from vsacli.compute.vector import Matrix, Vector, add, exact, mul, sub, trigonometric
-from vsacli.robot.model import Joint, Pose, Robot
+from vsacli.robot.model import Joint, Pose, Robot, check_robot
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 
 class Frame(NamedTuple):
-    """A DH frame in frame 0: axes as columns, (samples, 3, 3), and origin, (samples, 3) m."""
+    """A frame in another one: axes as columns, ([samples,] 3, 3), and origin, ([samples,] 3) m."""
 
     axes: FloatArray
     origin: FloatArray
@@ -23,14 +27,18 @@ class Frame(NamedTuple):
         """A point given in this frame, (samples, 3)."""
         return np.asarray(self.axes @ np.array(local) + self.origin)
 
+    def holding(self, inner: Frame) -> Frame:
+        """A frame that is given in this one."""
+        origin = (self.axes @ inner.origin[..., None])[..., 0] + self.origin
+        return Frame(self.axes @ inner.axes, origin)
+
 
 def frames(robot: Robot, q: FloatArray) -> Iterator[Frame]:
     """Frames 0 to N at positions q, (samples, joints)."""
     frame = Frame(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
     yield frame
     for joint, variable in zip(robot.joints, q.T, strict=True):
-        axes, origin = _link_frame(joint, variable)
-        frame = Frame(frame.axes @ axes, (frame.axes @ origin[..., None])[..., 0] + frame.origin)
+        frame = frame.holding(_link_frame(joint, variable))
         yield frame
 
 
@@ -41,6 +49,77 @@ def _link_frame(joint: Joint, variable: FloatArray) -> Frame:
     c, s, ca, sa = np.cos(theta), np.sin(theta), math.cos(dh.alpha), math.sin(dh.alpha)
     rows = [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [zero, zero + sa, zero + ca]]
     return Frame(np.moveaxis(np.array(rows), -1, 0), np.stack([dh.a * c, dh.a * s, d], axis=-1))
+
+
+def forward_kinematics(robot: Robot, q: ArrayLike) -> FloatArray:
+    """Poses of the link frames (DH frames 1 to N) and of the end effector, in the base frame.
+
+    Args:
+        robot: the robot, its base and tool poses included.
+        q: joint positions, ([samples,] joints), rad (m).
+
+    Returns:
+        Homogeneous 4x4 matrices, ([samples,] joints + 1, 4, 4): axes as columns, origin in m; the last one is
+        that of the end effector.
+
+    Raises:
+        InputError: q has another shape.
+        TypeError: robot is none.
+    """
+    check_robot(robot)
+    positions = checked_shape("q", q, len(robot.joints))
+    _, *moving = _in_base(robot, np.atleast_2d(positions))
+    poses = np.zeros((*np.atleast_2d(positions).shape[:1], len(moving), 4, 4))
+    poses[..., 3, 3] = 1
+    for index, frame in enumerate(moving):
+        poses[:, index, :3, :3], poses[:, index, :3, 3] = frame
+    return poses.reshape(*positions.shape[:-1], *poses.shape[1:])
+
+
+def jacobian(robot: Robot, q: ArrayLike, frame: str = "end_effector") -> FloatArray:
+    """Geometric Jacobian of the end effector: its velocity and angular velocity by joint velocities.
+
+    The power of a `Wrench` w in the same frame is w^T J q', so that it changes tau_e by -J^T w.
+
+    Args:
+        robot: the robot, its base and tool poses included.
+        q: joint positions, ([samples,] joints), rad (m).
+        frame: along whose axes the components are, "end_effector" or "base", as of a `Wrench`.
+
+    Returns:
+        J, ([samples,] 6, joints): velocity of the tool frame's origin, then angular velocity, in the order of
+        fx fy fz mx my mz; m/rad and rad/rad (m/m and 0 for a prismatic joint).
+
+    Raises:
+        InputError: q has another shape, or there is no such frame.
+        TypeError: robot is none.
+    """
+    check_robot(robot)
+    check_frame(frame, "Jacobian")
+    positions = checked_shape("q", q, len(robot.joints))
+    *driving, _, tool = _in_base(robot, np.atleast_2d(positions))
+    columns = np.zeros((*np.atleast_2d(positions).shape[:1], len(WRENCH_AXES), len(robot.joints)))
+    for index, (joint, moved) in enumerate(zip(robot.joints, driving, strict=True)):
+        axis = moved.axes[..., 2]
+        columns[:, :3, index] = np.cross(axis, tool.origin - moved.origin) if joint.is_revolute else axis
+        columns[:, 3:, index] = axis if joint.is_revolute else 0
+    if frame == "end_effector":
+        turn = np.swapaxes(tool.axes, -1, -2)
+        columns = np.concatenate((turn @ columns[:, :3], turn @ columns[:, 3:]), axis=1)
+    return columns.reshape(*positions.shape[:-1], *columns.shape[1:])
+
+
+def _in_base(robot: Robot, q: FloatArray) -> Iterator[Frame]:
+    """Frames 0 to N and that of the end effector in the base frame, at positions q, (samples, joints)."""
+    base, tool = _constant_frame(robot.base), _constant_frame(robot.tool)
+    for frame in frames(robot, q):
+        last = base.holding(frame)
+        yield last
+    yield last.holding(tool)
+
+
+def _constant_frame(pose: Pose) -> Frame:
+    return Frame(np.array(rotation_matrix(pose), dtype=np.float64), np.array(pose.xyz))
 
 
 def tip_position(robot: Robot, q: FloatArray) -> FloatArray:

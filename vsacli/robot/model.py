@@ -14,7 +14,7 @@ from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import FieldProblem
+from vsacli.base.errors import FieldProblem, check_type
 from vsacli.documents.fields import (
     NON_NEGATIVE,
     Items,
@@ -239,3 +239,12 @@ class Robot:
     def warnings(self) -> tuple[str, ...]:
         """What may not be what was meant, one sentence each."""
         return tuple(warning for joint in self.joints for warning in joint.warnings())
+
+
+def check_robot(value: object) -> None:
+    """Refuse an argument that is no robot.
+
+    Raises:
+        TypeError: saying how to get one.
+    """
+    check_type("robot", value, Robot, "load_robot({}) reads one; it is the first argument")
