@@ -32,7 +32,7 @@ NOT_FOR_THE_MAIN_JOB = (
     *("trajectory.declared.csv_samples", "trajectory.declared.sequence", "trajectory.declared.via_points"),
     *("trajectory.curves.piecewise", "trajectory.curves.sinusoids", "trajectory.curves.via_points"),
     *("trajectory.recorded", "trajectory.fits"),
-    *("actuators.pairs.iterated", "actuators.laws.polynomial", "actuators.laws.sinh", "actuators.laws.table"),
+    *("actuators.pairs.solver", "actuators.laws.polynomial", "actuators.laws.sinh", "actuators.laws.table"),
 )
 """Modules, here and elsewhere, that take time to import and have no part in the paper's example."""
 

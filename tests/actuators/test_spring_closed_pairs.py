@@ -12,7 +12,7 @@ from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.laws.quadratic import Quadratic, QuadraticTwins
 from vsacli.actuators.laws.sinh import Sinh, SinhPair
 from vsacli.actuators.pairs import make_pair
-from vsacli.actuators.pairs.iterated import IteratedPair
+from vsacli.actuators.pairs.solver import IteratedPair
 from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)

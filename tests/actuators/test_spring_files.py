@@ -12,8 +12,8 @@ import pytest
 from samples.command_line import contents
 
 from vsacli import load_robot
-from vsacli.actuators.laws.mirrored import Mirrored
 from vsacli.actuators.laws.table import MeasuredSpring
+from vsacli.actuators.laws.tendon import Mirrored
 
 ROBOT = """\
 format: vsacli-robot/1

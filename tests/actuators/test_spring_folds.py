@@ -11,10 +11,10 @@ from samples.springs import SPRINGS, measured, on_side_2, stiffness_under
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.four_bar import FourBar
-from vsacli.actuators.laws.mirrored import Mirrored
 from vsacli.actuators.laws.polynomial import Polynomial
+from vsacli.actuators.laws.tendon import Mirrored
+from vsacli.actuators.pairs.critical_curves import sample_hardening
 from vsacli.actuators.pairs.folds import map_folds
-from vsacli.actuators.pairs.hardening import sample_hardening
 
 EPS = float(np.finfo(float).eps)
 
@@ -100,13 +100,13 @@ def folds_of(springs: tuple[Cubic, Cubic], tau_e: float) -> int:
     return int(np.count_nonzero(np.diff(np.sign(np.diff(stiffness)))))
 
 
-def test_two_folds_are_born_where_the_outermost_fold_jumps():
+def test_two_folds_are_born_at_the_cusp_where_the_outermost_fold_jumps():
     springs = Cubic(k=400, k_c=2000), Cubic(k=440, k_c=2000)
     folds = map_folds(*springs)
     # Neighbouring boxes touch, except where the outermost fold jumps.
     jump = np.abs(folds.phi_1[0, 1:] - folds.phi_1[1, :-1]) > 1e-3 * np.abs(folds.phi_1[1, :-1])
     jumps = folds.edges[1:-1][jump]
-    (birth,) = jumps[np.abs(jumps) < 1e6]
-    # Right after the birth they are apart by the root of the relative distance, and so seen by the scan.
-    assert folds_of(springs, birth * (1 - 1e-4)) == 1
-    assert folds_of(springs, birth * (1 + 1e-4)) == 3
+    (cusp,) = jumps[np.abs(jumps) < 1e6]
+    # Right after the cusp they are apart by the root of the relative distance, and so seen by the scan.
+    assert folds_of(springs, cusp * (1 - 1e-4)) == 1
+    assert folds_of(springs, cusp * (1 + 1e-4)) == 3

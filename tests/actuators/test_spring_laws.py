@@ -15,7 +15,7 @@ from samples.springs import SPRINGS, measured
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.exponential import Exponential
-from vsacli.actuators.laws.four_bar import STRETCHED, FourBar
+from vsacli.actuators.laws.four_bar import STRETCH_MARGIN, FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.laws.quadratic import Quadratic
 from vsacli.actuators.laws.sinh import Sinh
@@ -212,7 +212,7 @@ def test_hardening_is_slope_over_stiffness(law: SpringLaw):
 
 def test_four_bar_ends_just_before_the_linkage_is_stretched():
     law = FourBar(k=40, ratio=2.2)
-    assert 2.2 * math.sin(law.domain[1] / 2) == pytest.approx(1 - STRETCHED, abs=4 * EPS)
+    assert 2.2 * math.sin(law.domain[1] / 2) == pytest.approx(1 - STRETCH_MARGIN, abs=4 * EPS)
     assert law.domain[0] == -law.domain[1]
 
 

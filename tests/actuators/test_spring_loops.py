@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.actuators.bracketing import bracketed_root
+from vsacli.actuators.pairs.bracketing import bracketed_root
 from vsacli.base.arrays import BoolArray
 from vsacli.compute.control_flow import Values, repeat, where_needed
 

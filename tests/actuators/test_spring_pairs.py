@@ -18,7 +18,7 @@ from samples.springs import SPRINGS, Spring, measured, on_side_2, residuals
 
 from vsacli.actuators.antagonistic import solve_deflections
 from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.pairs import make_pair, search
+from vsacli.actuators.pairs import make_pair, solver
 from vsacli.actuators.reach import TOUCHING, margin, reach_flags
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has
@@ -190,7 +190,7 @@ def test_demand_below_the_corridor_needs_no_bracketing(
 ):
     (law_1, curve_1), (law_2, curve_2) = first, second
     tau_e = loads(np.random.default_rng(6), curve_1, curve_2)
-    monkeypatch.setattr(search, "_bracketed", None)  # what is called fails
+    monkeypatch.setattr(solver, "_bracketed", None)  # what is called fails
     found = make_pair(law_1, law_2).solve(tau_e, np.full_like(tau_e, 1e-9))
     carried = found.lower > 1e-9
     assert carried.any()

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from vsacli.actuators.laws.cubic import AlikeCubics, Cubic
 from vsacli.actuators.pairs import make_pair
-from vsacli.actuators.pairs.iterated import IteratedPair
+from vsacli.actuators.pairs.solver import IteratedPair
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 

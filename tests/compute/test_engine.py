@@ -90,7 +90,7 @@ PAIRS = {
 }
 
 
-STRETCHED = {"stiffness_upper": 1e-9}
+STRETCH_MARGIN = {"stiffness_upper": 1e-9}
 """At the end of the four-bar's domain one unit in the last place of a deflection changes it by 1e-10."""
 
 
@@ -103,7 +103,7 @@ def test_spring_laws_agree(pair: str):
     steps = kinds_of_steps(expected)
     assert SAMPLES / 40 < steps[Flag.INFEASIBLE] < SAMPLES / 2
     found = compute_block(robot, motion, engine=compiled(robot))
-    assert_agree(found, expected, STRETCHED if pair == "four_bar" else None)
+    assert_agree(found, expected, STRETCH_MARGIN if pair == "four_bar" else None)
 
 
 @pytest.mark.slow

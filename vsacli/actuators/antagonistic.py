@@ -97,7 +97,7 @@ def motor_motion(actuator: Antagonistic, command: Command, reached: Reach, defle
     """
     phi_1, phi_2 = (np.where(reached.infeasible, np.nan, phi) for phi in deflections)
     first, second = actuator.laws
-    (energy_1, one), (energy_2, two) = first.loaded(phi_1), second.loaded(phi_2)
+    (energy_1, one), (energy_2, two) = first.energy_and_state(phi_1), second.energy_and_state(phi_2)
     det_a = determinant(one, two)  # (67)
     divisor = np.where(reached.singular, np.nan, det_a)
     dphi = solve(one, two, divisor, command.dtau_e, command.dstiffness)  # (68)
@@ -116,7 +116,7 @@ def solve_deflections(actuator: Antagonistic, tau_e: FloatArray, stiffness: Floa
     """Solve (14) on the branch that the actuator's preload names."""
     first, second = actuator.laws
     if actuator.preload == "negative":
-        return make_pair(second, first).solve(tau_e, stiffness).mirrored()
+        return make_pair(second, first).solve(tau_e, stiffness).exchanged()
     return make_pair(first, second).solve(tau_e, stiffness)
 
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.laws.mirrored import Mirrored
 from vsacli.actuators.laws.pair import Pair, PairSolution, tendon_solution
-from vsacli.actuators.laws.tendon import Tendon
+from vsacli.actuators.laws.tendon import Mirrored, Tendon
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import POSITIVE, number

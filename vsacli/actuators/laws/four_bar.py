@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vsacli.actuators.inversion import FirstGuess, inverse, turned_to
+from vsacli.actuators.laws.inverse import FirstGuess, inverse, with_sign_of
 from vsacli.actuators.laws.law import SpringLaw
 from vsacli.actuators.laws.state import SpringState
 from vsacli.base import units
@@ -17,11 +17,11 @@ from vsacli.documents.fields import POSITIVE, Check, number
 
 ABOVE_ONE = Check(lambda ratio: ratio > 1 and math.isfinite(ratio), "greater than 1")
 
-STRETCHED = 1e-6
+STRETCH_MARGIN = 1e-6
 """How close to 1 the domain lets C sin(phi/2) come. Beyond, where the torque grows without bound, deflections
 that are neighbouring doubles differ in stiffness by more than 1e-10."""
 
-NODES = 20
+GUESS_NODES = 20
 """Points of the curve that the first guess of the inverse begins with."""
 
 
@@ -39,7 +39,7 @@ class FourBar(SpringLaw):
     @property
     def domain(self) -> tuple[float, float]:
         """Up to the stretched linkage, all but a millionth."""
-        end = 2 * math.asin((1 - STRETCHED) / self.ratio)
+        end = 2 * math.asin((1 - STRETCH_MARGIN) / self.ratio)
         return (-end, end)
 
     @cached_property
@@ -52,7 +52,7 @@ class FourBar(SpringLaw):
         """Derivatives of the energy k beta^2/2, which share the angles."""
         return _derivatives(self.k, self._angle(phi, order + 1))
 
-    def loaded(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
+    def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
         """Energy and all derivatives, which share the angles."""
         beta = self._angle(phi, 4)
         return self.k / 2 * beta[0] * beta[0], SpringState(*_derivatives(self.k, beta))
@@ -80,20 +80,20 @@ class FourBar(SpringLaw):
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration within the domain."""
-        return self.under(torque)[0]
+        return self.deflection_and_state(torque)[0]
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection and spring by one iteration."""
+    def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
+        """Deflection and state by one iteration."""
         load = np.minimum(np.abs(torque), self.torque_range[1])
         low, high = np.zeros_like(load), np.full_like(load, self.domain[1])
         start = np.minimum(self._first_guess(load), high)
-        return turned_to(torque, *inverse(self, load, low, high, start))
+        return with_sign_of(torque, *inverse(self, load, low, high, start))
 
     @cached_property
     def _first_guess(self) -> FirstGuess:
-        """From nodes over the domain, denser towards its end."""
-        psi = np.linspace(0, math.pi / 2, NODES)
-        return FirstGuess(self, 2 * np.arcsin((1 - STRETCHED) * np.sin(psi) / self.ratio))
+        """First guess of the inverse, from nodes over the domain, denser towards its end."""
+        psi = np.linspace(0, math.pi / 2, GUESS_NODES)
+        return FirstGuess(self, 2 * np.arcsin((1 - STRETCH_MARGIN) * np.sin(psi) / self.ratio))
 
     def _angle(self, phi: FloatArray, order: int) -> list[FloatArray]:
         """Angle beta of the linear spring, and its derivatives up to an order, 4 at most.
@@ -104,25 +104,24 @@ class FourBar(SpringLaw):
         multiplied by 1 + tan^2(phi/4).
         """
         tangent = np.tan(phi / 4)
-        whole = 1 + tangent * tangent
-        sin_psi, ratio_cos = 2 * self.ratio * tangent, self.ratio * (2 - whole)
-        cos_psi = np.sqrt((whole - sin_psi) * (whole + sin_psi))
-        gain = (self.ratio - 1) * (self.ratio + 1) / (ratio_cos + cos_psi)
-        beta = [np.arcsin(2 * tangent * gain)]
+        factor = 1 + tangent * tangent
+        sin_psi, ratio_cos = 2 * self.ratio * tangent, self.ratio * (2 - factor)
+        cos_psi = np.sqrt((factor - sin_psi) * (factor + sin_psi))
+        quotient = (self.ratio - 1) * (self.ratio + 1) / (ratio_cos + cos_psi)
+        beta = [np.arcsin(2 * tangent * quotient)]
         if order > 0:
             half_secant = 0.5 / cos_psi
-            beta.append(gain * whole * whole * half_secant)
+            beta.append(quotient * factor * factor * half_secant)
         if order > 1:
-            rate, tan_psi = ratio_cos * half_secant, sin_psi / cos_psi  # psi', tan psi
-            beyond = beta[1] * (rate + 0.5)  # psi'^2 - 1/4
-            beta.append(beyond * tan_psi)
+            dpsi, tan_psi = ratio_cos * half_secant, sin_psi / cos_psi
+            excess = beta[1] * (dpsi + 0.5)  # psi'^2 - 1/4
+            beta.append(excess * tan_psi)
         if order > 2:
-            squared = tan_psi * tan_psi
-            grown = 1 + 3 * squared
-            beta.append(rate * beyond * grown)
+            growth = 1 + 3 * (tan_psi * tan_psi)
+            beta.append(dpsi * excess * growth)
         if order > 3:
-            rates = 4 * rate * rate
-            beta.append(beta[2] * (grown * (beyond + rates) + rates))
+            squared = 4 * dpsi * dpsi
+            beta.append(beta[2] * (growth * (excess + squared) + squared))
         return beta
 
 

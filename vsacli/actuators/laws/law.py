@@ -45,7 +45,7 @@ class SpringLaw(ABC):
 
     @property
     def pulls_only(self) -> bool:
-        """Whether it is a tendon, which goes slack at zero deflection instead of pushing."""
+        """Whether the spring is a tendon, which goes slack at zero deflection instead of pushing."""
         return False
 
     @property
@@ -81,16 +81,16 @@ class SpringLaw(ABC):
         return tuple(method(phi) for method in methods[: order + 1])
 
     def state(self, phi: FloatArray) -> SpringState:
-        """Torque and all derivatives at deflections."""
+        """State of the spring at deflections."""
         return SpringState(*self.derivatives(phi, 3))
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection under a torque and the spring there; for laws that find both in one."""
+    def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
+        """Deflection under a torque and the state there; for laws whose iteration finds both."""
         phi = self.deflection(torque)
         return phi, self.state(phi)
 
-    def loaded(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Energy and all derivatives; for laws in which they share work."""
+    def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
+        """Energy and state at deflections; for laws in which they share work."""
         return self.energy(phi), self.state(phi)
 
     @abstractmethod

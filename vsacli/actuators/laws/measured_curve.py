@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 DEGREE = 3
-MOST_PIECES = 24
+MAX_PIECES = 24
 """Knot spans of g; a spring has no finer features than a few dozen measured points can show."""
 
-LEAST_STIFFNESS = 1e-3
+REST_STIFFNESS_SHARE = 1e-3
 """Share of its mean stiffness that a spring which pushes and pulls has at rest, since sigma > 0 is needed."""
 
-TINY = float(np.finfo(float).tiny)
+LEAST_SHAPE_SIZE = float(np.finfo(float).tiny)
 """Instead of the size of a shape between two measured deflections, which is zero at both."""
 
 
@@ -101,8 +101,8 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> MeasuredCurve:
     knots = _knots(float(deflection[0]), float(deflection[-1]), len(deflection))
     shapes = [_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
     columns = np.column_stack([deflection, *(shape(deflection, 1, 1)[0] for shape in shapes)])
-    sizes = np.maximum(np.abs(columns).max(axis=0), TINY)
-    least = LEAST_STIFFNESS * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
+    sizes = np.maximum(np.abs(columns).max(axis=0), LEAST_SHAPE_SIZE)
+    least = REST_STIFFNESS_SHARE * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
     excess, *weights = nnls(columns / sizes, torque - least * deflection)[0] / sizes
     curve = _curve(knots, np.array(weights), least + excess)
     return dataclasses.replace(curve, residual=float(np.abs(curve(deflection, 1, 1)[0] - torque).max()))
@@ -110,7 +110,7 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> MeasuredCurve:
 
 def _knots(low: float, high: float, samples: int) -> FloatArray:
     """Knots of g, one of them at zero; about two measured points to a span."""
-    pieces = int(np.clip(samples // 2, 1, MOST_PIECES))
+    pieces = int(np.clip(samples // 2, 1, MAX_PIECES))
     above = max(1, round(pieces * high / (high - low)))
     below = max(1, pieces - above) if low < 0 else 0
     breaks = np.concatenate((np.linspace(low, 0, below, endpoint=False), np.linspace(0, high, above + 1)))

@@ -36,7 +36,7 @@ class PairSolution(NamedTuple):
         """phi_1 and phi_2, (2, samples)."""
         return np.stack((self.phi_1, self.phi_2))
 
-    def mirrored(self) -> PairSolution:
+    def exchanged(self) -> PairSolution:
         """The same with the two sides exchanged."""
         return self._replace(phi_1=self.phi_2, phi_2=self.phi_1)
 

@@ -9,7 +9,7 @@ from functools import cached_property, reduce
 
 import numpy as np
 
-from vsacli.actuators.inversion import inverse, turned_to
+from vsacli.actuators.laws.inverse import inverse, with_sign_of
 from vsacli.actuators.laws.law import SpringLaw
 from vsacli.actuators.laws.state import SpringState
 from vsacli.base import units
@@ -67,10 +67,10 @@ class Polynomial(SpringLaw):
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration from the bound that each term alone sets."""
-        return self.under(torque)[0]
+        return self.deflection_and_state(torque)[0]
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection and spring by one iteration."""
+    def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
+        """Deflection and state by one iteration."""
         load = np.abs(torque)
         bounds = [
             (load / coefficient) ** (1 / (2 * index + 1))
@@ -78,7 +78,7 @@ class Polynomial(SpringLaw):
             if coefficient > 0
         ]
         high = reduce(np.minimum, bounds)
-        return turned_to(torque, *inverse(self, load, np.zeros_like(load), high, start=high))
+        return with_sign_of(torque, *inverse(self, load, np.zeros_like(load), high, start=high))
 
     def _derivative(self, order: int, squared: FloatArray) -> FloatArray:
         """Derivative of the torque, without the factor phi that those of even order have."""

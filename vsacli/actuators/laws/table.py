@@ -8,19 +8,19 @@ from functools import cached_property
 
 import numpy as np
 
-from vsacli.actuators.inversion import FirstGuess, inverse
+from vsacli.actuators.laws.inverse import FirstGuess, inverse
 from vsacli.actuators.laws.law import SpringLaw
 from vsacli.actuators.laws.measured_curve import MeasuredCurve, fit_curve
-from vsacli.actuators.laws.mirrored import Mirrored
 from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.tendon import Mirrored
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.documents.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
 
-LEAST_ROWS = 6
-NODES = 25
+MIN_ROWS = 6
+GUESS_NODES = 25
 """Points of the curve on either side that the first guess of the inverse begins with."""
 
 SHAPE_TOLERANCE = 1e-3
@@ -91,7 +91,7 @@ class MeasuredSpring(SpringLaw):
         """Of the fitted curve, looked up once."""
         return self._curve(phi, 1, order + 1)
 
-    def loaded(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
+    def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
         """Of the fitted curve, looked up once."""
         energy, *derivatives = self._curve(phi, 0, 4)
         return energy, SpringState(*derivatives)
@@ -118,10 +118,10 @@ class MeasuredSpring(SpringLaw):
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse by safeguarded iteration within the measured range."""
-        return self.under(torque)[0]
+        return self.deflection_and_state(torque)[0]
 
-    def under(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Deflection and spring by one iteration."""
+    def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
+        """Deflection and state by one iteration."""
         low, high = (np.full_like(torque, end) for end in self.domain)
         least, largest = self.torque_range
         carried = np.minimum(np.maximum(torque, least), largest)
@@ -131,7 +131,7 @@ class MeasuredSpring(SpringLaw):
     @cached_property
     def _first_guess(self) -> FirstGuess:
         low, high = self.domain
-        shares = np.linspace(0, 1, NODES)
+        shares = np.linspace(0, 1, GUESS_NODES)
         return FirstGuess(self, np.unique(np.concatenate((low * shares, high * shares))))
 
 
@@ -143,8 +143,8 @@ def _problems(table: Table) -> Iterator[Problem]:
     def at(row: int, message: str) -> Problem:
         return Problem(path, table.line_of(row), message)
 
-    if len(deflection) < LEAST_ROWS:
-        yield Problem(path, 0, f"expected at least {LEAST_ROWS} rows, found {len(deflection)}")
+    if len(deflection) < MIN_ROWS:
+        yield Problem(path, 0, f"expected at least {MIN_ROWS} rows, found {len(deflection)}")
     elif sizes := list(_wrong_sizes(deflection, torque)):
         yield from (at(row, message) for row, message in sizes)
     elif not deflection[0] <= 0 < deflection[-1]:

@@ -19,6 +19,6 @@ def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:
     closed = first.closed_pair(second)
     if closed is not None:
         return closed
-    from vsacli.actuators.pairs.iterated import IteratedPair
+    from vsacli.actuators.pairs.solver import IteratedPair
 
     return IteratedPair(first, second)

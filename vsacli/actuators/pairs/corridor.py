@@ -7,16 +7,20 @@ outermost of them, the piece is monotone to the end of the laws' domain.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.pairs.balance import Balance
-from vsacli.actuators.pairs.ends import LARGEST, SMALLEST, at_end
-from vsacli.actuators.pairs.folds import Folds
-from vsacli.actuators.pairs.outermost import outermost_fold
-from vsacli.actuators.pairs.state import PairState
+from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.pairs.balance import Balance, PairState
+from vsacli.actuators.pairs.folds import Folds, outermost_fold
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.control_flow import Values, where_needed
+
+SMALLEST_PRELOAD, LARGEST_PRELOAD = 0, 1
+"""The two ends of the preload torque: side 1 at that end of its domain, or side 2 at the opposite one."""
 
 
 class End(NamedTuple):
@@ -39,7 +43,7 @@ class Corridor(NamedTuple):
         rising: whether the stiffness increases with the preload.
         critical: whether the inner end is a critical point (else the end of a law's domain).
         slack: whether a side that only pulls carries no torque at the inner end.
-        springs: both springs at the inner end.
+        state: both springs at the inner end.
     """
 
     inner: End
@@ -47,38 +51,85 @@ class Corridor(NamedTuple):
     rising: BoolArray
     critical: BoolArray
     slack: BoolArray
-    springs: PairState
+    state: PairState
 
 
 def corridor(balance: Balance, folds: Folds, tau_e: FloatArray) -> Corridor:
     """The piece of the joint stiffness that reaches the largest preload, for each tau_e (samples,)."""
-    least, largest = balance.domain(tau_e)
+    least, largest = balance.preload_range(tau_e)
     carried = least <= largest
-    known, fold = outermost_fold(balance, folds, tau_e)
-    critical = carried & known & ((tau_e != 0) | ((least < 0) & (largest > 0)))
-    springs = PairState.of(
-        at_end(balance, SMALLEST, tau_e, carried & ~critical, fold.values, lambda springs: springs.values)
+    exists, fold = outermost_fold(balance, folds, tau_e)
+    critical = carried & exists & ((tau_e != 0) | ((least < 0) & (largest > 0)))
+    inner = PairState.of(
+        _at_end(
+            balance, SMALLEST_PRELOAD, tau_e, carried & ~critical, fold.values, lambda state: state.values
+        )
     )
-    outer = End(*at_end(balance, LARGEST, tau_e, carried, _endless(balance, tau_e), _end))
+    outer = End(*_at_end(balance, LARGEST_PRELOAD, tau_e, carried, _endless(balance, tau_e), _end))
     return Corridor(
-        inner=_known(_end(springs), carried),
-        outer=_known(outer, carried),
-        rising=outer.stiffness >= springs.stiffness,
+        inner=_if_carried(_end(inner), carried),
+        outer=_if_carried(outer, carried),
+        rising=outer.stiffness >= inner.stiffness,
         critical=critical,
         slack=balance.is_slack(tau_e, least),
-        springs=springs,
+        state=inner,
     )
 
 
-def _end(springs: PairState) -> End:
-    return End(springs.phi_1, springs.phi_2, springs.stiffness)
+def _end(state: PairState) -> End:
+    return End(state.phi_1, state.phi_2, state.stiffness)
 
 
 def _endless(balance: Balance, tau_e: FloatArray) -> End:
     """What the springs come close to while the preload grows without end."""
-    phi_1, phi_2 = balance.first.domain[LARGEST], balance.second.domain[1 - LARGEST]
+    phi_1 = balance.first.domain[LARGEST_PRELOAD]
+    phi_2 = balance.second.domain[1 - LARGEST_PRELOAD]
     return End(*(np.full_like(tau_e, value) for value in (phi_1, phi_2, np.inf)))
 
 
-def _known(end: End, carried: BoolArray) -> End:
+def _if_carried(end: End, carried: BoolArray) -> End:
     return end._replace(stiffness=np.where(carried, end.stiffness, np.nan))
+
+
+def _at_end(
+    balance: Balance,
+    end: int,
+    tau_e: FloatArray,
+    chosen: BoolArray,
+    otherwise: Values,
+    wanted: Callable[[PairState], Values],
+) -> Values:
+    """What is wanted of the springs where the preload ends; arrays (samples,).
+
+    Args:
+        balance: the springs.
+        end: `SMALLEST_PRELOAD` or `LARGEST_PRELOAD`.
+        tau_e: elastic torque.
+        chosen: where to compute that.
+        otherwise: what holds elsewhere, and where the preload has no end.
+        wanted: arrays to return, as many as there are otherwise.
+    """
+    first, second = balance.first, balance.second
+    tau_1, tau_2 = first.torque_range[end], second.torque_range[1 - end]
+    first_ends = tau_1 <= tau_e - tau_2 if end == LARGEST_PRELOAD else tau_1 >= tau_e - tau_2
+
+    def with_first(tau_e: FloatArray) -> Values:
+        phi_1 = np.full_like(tau_e, first.domain[end])
+        phi_2, two = second.deflection_and_state(tau_e - tau_1)
+        return wanted(PairState(phi_1, phi_2, _everywhere(balance.domain_ends[0][end], tau_e), two))
+
+    def with_second(tau_e: FloatArray) -> Values:
+        phi_1, one = first.deflection_and_state(tau_e - tau_2)
+        phi_2 = np.full_like(tau_e, second.domain[1 - end])
+        return wanted(PairState(phi_1, phi_2, one, _everywhere(balance.domain_ends[1][1 - end], tau_e)))
+
+    values = otherwise
+    if math.isfinite(tau_1):
+        values = where_needed(chosen & first_ends, with_first, (tau_e,), values)
+    if math.isfinite(tau_2):
+        values = where_needed(chosen & ~first_ends, with_second, (tau_e,), values)
+    return values
+
+
+def _everywhere(state: SpringState, like: FloatArray) -> SpringState:
+    return SpringState(*(np.full_like(like, value) for value in state))

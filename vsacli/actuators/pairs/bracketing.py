@@ -12,10 +12,14 @@ from vsacli.compute.control_flow import Values, repeat
 Function = Callable[..., FloatArray]
 """f(x, *constants) on arrays of one shape."""
 
-MOST_STEPS = 120
+MAX_STEPS = 120
 """Twice what bisection needs between neighbouring powers of two; more only if an end lies at zero."""
 
-ROUNDING = 2 * float(np.finfo(float).eps)
+ROOT_RTOL = 2 * float(np.finfo(float).eps)
+"""Relative width of a bracket that cannot be halved any more."""
+
+ROOT_ATOL = 1e-300
+"""The same of a bracket at zero."""
 
 
 def bracketed_root(
@@ -23,7 +27,7 @@ def bracketed_root(
 ) -> FloatArray:
     """A root between `low` and `high`, where the function has opposite signs, to rounding.
 
-    If they have one sign, the end that is nearer to zero.
+    If they have one sign, the end at which the function is nearer to zero.
 
     T. R. Chandrupatla, A new hybrid quadratic/bisection algorithm for finding the zero of a nonlinear
     function without using derivatives, Advances in Engineering Software 28 (1997). Arrays (samples,).
@@ -37,21 +41,18 @@ def bracketed_root(
         x_3, f_3 = np.where(same, x_1, x_2), np.where(same, f_1, f_2)
         x_2, f_2 = np.where(same, x_2, x_1), np.where(same, f_2, f_1)
         width = np.abs(x_2 - x)
-        resolution = ROUNDING * np.minimum(np.abs(x), np.abs(x_2)) + TINY
-        least = resolution / np.maximum(width, TINY)
+        resolution = ROOT_RTOL * np.minimum(np.abs(x), np.abs(x_2)) + ROOT_ATOL
+        least = resolution / np.maximum(width, ROOT_ATOL)
         share = np.clip(_next_share(x, f, x_2, f_2, x_3, f_3), least, 1 - least)
         return (share, x, f, x_2, f_2, x_3, f_3), (width <= 2 * resolution) | (f == 0)
 
     at_low, at_high = function(low, *constants), function(high, *constants)
     half = np.full_like(low, 0.5)
     start = (half, low, at_low, high, at_high, high, at_high)
-    _, x_1, f_1, x_2, f_2, _, _ = repeat(step, start, constants, MOST_STEPS)
+    _, x_1, f_1, x_2, f_2, _, _ = repeat(step, start, constants, MAX_STEPS)
     enclosed = (at_low < 0) & (at_high > 0) | (at_low > 0) & (at_high < 0)
     end = np.where(np.abs(at_low) <= np.abs(at_high), low, high)
     return np.where(enclosed, np.where(np.abs(f_1) <= np.abs(f_2), x_1, x_2), end)
-
-
-TINY = 1e-300
 
 
 def _next_share(

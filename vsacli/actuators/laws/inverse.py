@@ -1,0 +1,130 @@
+"""Inverse of a spring law that has no closed one: Halley's method in a shrinking bracket."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.state import SpringState
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
+
+MAX_HALLEY_STEPS = 200
+"""More than bisection alone needs for all digits of a double."""
+
+HALLEY_RTOL = 2e-6
+"""Relative error of the torque from which one more step leaves rounding only: it takes the third power."""
+
+GUESS_RTOL = 1e-6
+"""Relative error of the torque with which a first guess is content."""
+
+MAX_HALVINGS = 20
+"""Times that cells between the nodes of a first guess are halved; next to slack the deflection is a root of
+the torque, which no cubic comes close to."""
+
+LEAST_TORQUE_RISE = 1e-100
+"""Stands for the difference of two torques that rounding has made equal, N m (N)."""
+
+
+def inverse(
+    law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
+) -> tuple[FloatArray, SpringState]:
+    """Deflection at which a law has a torque, and the state of the spring there; arrays (samples,).
+
+    The last step is so short that the state before it gives the state after it.
+
+    Args:
+        law: the spring.
+        torque: torque of the spring, N m (N).
+        low: deflection that is not above the one sought, rad (m).
+        high: deflection that is not below the one sought.
+        start: first guess; next to the solution one step does, without a loop.
+    """
+    with np.errstate(all="ignore"):  # without stiffness at rest, a step leads nowhere
+        phi, error, state = _halley_step(law, torque, start)
+        converged = _converges(torque, error) & (phi >= low) & (phi <= high)
+        phi, *values = where_needed(
+            ~converged,
+            lambda *known: _safeguarded(law, *known),
+            (torque, low, high, start),
+            (phi, *state.after(phi - start)),
+        )
+        return np.where(torque == 0, 0.0, phi), SpringState(*values)
+
+
+def _halley_step(
+    law: SpringLaw, torque: FloatArray, phi: FloatArray
+) -> tuple[FloatArray, FloatArray, SpringState]:
+    """The deflection after a step, and the error of the torque and the state of the spring before it.
+
+    Halley's correction of the Newton step is kept between one half and two.
+    """
+    state = law.state(phi)
+    error = state.tau - torque
+    newton = error / state.sigma
+    correction = newton * state.zeta / (2 * state.sigma)
+    return phi - newton / np.minimum(np.maximum(1 - correction, 0.5), 2), error, state
+
+
+def _converges(torque: FloatArray, error: FloatArray) -> BoolArray:
+    """Whether a step from such an error of the torque leaves rounding only."""
+    converges: BoolArray = np.abs(error) <= HALLEY_RTOL * np.abs(torque)
+    return converges
+
+
+def _safeguarded(
+    law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
+) -> Values:
+    """`inverse` from a start that is far away: Halley's steps within the bracket, else bisection."""
+
+    def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+        (phi, low, high, *_), (torque,) = state, constants
+        halley, error, spring = _halley_step(law, torque, phi)
+        low, high = np.where(error <= 0, phi, low), np.where(error >= 0, phi, high)
+        inside = (halley >= low) & (halley <= high)
+        following = np.where(inside, halley, (low + high) / 2)
+        converged = inside & _converges(torque, error)
+        return (following, low, high, *spring.after(following - phi)), converged | ~(low < high)
+
+    low = np.where(np.isfinite(torque), low, np.nan)
+    phi, _, _, *spring = repeat(step, (start, low, high, *[start] * 4), (torque,), MAX_HALLEY_STEPS)
+    return phi, *spring
+
+
+def with_sign_of(torque: FloatArray, phi: FloatArray, state: SpringState) -> tuple[FloatArray, SpringState]:
+    """Deflection and state of an odd law under a torque, from those under the size of the torque."""
+    tau, zeta = np.copysign(state.tau, torque), np.copysign(state.zeta, torque)
+    return np.copysign(phi, torque), state._replace(tau=tau, zeta=zeta)
+
+
+class FirstGuess:
+    """Deflection over the torque by Hermite's cubics between nodes of a law that are computed once."""
+
+    def __init__(self, law: SpringLaw, nodes: FloatArray) -> None:
+        """Begin with ascending nodes, and halve the cells that are too wide for a cubic."""
+        self._interpolate(law, nodes)
+        for _ in range(MAX_HALVINGS):
+            middle = (nodes[:-1] + nodes[1:]) / 2
+            torque = law.torque(middle)
+            guessed = law.torque(np.clip(self(torque), nodes[:-1], nodes[1:]))
+            too_wide = np.abs(guessed - torque) > GUESS_RTOL * np.abs(torque)
+            if not too_wide.any():
+                break
+            nodes = np.union1d(nodes, middle[too_wide])
+            self._interpolate(law, nodes)
+
+    def _interpolate(self, law: SpringLaw, nodes: FloatArray) -> None:
+        torque, stiffness = law.derivatives(nodes, 1)
+        compliance = 1 / np.where(stiffness == 0, np.inf, stiffness)
+        rise, width = np.diff(nodes), np.maximum(np.diff(torque), LEAST_TORQUE_RISE)
+        mean, first, last = rise / width, compliance[:-1], compliance[1:]
+        quadratic, cubic = (3 * mean - 2 * first - last) / width, (first + last - 2 * mean) / width**2
+        self._torque = torque[:-1]
+        self._coefficients = nodes[:-1], first, quadratic, cubic
+
+    def __call__(self, torque: FloatArray) -> FloatArray:
+        """The deflection under torques within those of the nodes."""
+        cell = np.searchsorted(self._torque[1:], torque, side="right")
+        start, a, b, c, d = look_up((self._torque, *self._coefficients), cell)
+        x = torque - start
+        return a + x * (b + x * (c + x * d))

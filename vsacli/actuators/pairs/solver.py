@@ -1,0 +1,200 @@
+"""Any two spring laws: (14) solved by steps of third order on the outermost branch, guarded by bracketing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.pair import Pair, PairSolution
+from vsacli.actuators.pairs.balance import Balance
+from vsacli.actuators.pairs.bracketing import bracketed_root
+from vsacli.actuators.pairs.corridor import Corridor, corridor
+from vsacli.actuators.pairs.equal_torque import first_guess, third_order_step
+from vsacli.actuators.pairs.folds import Folds, map_folds
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.control_flow import Values, repeat, where_needed
+
+MAX_STEPS = 30
+"""Three or four do, except next to a cusp or far beyond what the springs are made for."""
+
+ERROR_RTOL = 1e-17
+"""Relative error after a step that is none: the estimate may be some hundred times too small."""
+
+MAX_DOUBLINGS = 1000
+"""From about the demand on, a preload torque leaves the range of numbers before."""
+
+
+@dataclass(frozen=True)
+class IteratedPair(Pair):
+    """Two laws without a closed solution."""
+
+    first: SpringLaw
+    second: SpringLaw
+
+    @cached_property
+    def _balance(self) -> Balance:
+        return Balance(self.first, self.second)
+
+    @cached_property
+    def _folds(self) -> Folds:
+        return map_folds(self.first, self.second)
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+        """Solve (14) for each sample; see `Pair.solve`."""
+        balance, folds = self._balance, self._folds
+        with np.errstate(all="ignore"):  # trial steps may lead anywhere, and are refused there
+            piece = corridor(balance, folds, tau_e)
+            lower = np.minimum(piece.inner.stiffness, piece.outer.stiffness)
+            upper = np.maximum(piece.inner.stiffness, piece.outer.stiffness)
+            demand = np.minimum(np.maximum(stiffness, lower), upper)
+            phi_1, phi_2 = _deflections(balance, piece, tau_e, demand)
+        return PairSolution(
+            lower=lower,
+            upper=upper,
+            lower_critical=piece.critical & piece.rising,
+            upper_critical=piece.critical & ~piece.rising,
+            slack_below=~piece.critical & piece.rising & piece.slack,
+            phi_1=phi_1,
+            phi_2=phi_2,
+        )
+
+
+class _Box(NamedTuple):
+    """Deflections between the ends of the piece, where the solution lies; arrays (samples,).
+
+    Attributes:
+        inner_1: phi_1 at the inner end, its smallest.
+        outer_1: phi_1 at the outer end, its largest.
+        inner_2: phi_2 at the inner end, its largest.
+        outer_2: phi_2 at the outer end, its smallest.
+        outer_near: 1 where the stiffness at the outer end is at most twice the demand, else 0.
+    """
+
+    inner_1: FloatArray
+    outer_1: FloatArray
+    inner_2: FloatArray
+    outer_2: FloatArray
+    outer_near: FloatArray
+
+    @classmethod
+    def of(cls, piece: Corridor, demand: FloatArray) -> _Box:
+        """The box of a piece."""
+        inner, outer = piece.inner, piece.outer
+        near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
+        return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near)
+
+    def holds(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
+        """Whether deflections lie between the ends, and not at the outer one."""
+        inside: BoolArray = (
+            (self.inner_1 <= phi_1)
+            & (phi_1 < self.outer_1)
+            & (self.outer_2 < phi_2)
+            & (phi_2 <= self.inner_2)
+        )
+        return inside
+
+    def confined(
+        self, phi_1: FloatArray, phi_2: FloatArray, target_1: FloatArray, target_2: FloatArray
+    ) -> Values:
+        """Targets of a step from deflections in the box, moved back into it."""
+        return (
+            _short_of(phi_1, _not_below(phi_1, target_1, self.inner_1), self.outer_1, self.outer_near > 0),
+            -_short_of(
+                -phi_2, _not_below(-phi_2, -target_2, -self.inner_2), -self.outer_2, self.outer_near > 0
+            ),
+        )
+
+
+def _not_below(start: FloatArray, target: FloatArray, inner: FloatArray) -> FloatArray:
+    """The target, or half way to the inner end if it lies on the other side of that."""
+    return np.where(target < inner, (start + inner) / 2, target)
+
+
+def _short_of(start: FloatArray, target: FloatArray, outer: FloatArray, near: BoolArray) -> FloatArray:
+    """The target, but not beyond the outer end; half way to it if the demand is far from the stiffness there."""
+    return np.where(target >= outer, np.where(near, outer, (start + outer) / 2), target)
+
+
+def _deflections(balance: Balance, piece: Corridor, tau_e: FloatArray, demand: FloatArray) -> Values:
+    """phi_1 and phi_2 where the piece has a stiffness, which lies within its ends; arrays (samples,)."""
+    sign = np.where(piece.rising, 1.0, -1.0)
+    inner = piece.inner
+    box = _Box.of(piece, demand)
+    guess = first_guess(piece.state, inner.stiffness, demand, sign)
+    start = where_needed(
+        ~box.holds(*guess),
+        lambda phi_1, phi_2, guess_1, guess_2, *box: _Box(*box).confined(phi_1, phi_2, guess_1, guess_2),
+        (inner.phi_1, inner.phi_2, *guess, *box),
+        guess,
+    )
+    phi_1, phi_2, error = repeat(
+        lambda state, constants: _step(balance, state, constants),
+        (*start, np.zeros_like(tau_e)),
+        (tau_e, demand, sign, inner.stiffness, *box),
+        MAX_STEPS,
+    )
+    return where_needed(
+        ~(error <= ERROR_RTOL) & ~np.isnan(demand),
+        lambda *known: _bracketed(balance, *known),
+        (tau_e, demand, inner.phi_1),
+        (phi_1, phi_2),
+    )
+
+
+def _step(balance: Balance, state: Values, constants: Values) -> tuple[Values, BoolArray]:
+    """A step of third order on (14) that stays in the box, and whether it was the last."""
+    phi_1, phi_2, _ = state
+    tau_e, demand, sign, inner_stiffness, *bounds = constants
+    step_1, step_2, error = third_order_step(balance.state(phi_1, phi_2), tau_e, demand, sign)
+    target = phi_1 + step_1, phi_2 + step_2
+    *following, error = where_needed(
+        (demand == inner_stiffness) | ~_Box(*bounds).holds(*target),
+        _confined_step,
+        (demand, inner_stiffness, error, phi_1, phi_2, *target, *bounds),
+        (*target, error),
+    )
+    return (*following, error), ~(error > ERROR_RTOL)
+
+
+def _confined_step(
+    demand: FloatArray,
+    inner_stiffness: FloatArray,
+    error: FloatArray,
+    phi_1: FloatArray,
+    phi_2: FloatArray,
+    target_1: FloatArray,
+    target_2: FloatArray,
+    *bounds: FloatArray,
+) -> Values:
+    """A step moved back into the box; none, and no error, where the demand is that of the inner end."""
+    confined_1, confined_2 = _Box(*bounds).confined(phi_1, phi_2, target_1, target_2)
+    met = demand == inner_stiffness
+    return np.where(met, phi_1, confined_1), np.where(met, phi_2, confined_2), np.where(met, 0.0, error)
+
+
+def _bracketed(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1: FloatArray) -> Values:
+    """phi_1 and phi_2 by bracketing the torque x that the preload gains from the inner end on."""
+    tau_1 = balance.first.torque(inner_1)
+    tau_2 = tau_e - tau_1
+
+    def missing(x: FloatArray, tau_1: FloatArray, tau_2: FloatArray, demand: FloatArray) -> FloatArray:
+        return demand - balance.stiffness(*balance.deflections(tau_1 + x, tau_2 - x))
+
+    least, largest = np.zeros_like(tau_e), balance.preload_range(tau_e)[1] + tau_e / 2 - tau_1
+    endless = np.isinf(largest)
+    guess = np.where(endless, np.abs(tau_1) + np.abs(tau_2) + demand, largest)
+
+    def widened(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+        (width,) = state
+        *known, endless = constants
+        short = (endless > 0) & (missing(width, *known) > 0)
+        return (np.where(short, 2 * width, width),), ~short
+
+    known = tau_1, tau_2, demand
+    (width,) = repeat(widened, (guess,), (*known, np.where(endless, 1.0, 0.0)), MAX_DOUBLINGS)
+    x = bracketed_root(missing, least, width, known)
+    return balance.deflections(tau_1 + x, tau_2 - x)
