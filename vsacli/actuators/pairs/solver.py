@@ -115,7 +115,7 @@ def _not_below(start: FloatArray, target: FloatArray, inner: FloatArray) -> Floa
 
 
 def _short_of(start: FloatArray, target: FloatArray, outer: FloatArray, near: BoolArray) -> FloatArray:
-    """The target, but not beyond the outer end; half way to it if the demand is far from the stiffness there."""
+    """The target, not beyond the outer end; half way to it if the demand is far from the stiffness there."""
     return np.where(target >= outer, np.where(near, outer, (start + outer) / 2), target)
 
 
