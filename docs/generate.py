@@ -28,7 +28,7 @@ from vsacli.base.flags import Flag
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
-from vsacli.cli.exit_codes import Exit
+from vsacli.cli.console import Exit
 from vsacli.cli.main import vsacli
 from vsacli.control.poles import PolesFile
 from vsacli.files.examples import Example, examples, opening_comment

@@ -13,7 +13,7 @@ from samples.command_line import COMMAND, REST_TO_REST, ROBOT, contents, edited,
 from samples.marks import slow
 
 from vsacli import __version__
-from vsacli.cli.exit_codes import Exit
+from vsacli.cli.console import Exit
 from vsacli.cli.main import vsacli as group
 
 

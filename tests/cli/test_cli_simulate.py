@@ -13,7 +13,7 @@ from samples.command_line import REPOSITORY, ROBOT, contents, edited
 
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
-from vsacli.cli.exit_codes import Exit
+from vsacli.cli.console import Exit
 from vsacli.results.store.reader import open_result
 from vsacli.results.store.simulation import StoredSimulation
 

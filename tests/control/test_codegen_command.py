@@ -11,7 +11,7 @@ from conftest import Outcome
 from samples.command_line import REPOSITORY, ROBOT, contents, edited
 from samples.generated_code import COMPILERS, STRICT, compile_c
 
-from vsacli.cli.exit_codes import Exit
+from vsacli.cli.console import Exit
 from vsacli.control.codegen.project import prefix_of
 from vsacli.robot.model import Robot
 

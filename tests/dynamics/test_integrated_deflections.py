@@ -28,6 +28,7 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.exponential import Exponential
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
+from vsacli.base.errors import InputError
 from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.dynamics.integrated_deflections.task import Task
 from vsacli.robot.model import Robot
@@ -151,3 +152,8 @@ def test_only_antagonistic_joints_are_followed():
     assert [drift.joint for drift in result.report.drifts] == ["shoulder"]
     np.testing.assert_array_equal(result.phi[:, 0], root.phi[:, 0])
     assert np.isfinite(result.phi[:, 1]).all()
+
+
+def test_unknown_deflections_are_refused():
+    with pytest.raises(InputError, match=r"^unknown deflections 'integral'; did you mean 'integrate'\?$"):
+        inverse_dynamics(ARM, motion(), deflections="integral")

@@ -14,6 +14,8 @@ from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has
 from vsacli.base.variables import Block
 from vsacli.compute.engine import choose
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
     from vsacli.analysis.result import Result
     from vsacli.dynamics.integrated_deflections import IntegratedDeflections
 
+DEFLECTIONS = ("root", "integrate")
+"""How deflections are found: as the root of (14) at each step, or from that of the first step by (19)."""
+
 
 class Run:
     """One pass over a trajectory: iterate it for the blocks, then ask it for the report.
@@ -35,7 +40,8 @@ class Run:
         trajectory: what it is asked to do.
         stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does.
         near_singular: margin below which a step is near-singular.
-        deflections: integrated ones to use instead of the root of (14) at each step.
+        deflections: "root" of (14) at each step; "integrate" follows that of the first step by (19); or those
+            that were integrated before.
         block_samples: steps in a block, as `usual_block` has it if None; results do not depend on it.
         engine: what computes, one of `vsacli.compute.engine.NAMES`.
         threads: of compiled code; as many as there are processors if None.
@@ -44,8 +50,8 @@ class Run:
         choice: the engine that was chosen, and why.
 
     Raises:
-        InputError: the margin is none, the trajectory does not fit the robot, there is no such engine,
-            or no C compiler for it.
+        InputError: the margin is none, the trajectory does not fit the robot, there are no such deflections,
+            there is no such engine, or no C compiler for it.
     """
 
     def __init__(
@@ -55,7 +61,7 @@ class Run:
         *,
         stop_on_infeasible: bool = False,
         near_singular: float = NEAR_SINGULAR,
-        deflections: IntegratedDeflections | None = None,
+        deflections: str | IntegratedDeflections = "root",
         block_samples: int | None = None,
         engine: str = "numpy",
         threads: int | None = None,
@@ -67,12 +73,12 @@ class Run:
         self._stop_on_infeasible = stop_on_infeasible
         self._near_singular = near_singular
         self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
-        self._deflections = deflections
+        self._deflections = _integrated(deflections, robot, trajectory)
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        kernel = InverseDynamics(robot, frame, near_singular, deflections is not None)
+        kernel = InverseDynamics(robot, frame, near_singular, followed=self._deflections is not None)
         self.choice = choose(engine, kernel, trajectory.samples, threads)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
-        self._drifts = [] if deflections is None else _drift_summaries(robot, deflections)
+        self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
         self._energy = RunEnergy(robot)
         self._spring_residual = 0.0
         self._samples = 0
@@ -127,7 +133,7 @@ def inverse_dynamics(
     trajectory: Trajectory,
     *,
     stop_on_infeasible: bool = False,
-    deflections: IntegratedDeflections | None = None,
+    deflections: str | IntegratedDeflections = "root",
     engine: str = "numpy",
 ) -> Result:
     """Motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
@@ -138,7 +144,8 @@ def inverse_dynamics(
         robot: the robot, from `load_robot` or built in Python.
         trajectory: for this robot, from `load_trajectory` or `Trajectory.from_samples`.
         stop_on_infeasible: end with the first infeasible step.
-        deflections: integrated ones to use instead of the root of (14) at each step.
+        deflections: "root" of (14) at each step; "integrate" follows that of the first step by (19); or those
+            that were integrated before.
         engine: what computes, "numpy", compiled "c", or "auto", which takes the latter where that saves
             time.
 
@@ -147,7 +154,7 @@ def inverse_dynamics(
 
     Raises:
         InputError: the trajectory has another number of joints than the robot, or no stiffness for a joint
-            that needs one; there is no such engine, or no C compiler for it.
+            that needs one; there are no such deflections, there is no such engine, or no C compiler for it.
     """
     from vsacli.analysis.result import Result
 
@@ -155,6 +162,21 @@ def inverse_dynamics(
         robot, trajectory, stop_on_infeasible=stop_on_infeasible, deflections=deflections, engine=engine
     )
     return Result(**_joined(list(run)), report=run.report(), joint_names=robot.joint_names)
+
+
+def _integrated(
+    deflections: str | IntegratedDeflections, robot: Robot, trajectory: Trajectory
+) -> IntegratedDeflections | None:
+    """The deflections to use instead of the root of (14) at each step; None if the root shall be used."""
+    if not isinstance(deflections, str):
+        return deflections
+    if deflections not in DEFLECTIONS:
+        raise InputError.one(f"unknown deflections {deflections!r}{did_you_mean(deflections, DEFLECTIONS)}")
+    if deflections == "root":
+        return None
+    from vsacli.dynamics.integrated_deflections import integrate_deflections
+
+    return integrate_deflections(robot, trajectory)
 
 
 def _drift_summaries(robot: Robot, deflections: IntegratedDeflections) -> list[DriftSummary]:

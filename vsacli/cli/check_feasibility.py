@@ -9,25 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.options import (
+from vsacli.cli.command_parts import (
+    compute,
     deflections_option,
     engine_options,
     example,
     json_option,
+    load_inputs,
     overwrite_option,
+    refuse_input_as_output,
     robot_argument,
+    run_stem,
+    show_report,
     stop_option,
     trajectory_argument,
 )
-from vsacli.cli.running import (
-    chosen_deflections,
-    compute,
-    load_inputs,
-    refuse_input_as_output,
-    run_stem,
-    show_report,
-)
+from vsacli.cli.console import Talk, talk_options
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -113,7 +110,7 @@ def check_feasibility(
         *inputs,
         stop_on_infeasible=stop_on_infeasible,
         near_singular=margin,
-        deflections=chosen_deflections(deflections, *inputs),
+        deflections=deflections,
         engine=engine,
         threads=threads,
     )

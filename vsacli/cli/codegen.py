@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import click
 
-from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.exit_codes import Exit
-from vsacli.cli.options import example, overwrite_option, robot_argument
+from vsacli.cli.command_parts import example, overwrite_option, robot_argument
+from vsacli.cli.console import Exit, Talk, talk_options
 
 
 @click.command(

@@ -1,14 +1,15 @@
-"""Talking to the user: results to stdout, notes and progress to stderr."""
+"""Talking to the user: results to stdout, notes and progress to stderr, and the exit code."""
 
 from __future__ import annotations
 
+import enum
 import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, TextIO, cast
+from typing import Any, Self, TextIO, cast
 
 import click
 
@@ -16,6 +17,36 @@ from vsacli.base.errors import StorageError
 
 PROGRESS_FROM = 100_000
 """Steps from which on a run is long enough for a progress bar."""
+
+
+class Exit(enum.IntEnum):
+    """Exit codes, each with its meaning: its line in the help and in the documentation."""
+
+    meaning: str
+
+    OK = 0, "done; every step feasible, regular and within limits"
+    BUG = 1, "a bug, or a result whose self-check failed (written, and its verdict says so)"
+    USAGE = 2, "usage or input error: one line for each problem; nothing written"
+    VERDICT = 3, "done, but some steps are infeasible, singular or over a limit; the report says which"
+    STORAGE = 4, "a file cannot be read or written (disk full, permission); the target is untouched"
+    INTERRUPTED = 130, "interrupted; the target is untouched"
+
+    def __new__(cls, code: int, meaning: str) -> Self:
+        """A code with what it means, which cannot be left out."""
+        member = int.__new__(cls, code)
+        member._value_ = code
+        member.meaning = meaning
+        return member
+
+
+OF_VERDICT = {
+    "ok": Exit.OK,
+    "over_limit": Exit.VERDICT,
+    "singular": Exit.VERDICT,
+    "infeasible": Exit.VERDICT,
+    "self_check_failed": Exit.BUG,
+}
+"""Exit code of a run by the verdict of its report."""
 
 
 class OutputError(StorageError):

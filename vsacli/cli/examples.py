@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.options import example, overwrite_option
 
 if TYPE_CHECKING:
     from vsacli.files.examples import Example

@@ -9,10 +9,14 @@ from typing import Any, TextIO
 import click
 
 from vsacli.base.errors import StorageError
-from vsacli.cli.console import Talk, talk_options, tell
-from vsacli.cli.exit_codes import Exit
-from vsacli.cli.options import example, overwrite_option, variables_option
-from vsacli.cli.running import described, refuse_input_as_output
+from vsacli.cli.command_parts import (
+    described,
+    example,
+    overwrite_option,
+    refuse_input_as_output,
+    variables_option,
+)
+from vsacli.cli.console import Exit, Talk, talk_options, tell
 
 
 @click.command(

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import click
 
+from vsacli.cli.command_parts import example, overwrite_option, refuse_input_as_output
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.options import example, overwrite_option
-from vsacli.cli.running import refuse_input_as_output
 
 ACTUATOR_TYPES = ("antagonistic", "elastic", "rigid")
 

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from vsacli.base.errors import InputError
-from vsacli.cli.options import example
+from vsacli.cli.command_parts import example
 
 
 @click.command(

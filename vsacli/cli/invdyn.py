@@ -8,27 +8,24 @@ from pathlib import Path
 
 import click
 
-from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.options import (
+from vsacli.cli.command_parts import (
+    compute,
     deflections_option,
     engine_options,
     example,
     hdf5_name,
     json_option,
+    load_inputs,
     overwrite_option,
+    refuse_input_as_output,
     robot_argument,
+    run_stem,
+    show_report,
     stop_option,
     trajectory_argument,
     variables_option,
 )
-from vsacli.cli.running import (
-    chosen_deflections,
-    compute,
-    load_inputs,
-    refuse_input_as_output,
-    run_stem,
-    show_report,
-)
+from vsacli.cli.console import Talk, talk_options
 
 
 @click.command(
@@ -94,7 +91,7 @@ def invdyn(
     run = Run(
         *inputs,
         stop_on_infeasible=stop_on_infeasible,
-        deflections=chosen_deflections(deflections, *inputs),
+        deflections=deflections,
         engine=engine,
         threads=threads,
     )

@@ -5,19 +5,17 @@ from __future__ import annotations
 import gc
 import io
 import sys
-from collections.abc import MutableMapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from contextlib import suppress
-from typing import NoReturn, cast
+from typing import Any, NoReturn, cast
 
 import click
 
 from vsacli import __version__
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.lazy import OnDemand
-from vsacli.cli.console import OutputClosedError, reporting_stdout_errors, tell
-from vsacli.cli.exit_codes import Exit
-from vsacli.cli.options import example
-from vsacli.cli.sections import SectionedGroup
+from vsacli.cli.command_parts import example
+from vsacli.cli.console import Exit, OutputClosedError, reporting_stdout_errors, tell
 
 _EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --plot figures")
 _EPILOG += "\n\n\b\nExit codes:\n" + "\n".join(f"  {code.value:<3}  {code.meaning}" for code in Exit)
@@ -44,6 +42,27 @@ _SECTIONS = {
     },
 }
 _COMMANDS = OnDemand({name: home for section in _SECTIONS.values() for name, home in section.items()})
+
+
+class SectionedGroup(click.Group):
+    """Lists its commands in the order of `sections`, each a heading with names."""
+
+    def __init__(self, *args: Any, sections: Mapping[str, Sequence[str]], **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.sections = sections
+
+    def list_commands(self, _context: click.Context) -> list[str]:
+        """The names of all commands."""
+        return [name for names in self.sections.values() for name in names]
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write a list for each section, their columns in line."""
+        width = max(map(len, self.list_commands(context)))
+        for heading, names in self.sections.items():
+            with formatter.section(heading):
+                formatter.write_dl(
+                    [(name.ljust(width), self.commands[name].get_short_help_str()) for name in names]
+                )
 
 
 @click.group(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
+from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.options import example, overwrite_option
 
 _output_option = click.option(
     "-o", "--output", metavar="FILE", help="File to write; by default standard output."

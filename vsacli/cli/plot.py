@@ -7,9 +7,8 @@ from pathlib import Path
 
 import click
 
+from vsacli.cli.command_parts import described, example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.options import example, overwrite_option
-from vsacli.cli.running import described
 
 
 @click.command(

@@ -6,7 +6,7 @@ import json
 
 import click
 
-from vsacli.cli.options import example
+from vsacli.cli.command_parts import example
 
 
 @click.command(

@@ -12,17 +12,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vsacli.base.errors import InputError
-from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.exit_codes import Exit
-from vsacli.cli.options import (
+from vsacli.cli.command_parts import (
     example,
     hdf5_name,
     json_option,
+    load_inputs,
     overwrite_option,
+    refuse_input_as_output,
     robot_argument,
+    run_stem,
     trajectory_argument,
 )
-from vsacli.cli.running import load_inputs, refuse_input_as_output
+from vsacli.cli.console import Exit, Talk, talk_options
 
 if TYPE_CHECKING:
     from vsacli.control.gains import Gains
@@ -121,8 +122,7 @@ def simulate(
     most their max_torque. A run ends early where a decoupling matrix becomes singular or a spring leaves the
     range of its law.
     """
-    stems = f"{Path(robot).stem}-{Path(trajectory).stem}"
-    path = Path(f"{stems}-simulation.h5" if output is None else output)
+    path = Path(f"{run_stem(robot, trajectory)}-simulation.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
     setup, sources = _setup(inputs[0], **choices)
     recorded = replace(inputs[0], sources=(*inputs[0].sources, *sources))

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.exit_codes import Exit
-from vsacli.cli.options import example
+from vsacli.cli.command_parts import example
+from vsacli.cli.console import Exit, Talk, talk_options
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

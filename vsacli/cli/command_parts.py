@@ -1,29 +1,90 @@
-"""What the commands share: reading inputs, protecting them, and showing the report."""
+"""What several commands share: arguments and options, reading inputs, running, showing the report."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from vsacli.base.errors import InputError
-from vsacli.cli.console import Talk
-from vsacli.cli.exit_codes import OF_VERDICT, Exit
+from vsacli.cli.console import OF_VERDICT, Exit, Talk
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
-    from vsacli.dynamics.integrated_deflections import IntegratedDeflections
     from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
     from vsacli.robot.model import Robot
     from vsacli.studies.remedies import Suggestions
     from vsacli.trajectory.trajectory import Trajectory
+
+
+def _split(_context: click.Context, _parameter: click.Parameter, text: str | None) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names:
+        raise click.BadParameter("expected names separated by commas, e.g. tau_motor,flags")
+    return names
+
+
+def hdf5_name(_context: click.Context, _parameter: click.Parameter, name: str | None) -> str | None:
+    """A callback for the name of an HDF5 file to write: not one that promises CSV."""
+    if name is not None and name.lower().endswith(".csv"):
+        raise click.BadParameter(f"{name!r}: the file is HDF5; `vsacli export` makes CSV of it")
+    return name
+
+
+def variables_option(default: str) -> Callable[[Any], Any]:
+    """`--variables`, of a command that otherwise takes those that `default` says."""
+    return click.option(
+        "--variables",
+        metavar="NAMES",
+        callback=_split,
+        help=f"Only these variables, e.g. tau_motor,flags; by default {default}.",
+    )
+
+
+def example(command: str) -> str:
+    """The end of a help text: a command line that works."""
+    return f"\b\nExample:\n  {command}"
+
+
+robot_argument = click.argument("robot")
+trajectory_argument = click.argument("trajectory")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
+overwrite_option = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
+deflections_option = click.option(
+    "--deflections",
+    type=click.Choice(["root", "integrate"]),
+    default="root",
+    show_default=True,
+    help="Solve for the deflections at each step, or follow those of the first by integration, which drifts.",
+)
+stop_option = click.option("--stop-on-infeasible", is_flag=True, help="End with the first infeasible step.")
+
+
+def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """`--engine` and `--threads`."""
+    engine = click.option(
+        "--engine",
+        type=click.Choice(["numpy", "c", "auto"]),
+        default="auto",
+        show_default=True,
+        help="What computes: NumPy, or code from the system's C compiler; auto takes what is faster.",
+    )
+    threads = click.option(
+        "--threads",
+        type=click.IntRange(min=1),
+        metavar="COUNT",
+        help="Threads of compiled code; by default one a processor.",
+    )
+    return engine(threads(command))
 
 
 def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> tuple[Robot, Trajectory]:
@@ -42,15 +103,6 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> tuple[Robo
         f"{trajectory.duration:g} s"
     )
     return robot, trajectory
-
-
-def chosen_deflections(method: str, robot: Robot, trajectory: Trajectory) -> IntegratedDeflections | None:
-    """The deflections that a run uses, as `--deflections` says; None if it solves for them at each step."""
-    if method == "root":
-        return None
-    from vsacli.dynamics.integrated_deflections import integrate_deflections
-
-    return integrate_deflections(robot, trajectory)
 
 
 def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
