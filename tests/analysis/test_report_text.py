@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -26,7 +27,8 @@ QUIET = JointReport(
     margin=0.0576,
     margin_time=0.1,
     reachable=(801.0983, math.inf),
-    stiffness=(850.0, 1275.0),
+    stiffness_min=850.0,
+    stiffness_max=1275.0,
     peak_tau_e=7.55,
     peak_tau_motor=(98.871, 91.635),
     start_theta=(0.0727618, -0.0551276),
@@ -54,13 +56,14 @@ def report(*joints: JointReport, **changes: object) -> Report:
         self_check=SelfCheck(spring_residual=4e-15, ladder=4.2e-11),
         joints=joints or (QUIET,),
     )
-    return whole._replace(**changes)
+    return replace(whole, **changes)
 
 
 def troubled(worst: Worst, steps: int = 412, first: float = 3.588, **changes: object) -> JointReport:
     """The elbow with one kind of trouble."""
     counted = worst.kind if worst.kind in COUNTED else "over_limit"
-    return QUIET._replace(
+    return replace(
+        QUIET,
         steps={**QUIET.steps, counted: steps},
         first_time={worst.kind: first, counted: first},
         worst={worst.kind: worst},
@@ -83,11 +86,13 @@ def line(text: str, start: str) -> str:
 
 
 def test_whole_report_of_a_run_without_trouble():
-    slide = QUIET._replace(
+    slide = replace(
+        QUIET,
         name="slide",
         type="prismatic",
         reachable=(8009.5, 20000.0),
-        stiffness=(9000.0, 9000.0),
+        stiffness_min=9000.0,
+        stiffness_max=9000.0,
         start_theta=(0.0317, 0.00602),
         torque_step=(0.1, 0.2),
         margin=0.11,
@@ -119,12 +124,12 @@ def test_whole_report_of_a_run_without_trouble():
     ids=["a step without torques", "one motor", "no springs"],
 )
 def test_energy_that_does_not_exist_is_not_mentioned(energy, expected):
-    lines = render(report(QUIET._replace(energy=energy))).splitlines()
+    lines = render(report(replace(QUIET, energy=energy))).splitlines()
     assert [line for line in lines if line.startswith(("energy", "co-contraction"))] == expected
 
 
 def test_energies_are_summed_only_if_every_joint_has_them():
-    lines = render(report(QUIET._replace(energy=JointEnergy(NAN, NAN, NAN, NAN, NAN)), QUIET)).splitlines()
+    lines = render(report(replace(QUIET, energy=JointEnergy(NAN, NAN, NAN, NAN, NAN)), QUIET)).splitlines()
     assert not [line for line in lines if line.startswith("energy")]
     [line] = [line for line in lines if line.startswith("co-contraction")]
     assert "61.2 N m" in line
@@ -195,7 +200,7 @@ def test_what_else_would_help_is_said():
         "; the opposite preload would reach it"
     )
     slack = too_soft(790, 803.1)
-    slack = slack._replace(steps={**slack.steps, "slack": 7})
+    slack = replace(slack, steps={**slack.steps, "slack": 7})
     assert sentence(slack).endswith("; a tendon goes slack at 7 steps")
 
 
@@ -243,22 +248,22 @@ def test_times_between_milliseconds_are_told_apart():
     [(0.2, "20.00 %"), (-0.0272, "-2.72 %"), (-6.8e-6, "-0.0007 %"), (0.0, "0.00 %"), (1.2e-10, "1e-08 %")],
 )
 def test_small_margins_do_not_round_to_zero(margin, shown):
-    row = line(render(report(QUIET._replace(margin=margin))), "elbow ")
+    row = line(render(report(replace(QUIET, margin=margin))), "elbow ")
     assert row.endswith(f"  {shown}")
 
 
 def test_peaks_next_to_a_singular_step_are_short():
-    row = line(render(report(QUIET._replace(peak_tau_motor=(1.2345678e9, 98.87)))), "elbow ")
+    row = line(render(report(replace(QUIET, peak_tau_motor=(1.2345678e9, 98.87)))), "elbow ")
     assert "1.23e+09 / 98.9 N m" in row
 
 
 def test_peak_that_never_existed_is_a_dash():
-    row = line(render(report(QUIET._replace(peak_tau_motor=(NAN, NAN)))), "elbow ")
+    row = line(render(report(replace(QUIET, peak_tau_motor=(NAN, NAN)))), "elbow ")
     assert "- / - N m" in row
 
 
 def test_starts_of_many_joints_are_three_to_a_line():
-    joints = [QUIET._replace(name=f"joint_{number}") for number in range(1, 8)]
+    joints = [replace(QUIET, name=f"joint_{number}") for number in range(1, 8)]
     text = render(report(*joints))
     start = text[text.index("start motors at: ") : text.index("torque step")]
     lines = start.splitlines()
@@ -268,13 +273,13 @@ def test_starts_of_many_joints_are_three_to_a_line():
 
 
 def test_start_at_an_infeasible_step_is_undefined():
-    text = render(report(QUIET._replace(start_theta=(NAN, NAN), torque_step=(NAN, NAN))))
+    text = render(report(replace(QUIET, start_theta=(NAN, NAN), torque_step=(NAN, NAN))))
     assert line(text, "start motors") == "start motors at: elbow undefined (first step infeasible)"
     assert "torque step" not in text
 
 
 def test_start_at_a_singular_step_has_no_torque_step():
-    text = render(report(QUIET._replace(torque_step=(NAN, NAN))))
+    text = render(report(replace(QUIET, torque_step=(NAN, NAN))))
     assert line(text, "start motors") == "start motors at: elbow +0.07276 -0.05513 rad"
     assert "torque step" not in text
 

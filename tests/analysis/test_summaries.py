@@ -227,8 +227,8 @@ def test_json_holds_plain_finite_values():
 
 
 def verdict_of(report: Report, **steps: int) -> str:
-    joints = (report.joints[0]._replace(steps=steps), *report.joints[1:])
-    return report._replace(joints=joints).verdict
+    joints = (dataclasses.replace(report.joints[0], steps=steps), *report.joints[1:])
+    return dataclasses.replace(report, joints=joints).verdict
 
 
 def test_worst_verdict_wins():
@@ -238,7 +238,7 @@ def test_worst_verdict_wins():
     assert verdict_of(report, over_limit=1) == "over_limit"
     assert verdict_of(report, over_limit=1, singular=1) == "singular"
     assert verdict_of(report, over_limit=1, singular=1, infeasible=1) == "infeasible"
-    failed = report.self_check._replace(ladder=1.0)
-    assert verdict_of(report._replace(self_check=failed), infeasible=1) == "self_check_failed"
-    assert not report.self_check._replace(ladder=math.nan).passed
-    assert not report.self_check._replace(spring_residual=math.nan).passed
+    failed = dataclasses.replace(report.self_check, ladder=1.0)
+    assert verdict_of(dataclasses.replace(report, self_check=failed), infeasible=1) == "self_check_failed"
+    assert not dataclasses.replace(report.self_check, ladder=math.nan).passed
+    assert not dataclasses.replace(report.self_check, spring_residual=math.nan).passed

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from samples.command_line import ROBOT, SEVEN_JOINTS, contents, seven_joint_motion
 from samples.figures import rest_to_rest
 
-from vsacli.dynamics.integrated_deflections import IntegratedDeflections, Stop, integrate_deflections
+from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integrate_deflections
+from vsacli.dynamics.inverse import Stop
 from vsacli.results.plots import FEASIBILITY_VARIABLES, plot_feasibility
 
 PNG = b"\x89PNG\r\n\x1a\n"

@@ -14,7 +14,7 @@ from samples.command_line import REPOSITORY, ROBOT
 from samples.hostile import CSV, XML, YAML, damaged, fuzz
 
 from vsacli.base.errors import InputError
-from vsacli.base.json_values import finite
+from vsacli.base.json_records import json_value
 from vsacli.files.info import describe_file
 from vsacli.files.info.text import render
 from vsacli.files.validation import check_files
@@ -56,7 +56,7 @@ def look_at(name: str, text: str) -> None:
         description = describe_file(name, str(ROBOT) if "base" in text else None)
     except InputError:
         return
-    finite(description)
+    json_value(description)
     assert render(description)
 
 

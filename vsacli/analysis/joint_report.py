@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 from vsacli.base.flags import LIMITS, Flag
-from vsacli.base.json_values import JsonObject, number, pair
+from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.dynamics.energy import JointEnergy
-
-if TYPE_CHECKING:
-    from vsacli.dynamics.integrated_deflections import Stop
+from vsacli.dynamics.inverse import Stop
 
 COUNTED = {
     "infeasible": Flag.INFEASIBLE,
@@ -22,7 +21,8 @@ COUNTED = {
 """Kinds of trouble whose steps are counted, and the bits that make them."""
 
 
-class Worst(NamedTuple):
+@dataclass(frozen=True)
+class Worst(Stored):
     """The worst step of a kind of trouble: when, what value, against which bound.
 
     `bound` is NaN where the elastic torque itself cannot be carried; `motor` is 1, 2 or None.
@@ -35,19 +35,12 @@ class Worst(NamedTuple):
     unit: str
     motor: int | None = None
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values; the kind is the key under which they stand."""
-        entry = {"time": self.time, "value": self.value, "bound": self.bound, "unit": self.unit}
-        return entry if self.motor is None else {**entry, "motor": self.motor}
-
-    @classmethod
-    def from_json(cls, kind: str, content: JsonObject) -> Worst:
-        """From what `as_json` gave, `finite`."""
-        time, value, bound = (number(content[name]) for name in ("time", "value", "bound"))
-        return cls(kind, time, value, bound, content["unit"], content.get("motor"))
+    key: ClassVar = "kind"
+    shape: ClassVar = {**named("time", "value", "bound", "unit"), "motor?": "motor"}
 
 
-class JointReport(NamedTuple):
+@dataclass(frozen=True)
+class JointReport(Stored):
     """What a run found at one joint; torques in N m (N), stiffness in N m/rad (N/m).
 
     Attributes:
@@ -61,7 +54,8 @@ class JointReport(NamedTuple):
         margin: smallest relative margin to an end of the corridor, NaN if a torque cannot be carried.
         margin_time: when.
         reachable: the corridor at that time.
-        stiffness: smallest and largest commanded stiffness.
+        stiffness_min: smallest commanded stiffness.
+        stiffness_max: the largest.
         peak_tau_e: largest |tau_e|.
         peak_tau_motor: largest |tau_motor| of motors 1 and 2, over the steps where it exists.
         start_theta: motor positions at the first step, to which the motors go before the start.
@@ -80,7 +74,8 @@ class JointReport(NamedTuple):
     margin: float
     margin_time: float
     reachable: tuple[float, float]
-    stiffness: tuple[float, float]
+    stiffness_min: float
+    stiffness_max: float
     peak_tau_e: float
     peak_tau_motor: tuple[float, float]
     start_theta: tuple[float, float]
@@ -88,47 +83,27 @@ class JointReport(NamedTuple):
     other_preload: bool
     energy: JointEnergy
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values under the published keys."""
-        return {
-            "name": self.name,
-            "type": self.type,
-            "actuator": self.actuator,
-            "steps": self.steps,
-            "first_time": self.first_time,
-            "worst": {kind: worst.as_json() for kind, worst in self.worst.items()},
-            "margin": {"min": self.margin, "time": self.margin_time, "reachable": list(self.reachable)},
-            "stiffness": {"min": self.stiffness[0], "max": self.stiffness[1]},
-            "peak": {"tau_e": self.peak_tau_e, "tau_motor": list(self.peak_tau_motor)},
-            "start": {"theta": list(self.start_theta), "torque_step": list(self.torque_step)},
-            "other_preload": self.other_preload,
-            "energy": self.energy.as_json(),
-        }
+    shape: ClassVar = {
+        **named("name", "type", "actuator", "steps", "first_time", "worst"),
+        "margin": {"min": "margin", "time": "margin_time", "reachable": "reachable"},
+        "stiffness": {"min": "stiffness_min", "max": "stiffness_max"},
+        "peak": {"tau_e": "peak_tau_e", "tau_motor": "peak_tau_motor"},
+        "start": {"theta": "start_theta", "torque_step": "torque_step"},
+        **named("other_preload", "energy"),
+    }
 
     @classmethod
-    def from_json(cls, content: JsonObject) -> JointReport:
-        """From what `as_json` gave, `finite`: no end of a corridor is NaN alone, so the upper is infinite."""
-        margin = content["margin"]
-        lower, upper = pair(margin["reachable"])
+    def from_json(cls, content: JsonObject, **further: Any) -> Self:
+        """From what `as_json` gave: no end of a corridor is NaN alone, so the upper is infinite."""
+        joint = super().from_json(content, **further)
+        lower, upper = joint.reachable
         if math.isnan(upper) and not math.isnan(lower):
-            upper = math.inf
-        return cls(
-            **{name: content[name] for name in ("name", "type", "actuator", "steps", "first_time")},
-            worst={kind: Worst.from_json(kind, worst) for kind, worst in content["worst"].items()},
-            margin=number(margin["min"]),
-            margin_time=number(margin["time"]),
-            reachable=(lower, upper),
-            stiffness=pair(content["stiffness"][end] for end in ("min", "max")),
-            peak_tau_e=number(content["peak"]["tau_e"]),
-            peak_tau_motor=pair(content["peak"]["tau_motor"]),
-            start_theta=pair(content["start"]["theta"]),
-            torque_step=pair(content["start"]["torque_step"]),
-            other_preload=content["other_preload"],
-            energy=JointEnergy.from_json(content["energy"]),
-        )
+            return replace(joint, reachable=(lower, math.inf))
+        return joint
 
 
-class JointDrift(NamedTuple):
+@dataclass(frozen=True)
+class JointDrift(Stored):
     """What became of the followed deflections of a joint.
 
     Attributes:
@@ -145,20 +120,4 @@ class JointDrift(NamedTuple):
     unit: str
     stop: Stop | None = None
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values under the published keys."""
-        return {
-            "joint": self.joint,
-            "drift": self.largest,
-            "time": self.time,
-            "unit": self.unit,
-            "stopped": None if self.stop is None else {"time": self.stop.time, "reason": self.stop.reason},
-        }
-
-    @classmethod
-    def from_json(cls, content: JsonObject) -> JointDrift:
-        """From what `as_json` gave, `finite`."""
-        from vsacli.dynamics.integrated_deflections import Stop
-
-        stop = None if content["stopped"] is None else Stop(**content["stopped"])
-        return cls(content["joint"], number(content["drift"]), number(content["time"]), content["unit"], stop)
+    shape: ClassVar = {"joint": "joint", "drift": "largest", **named("time", "unit"), "stopped": "stop"}

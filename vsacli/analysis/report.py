@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 from vsacli.analysis import report_text as text
 from vsacli.analysis.joint_report import JointDrift, JointReport
-from vsacli.analysis.self_check import DRIFT_BOUND, LADDER_BOUND, SPRING_BOUND, SelfCheck
-from vsacli.base.json_values import JsonObject, finite, number
-
-FORMAT = "vsacli-report/1"
+from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
+from vsacli.base.json_records import JsonObject, Stored, named
 
 VERDICTS = ("ok", "over_limit", "singular", "infeasible", "self_check_failed")
 """From best to worst; the worst that applies wins."""
 
 
-class Report(NamedTuple):
+@dataclass(frozen=True)
+class Report(Stored):
     """The verdict on a run.
 
     Attributes:
@@ -44,6 +44,14 @@ class Report(NamedTuple):
     drifts: tuple[JointDrift, ...] = ()
     fits: tuple[dict[str, Any], ...] = ()
 
+    format: ClassVar = "vsacli-report/1"
+    shape: ClassVar = {
+        **named("format", "verdict", "robot", "trajectory", "samples", "duration", "complete"),
+        **named("warnings", "notes", "fits", "self_check"),
+        "deflections": {"method": "deflections", "joints?": "drifts"},
+        "joints": "joints",
+    }
+
     @property
     def verdict(self) -> str:
         """The worst of `VERDICTS` that applies."""
@@ -51,6 +59,11 @@ class Report(NamedTuple):
         if not self.self_check.passed:
             applies.add("self_check_failed")
         return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
+
+    @property
+    def deflections(self) -> str:
+        """How the deflections were found: as the "root" of (14) at each step, or by "integrate"."""
+        return "integrate" if self.drifts else "root"
 
     def __str__(self) -> str:
         """The lines that the commands print, without a final newline."""
@@ -74,56 +87,13 @@ class Report(NamedTuple):
             left += " planned, stopped early"
         return text.headline(left, self.verdict, self.joints)
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values for `json.dumps`; numbers that are not finite become None."""
-        check = self.self_check
-        content: dict[str, Any] = finite(
-            {
-                "format": FORMAT,
-                "verdict": self.verdict,
-                "robot": self.robot,
-                "trajectory": self.trajectory,
-                "samples": self.samples,
-                "duration": self.duration,
-                "complete": self.complete,
-                "warnings": list(self.warnings),
-                "notes": list(self.notes),
-                "fits": list(self.fits),
-                "self_check": {
-                    "passed": check.passed,
-                    "spring_residual": check.spring_residual,
-                    "ladder": check.ladder,
-                    "bound": LADDER_BOUND,
-                },
-                "deflections": self._deflections(),
-                "joints": [joint.as_json() for joint in self.joints],
-            }
-        )
-        return content
-
-    def _deflections(self) -> dict[str, Any]:
-        if not self.drifts:
-            return {"method": "root"}
-        return {"method": "integrate", "joints": [drift.as_json() for drift in self.drifts]}
-
     @classmethod
-    def from_json(cls, content: JsonObject) -> Report:
+    def from_json(cls, content: JsonObject, **further: Any) -> Self:
         """From what `as_json` gave, as a result file holds it.
 
         Raises:
             LookupError, TypeError, AttributeError, ValueError: it is no such report.
         """
-        check, drifts = content["self_check"], content["deflections"].get("joints", ())
-        return cls(
-            **{name: content[name] for name in ("robot", "trajectory", "samples", "duration", "complete")},
-            warnings=tuple(content["warnings"]),
-            notes=tuple(content.get("notes", ())),
-            fits=tuple(content["fits"]),
-            self_check=SelfCheck(
-                number(check["spring_residual"]),
-                number(check["ladder"]),
-                DRIFT_BOUND if drifts else SPRING_BOUND,
-            ),
-            joints=tuple(map(JointReport.from_json, content["joints"])),
-            drifts=tuple(map(JointDrift.from_json, drifts)),
-        )
+        report = super().from_json(content, **further)
+        bound = DRIFT_BOUND if report.drifts else SPRING_BOUND
+        return replace(report, self_check=replace(report.self_check, spring_bound=bound))

@@ -68,7 +68,7 @@ def _row(joint: JointReport) -> tuple[str, ...]:
         joint.name,
         f"{_number(joint.peak_tau_e)} {torque}",
         f"{motors} {torque}",
-        _span(*joint.stiffness),
+        _span(joint.stiffness_min, joint.stiffness_max),
         *((_corridor(*joint.reachable), _percent(joint.margin)) if _is_antagonistic(joint) else ("-", "-")),
     )
 

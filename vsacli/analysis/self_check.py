@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from vsacli.actuators.drivetrain import SIDES, motors_and_springs
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
+from vsacli.base.json_records import Stored, named
 from vsacli.base.variables import Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.inverse import compute_block
@@ -68,7 +70,8 @@ SMALL_JOINT = 1e-3
 but rounding of the larger torques."""
 
 
-class SelfCheck(NamedTuple):
+@dataclass(frozen=True)
+class SelfCheck(Stored):
     """Outcome of the self-check.
 
     Attributes:
@@ -80,6 +83,9 @@ class SelfCheck(NamedTuple):
     spring_residual: float
     ladder: float
     spring_bound: float = SPRING_BOUND
+
+    ladder_bound: ClassVar = LADDER_BOUND
+    shape: ClassVar = {**named("passed", "spring_residual", "ladder"), "bound": "ladder_bound"}
 
     @property
     def passed(self) -> bool:

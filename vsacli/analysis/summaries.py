@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +15,9 @@ from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import has
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
+from vsacli.dynamics.inverse import Stop
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.model import Joint
-
-if TYPE_CHECKING:
-    from vsacli.dynamics.integrated_deflections import Stop
 
 REACH = {kind: COUNTED[kind] for kind in ("infeasible", "singular", "near_singular")}
 """Kinds of trouble whose worst step is the one with the smallest margin."""
@@ -88,7 +85,8 @@ class JointSummary:
             margin=least if math.isfinite(least) else math.nan,
             margin_time=time,
             reachable=reachable,
-            stiffness=(float(self._stiffness[0]), float(self._stiffness[1])),
+            stiffness_min=float(self._stiffness[0]),
+            stiffness_max=float(self._stiffness[1]),
             peak_tau_e=peak_tau_e,
             peak_tau_motor=(peak_1, peak_2),
             start_theta=(theta_1, theta_2),

@@ -31,14 +31,14 @@ def info(file: str, robot: str | None, as_json: bool, field: str | None) -> None
     Of a robot, Denavit-Hartenberg rows, links, actuators, reach, static load and reachable stiffness; of a
     trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report.
     """
-    from vsacli.base.json_values import finite
+    from vsacli.base.json_records import json_value
     from vsacli.files.info import describe_file, render
 
     description = describe_file(file, robot)
     if field is not None:
-        click.echo(_found(finite(description), field))
+        click.echo(_found(json_value(description), field))
     else:
-        click.echo(json.dumps(finite(description), indent=1) if as_json else render(description))
+        click.echo(json.dumps(json_value(description), indent=1) if as_json else render(description))
 
 
 def _found(content: Any, field: str) -> str:

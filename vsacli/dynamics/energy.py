@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES, motors_and_springs
 from vsacli.base.arrays import FloatArray, by_joint, over_time
-from vsacli.base.json_values import JsonObject, number
+from vsacli.base.json_records import Stored, named
 from vsacli.base.variables import Block
 from vsacli.robot.model import Robot
 
 
-class JointEnergy(NamedTuple):
+@dataclass(frozen=True)
+class JointEnergy(Stored):
     """Energy of a joint over a run; but for the peak, NaN if the torques of a step do not exist.
 
     The torques of two springs split: tau_1^2 + tau_2^2 = tau_e^2/2 + (tau_1 - tau_2)^2/2. The first part
@@ -35,20 +37,15 @@ class JointEnergy(NamedTuple):
     co_contraction: float
     load: float
 
+    shape: ClassVar = named(
+        "elastic_peak", "spent", "recovered", "co_contraction", "load", "co_contraction_share"
+    )
+
     @property
     def co_contraction_share(self) -> float:
         """Share of the co-contraction in the time integral of tau_1^2 + tau_2^2; NaN if that is zero."""
         squared = self.co_contraction**2 + self.load**2
         return self.co_contraction**2 / squared if squared else math.nan
-
-    def as_json(self) -> dict[str, float]:
-        """JSON values under the published keys."""
-        return {**self._asdict(), "co_contraction_share": self.co_contraction_share}
-
-    @classmethod
-    def from_json(cls, content: JsonObject) -> JointEnergy:
-        """From what `as_json` gave, with None for NaN."""
-        return cls(*(number(content[name]) for name in cls._fields))
 
 
 class Flow(NamedTuple):

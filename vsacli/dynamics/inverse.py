@@ -16,6 +16,7 @@ from vsacli.actuators.reach import NEAR_SINGULAR
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type
+from vsacli.base.json_records import Stored
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
@@ -37,6 +38,14 @@ STIFFNESS_NAMES = ("stiffness", "dstiffness", "ddstiffness")
 def usual_block(joints: int) -> int:
     """Steps computed at a time: one pass of NumPy's, which hides the interpreter and bounds the memory."""
     return samples_per_pass(joints * (len(MOTION_NAMES) + len(STIFFNESS_NAMES)))
+
+
+@dataclass(frozen=True)
+class Stop(Stored):
+    """From when on, s, the deflections of a joint cannot be followed, and why."""
+
+    time: float
+    reason: str
 
 
 @dataclass(frozen=True)

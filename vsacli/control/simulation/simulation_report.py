@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,20 +11,18 @@ from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.report import VERDICTS
 from vsacli.base.arrays import FloatArray, by_joint, of_joint
 from vsacli.base.flags import LIMITS, Flag, has
-from vsacli.base.json_values import JsonObject, finite, number, pair
+from vsacli.base.json_records import Stored, named
 from vsacli.base.simulation_variables import actual
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.model import Joint, Robot
 
-FORMAT = "vsacli-simulation-report/1"
-
 _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
 
 
 @dataclass(frozen=True)
-class Deviation:
+class Deviation(Stored):
     """Of an actual value from the command: the largest, when (s), and the last; NaN if there is none."""
 
     peak: float
@@ -39,18 +37,9 @@ class Deviation:
         worst = int(np.nanargmax(np.abs(error)))
         return cls(float(abs(error[worst])), float(time[worst]), float(error[-1]))
 
-    def as_json(self) -> dict[str, float]:
-        """JSON values."""
-        return vars(self)
-
-    @classmethod
-    def from_json(cls, content: JsonObject) -> Deviation:
-        """From what `as_json` gave, `finite`."""
-        return cls(*(number(content[name]) for name in ("peak", "time", "final")))
-
 
 @dataclass(frozen=True)
-class JointTracking:
+class JointTracking(Stored):
     """What a simulation found at one joint.
 
     Attributes:
@@ -73,32 +62,14 @@ class JointTracking:
     worst: dict[str, Worst]
     energy: JointEnergy
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values under the published keys."""
-        return {
-            "name": self.name,
-            "type": self.type,
-            "q_error": self.q.as_json(),
-            "stiffness_error": self.stiffness.as_json(),
-            "peak": {"tau_motor": list(self.peak_tau_motor)},
-            "steps": {"over_limit": self.steps_over_limit},
-            "worst": {name: worst.as_json() for name, worst in self.worst.items()},
-            "energy": self.energy.as_json(),
-        }
-
-    @classmethod
-    def from_json(cls, content: JsonObject) -> JointTracking:
-        """From what `as_json` gave, `finite`."""
-        return cls(
-            name=content["name"],
-            type=content["type"],
-            q=Deviation.from_json(content["q_error"]),
-            stiffness=Deviation.from_json(content["stiffness_error"]),
-            peak_tau_motor=pair(content["peak"]["tau_motor"]),
-            steps_over_limit=content["steps"]["over_limit"],
-            worst={kind: Worst.from_json(kind, worst) for kind, worst in content["worst"].items()},
-            energy=JointEnergy.from_json(content["energy"]),
-        )
+    shape: ClassVar = {
+        **named("name", "type"),
+        "q_error": "q",
+        "stiffness_error": "stiffness",
+        "peak": {"tau_motor": "peak_tau_motor"},
+        "steps": {"over_limit": "steps_over_limit"},
+        **named("worst", "energy"),
+    }
 
 
 def joint_trackings(robot: Robot, history: History) -> tuple[JointTracking, ...]:
@@ -168,7 +139,7 @@ def verdict_on(history: History, *, complete: bool) -> str:
 
 
 @dataclass(frozen=True)
-class SimulationReport:
+class SimulationReport(Stored):
     """The verdict on a simulation.
 
     Attributes:
@@ -197,48 +168,16 @@ class SimulationReport:
     evaluations: int
     joints: tuple[JointTracking, ...]
     warnings: tuple[str, ...]
-    notes: tuple[str, ...]
     with_full_state: tuple[Deviation, ...]
+    notes: tuple[str, ...] = ()
+
+    format: ClassVar = "vsacli-simulation-report/1"
+    shape: ClassVar = named(
+        *("format", "verdict", "robot", "trajectory", "controller", "samples", "duration", "complete"),
+        *("ending", "evaluations", "warnings", "notes", "joints", "with_full_state"),
+    )
 
     @property
     def complete(self) -> bool:
         """Whether the run reached the end of the trajectory."""
         return self.ending is None
-
-    def as_json(self) -> dict[str, Any]:
-        """JSON values for `json.dumps`; numbers that are not finite become None."""
-        content: dict[str, Any] = finite(
-            {
-                "format": FORMAT,
-                "verdict": self.verdict,
-                "robot": self.robot,
-                "trajectory": self.trajectory,
-                "controller": self.controller,
-                "samples": self.samples,
-                "duration": self.duration,
-                "complete": self.complete,
-                "ending": self.ending,
-                "evaluations": self.evaluations,
-                "warnings": list(self.warnings),
-                "notes": list(self.notes),
-                "joints": [joint.as_json() for joint in self.joints],
-                "with_full_state": [deviation.as_json() for deviation in self.with_full_state],
-            }
-        )
-        return content
-
-    @classmethod
-    def from_json(cls, content: JsonObject) -> SimulationReport:
-        """From what `as_json` gave, as a simulation file holds it.
-
-        Raises:
-            LookupError, TypeError, AttributeError, ValueError: it is no such report.
-        """
-        as_they_are = ("robot", "trajectory", "controller", "samples", "duration", "verdict", "ending")
-        return cls(
-            **{name: content[name] for name in (*as_they_are, "evaluations")},
-            warnings=tuple(content["warnings"]),
-            notes=tuple(content.get("notes", ())),
-            joints=tuple(map(JointTracking.from_json, content["joints"])),
-            with_full_state=tuple(map(Deviation.from_json, content["with_full_state"])),
-        )

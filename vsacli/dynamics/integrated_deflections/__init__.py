@@ -4,6 +4,5 @@ Buondonno & De Luca (2016), III-B, who warn of the drift.
 """
 
 from vsacli.dynamics.integrated_deflections.solution import IntegratedDeflections, integrate_deflections
-from vsacli.dynamics.integrated_deflections.task import Stop
 
-__all__ = ["IntegratedDeflections", "Stop", "integrate_deflections"]
+__all__ = ["IntegratedDeflections", "integrate_deflections"]

@@ -10,7 +10,8 @@ import numpy as np
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
 from vsacli.dynamics.integrated_deflections.integration import Integration, Pieces, by_joint
-from vsacli.dynamics.integrated_deflections.task import REASONS, Stop, Task
+from vsacli.dynamics.integrated_deflections.task import REASONS, Task
+from vsacli.dynamics.inverse import Stop
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -29,14 +28,6 @@ REASONS = (
     "the integration cannot go on",
 )
 FOLLOWED, SINGULAR, UNREACHABLE, STALLED = range(len(REASONS))
-
-
-@dataclass(frozen=True)
-class Stop:
-    """From when on, s, the deflections of a joint cannot be followed, and why."""
-
-    time: float
-    reason: str
 
 
 class Task:

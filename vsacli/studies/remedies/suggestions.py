@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
+from vsacli.base.json_records import Published, named
 from vsacli.trajectory.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class NotPossible:
+class NotPossible(Published):
     """There is no suggestion of a kind, and why."""
 
     reasons: tuple[str, ...]
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values."""
-        return {"possible": False, "reasons": list(self.reasons)}
+    possible: ClassVar = False
+    shape: ClassVar = named("possible", "reasons")
 
 
 @dataclass(frozen=True)
-class SlowDown:
+class SlowDown(Published):
     """Stretch position and stiffness together in time.
 
     Attributes:
@@ -32,17 +32,17 @@ class SlowDown:
     factor: float
     duration: float
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values; the duration is the new one."""
-        return {"possible": True, "factor": self.factor, "duration": self._slower, "text": self.sentence}
+    possible: ClassVar = True
+    shape: ClassVar = {**named("possible", "factor"), "duration": "slower", "text": "sentence"}
 
     @property
     def sentence(self) -> str:
         """What to do."""
-        return f"slow down by a factor {self.factor:.10g} ({self.duration:.10g} s -> {self._slower:.10g} s)"
+        return f"slow down by a factor {self.factor:.10g} ({self.duration:.10g} s -> {self.slower:.10g} s)"
 
     @property
-    def _slower(self) -> float:
+    def slower(self) -> float:
+        """The new duration, s."""
         return self.factor * self.duration
 
 
@@ -59,15 +59,18 @@ class Offset:
 
 
 @dataclass(frozen=True)
-class StiffnessOffset:
+class StiffnessOffset(Published):
     """Add a constant to the stiffness of each joint; joints that are fine get zero."""
 
     offsets: tuple[Offset, ...]
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values."""
-        values = {offset.joint: offset.value for offset in self.offsets}
-        return {"possible": True, "offsets": values, "text": self.sentence}
+    possible: ClassVar = True
+    shape: ClassVar = {"possible": "possible", "offsets": "by_joint", "text": "sentence"}
+
+    @property
+    def by_joint(self) -> dict[str, float]:
+        """The constant of each joint."""
+        return {offset.joint: offset.value for offset in self.offsets}
 
     @property
     def sentence(self) -> str:
@@ -79,7 +82,7 @@ class StiffnessOffset:
 
 
 @dataclass(frozen=True)
-class JointChange:
+class JointChange(Published):
     """How far the stiffness of a joint moves: the largest change and when, and the root mean square."""
 
     joint: str
@@ -88,12 +91,14 @@ class JointChange:
     rms: float
     unit: str
 
+    shape: ClassVar = named("largest", "time", "rms")
+
     def __str__(self) -> str:
         return f"{self.joint} by up to {self.largest:+.4g} {self.unit} (at t = {self.time:.3f} s)"
 
 
 @dataclass(frozen=True)
-class StiffnessProfile:
+class StiffnessProfile(Published):
     """Give the stiffness another profile.
 
     Attributes:
@@ -104,13 +109,13 @@ class StiffnessProfile:
     changes: tuple[JointChange, ...]
     trajectory: Trajectory = field(repr=False, compare=False)
 
-    def as_json(self) -> dict[str, Any]:
-        """JSON values."""
-        changes = {
-            change.joint: {"largest": change.largest, "time": change.time, "rms": change.rms}
-            for change in self.changes
-        }
-        return {"possible": True, "changes": changes, "text": self.sentence}
+    possible: ClassVar = True
+    shape: ClassVar = {"possible": "possible", "changes": "by_joint", "text": "sentence"}
+
+    @property
+    def by_joint(self) -> dict[str, JointChange]:
+        """The change of each joint."""
+        return {change.joint: change for change in self.changes}
 
     @property
     def sentence(self) -> str:
@@ -119,7 +124,7 @@ class StiffnessProfile:
 
 
 @dataclass(frozen=True)
-class Suggestions:
+class Suggestions(Published):
     """For each kind of change the smallest that makes a task possible, or why there is none.
 
     All are None where nothing needs to change.
@@ -138,14 +143,6 @@ class Suggestions:
         "stiffness_offset": "constant change of stiffness",
         "stiffness_profile": "other course of stiffness",
     }
-
-    def as_json(self) -> dict[str, Any]:
-        """JSON values; a kind is null where nothing needs to change."""
-        kinds = {kind: getattr(self, kind) for kind in self.KINDS}
-        return {
-            "near_singular": self.near_singular,
-            **{kind: None if found is None else found.as_json() for kind, found in kinds.items()},
-        }
 
     def lines(self) -> Iterator[str]:
         """One sentence for each kind, under a heading."""

@@ -1,0 +1,132 @@
+"""Records as JSON under published keys, and back; JSON has no numbers that are not finite."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, ClassVar, Self, TypeAlias, Union, get_args, get_origin, get_type_hints
+
+JsonObject: TypeAlias = Mapping[str, Any]
+"""An object of JSON."""
+
+Shape: TypeAlias = Mapping[str, Union[str, "Shape"]]
+"""A JSON object with the name of an attribute in place of each value."""
+
+OPTIONAL = "?"
+
+
+def named(*attributes: str) -> dict[str, str]:
+    """The shape of attributes that stand under their own names."""
+    return {name: name for name in attributes}
+
+
+class Published:
+    """A dataclass with a published form as JSON.
+
+    Its `shape` mirrors that: the keys in their order, nested as they are, each with the attribute whose value
+    stands there. A key with `?` at its end is left out while that value is None or empty. A class without a
+    shape has its fields under their own names.
+    """
+
+    shape: ClassVar[Shape] = {}
+
+    def as_json(self) -> dict[str, Any]:
+        """JSON values under the published keys, None for numbers that are not finite."""
+        return _written(self, _shape_of(type(self)))
+
+
+class Stored(Published):
+    """A published record that is read back, by the types of its fields.
+
+    `key` names the field that is no part of the JSON object, since it is the key of the object in another.
+    """
+
+    key: ClassVar[str] = ""
+
+    @classmethod
+    def from_json(cls, content: JsonObject, **further: Any) -> Self:
+        """From what `as_json` gave, and `further` fields; None for a float is NaN.
+
+        What was added to a format later has a default, since it is missing in what was written before.
+
+        Raises:
+            LookupError, TypeError, AttributeError, ValueError: it is no such record.
+        """
+        types = _types_of(cls)  # type: ignore[arg-type]  # mypy does not know that classes are hashable
+        found = _found(content, _shape_of(cls))
+        return cls(**further, **{name: _read(types[name], value) for name, value in found if name in types})
+
+
+def json_value(content: Any) -> Any:
+    """Anything as JSON values, None for numbers that are not finite."""
+    match content:
+        case Published():
+            return content.as_json()
+        case dict():
+            return {key: json_value(entry) for key, entry in content.items()}
+        case list() | tuple():
+            return [json_value(entry) for entry in content]
+        case float() if not math.isfinite(content):
+            return None
+    return content
+
+
+def _shape_of(cls: Any) -> Shape:
+    shape: Shape = cls.shape or named(*(field.name for field in dataclasses.fields(cls)))
+    return shape
+
+
+@cache
+def _types_of(cls: type) -> dict[str, Any]:
+    """The type of each field of a dataclass."""
+    types = get_type_hints(cls)
+    return {field.name: types[field.name] for field in dataclasses.fields(cls)}
+
+
+def _written(record: Published, shape: Shape) -> dict[str, Any]:
+    content = {}
+    for key, inner in shape.items():
+        value = json_value(getattr(record, inner)) if isinstance(inner, str) else _written(record, inner)
+        if not (key.endswith(OPTIONAL) and value in (None, [])):
+            content[key.removesuffix(OPTIONAL)] = value
+    return content
+
+
+def _found(content: JsonObject, shape: Shape) -> Iterator[tuple[str, Any]]:
+    """The attributes of a shape for which there are values, and those."""
+    for key, inner in shape.items():
+        key = key.removesuffix(OPTIONAL)
+        if key not in content:
+            continue
+        if isinstance(inner, str):
+            yield inner, content[key]
+        else:
+            yield from _found(content[key], inner)
+
+
+def _read(expected: Any, content: Any) -> Any:
+    """A value of a type of fields: a number, a tuple, a mapping, a record, any of those or None."""
+    types = get_args(expected)
+    match get_origin(expected) or expected:
+        case origin if type(None) in types:
+            (some,) = (option for option in types if option is not type(None))
+            return None if content is None else _read(some, content)
+        case origin if origin is float:
+            return math.nan if content is None else content
+        case origin if origin is tuple:
+            each = types[:1] * len(content) if types[-1] is Ellipsis else types
+            return tuple(_read(one, entry) for one, entry in zip(each, content, strict=True))
+        case origin if origin is dict:
+            return {key: _read_entry(types[-1], key, entry) for key, entry in content.items()}
+        case origin if isinstance(origin, type) and issubclass(origin, Stored):
+            return origin.from_json(content)
+    return content
+
+
+def _read_entry(expected: Any, key: str, content: Any) -> Any:
+    """The value under a key of a mapping, which may have the key as a field."""
+    if isinstance(expected, type) and issubclass(expected, Stored) and expected.key:
+        return expected.from_json(content, **{expected.key: key})
+    return _read(expected, content)
