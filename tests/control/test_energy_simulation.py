@@ -17,7 +17,7 @@ from vsacli import inverse_dynamics
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
 from vsacli.control.gains import Gains
-from vsacli.control.simulation import InitialError, Setup, simulate
+from vsacli.control.simulation import InitialError, simulate
 from vsacli.control.simulation.history import History
 from vsacli.control.simulation.simulation_text import render
 from vsacli.robot.model import Robot
@@ -54,7 +54,7 @@ def balance(robot: Robot, past: History) -> FloatArray:
 def test_the_motors_work_is_what_moves_lifts_deflects_and_is_lost(robot, gains, measured):
     trajectory = short_motion(len(robot.joints), rate=1000, duration=0.3, stiffness=(1900, 2100))
     error = InitialError(0.02)
-    past = simulate(robot, trajectory, Setup(gains=gains, initial_error=error, measured=measured)).history
+    past = simulate(robot, trajectory, gains=gains, initial_error=error, measured=measured).history
     work = np.nansum(past.motor_energy_actual, axis=(1, 2))
     scale = np.nanmax(np.abs(past.motor_energy_actual))
     # torques linear over 1 ms: (20 1/s * 1e-3 s)^2/12 = 3e-5 of what passes, twice; held ones are exact, and

@@ -16,7 +16,7 @@ from samples.simulated import error_course, linearized_run, mixed_3r, short_moti
 
 from vsacli.control.feedback_linearization import FeedbackLinearization
 from vsacli.control.gains import Gains
-from vsacli.control.simulation import InitialError, Setup, simulate
+from vsacli.control.simulation import InitialError, simulate
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Pose
 
@@ -133,8 +133,7 @@ def test_the_power_balance_holds(robot):
     """Kinetic, potential and elastic energy grow by what the motors give and the dampings take."""
     joints = len(robot.joints)
     trajectory = short_motion(joints, rate=1000, duration=0.4, stiffness=(1900, 2100))
-    setup = Setup(gains=GAINS, initial_error=InitialError(0.05, 40))
-    past = simulate(robot, trajectory, setup).history
+    past = simulate(robot, trajectory, gains=GAINS, initial_error=InitialError(0.05, 40)).history
     model = pinocchio.build(robot)
     data = model.createData()
     links = [

@@ -10,7 +10,7 @@ from samples.robots import random_robot, vsa_3r
 from samples.simulated import mixed_3r, short_motion
 from scipy.integrate import solve_ivp
 
-from vsacli.control.simulation import InitialError, Setup, perturbed, simulate
+from vsacli.control.simulation import InitialError, perturbed, simulate
 from vsacli.control.simulation.tabulated import first_undefined, tabulate
 from vsacli.dynamics.forward import Plant
 from vsacli.robot.file import load_robot
@@ -61,7 +61,7 @@ def test_feedforward_reproduces_the_motion_of_other_robots(frame):
 
 def test_an_error_at_the_start_is_kept_open_loop():
     """Nothing feeds back: the error neither vanishes nor is hidden, and the run goes on."""
-    simulation = simulate(vsa_3r(), short_motion(3), Setup(initial_error=InitialError(0.02, [0, 0, 0])))
+    simulation = simulate(vsa_3r(), short_motion(3), initial_error=InitialError(0.02, [0, 0, 0]))
     assert simulation.history.q_error[0] == pytest.approx([0.02] * 3, rel=1e-12)
     assert simulation.report.joints[0].q.peak >= 0.02
     assert simulation.report.complete
@@ -70,10 +70,10 @@ def test_an_error_at_the_start_is_kept_open_loop():
 def test_the_course_does_not_depend_on_the_model_of_a_perfect_controller():
     robot, trajectory = vsa_3r(), short_motion(3)
     assert perturbed(robot, 0.0, seed=3) == robot
-    off = simulate(robot, trajectory, Setup(model=perturbed(robot, 0.05, seed=3))).report
+    off = simulate(robot, trajectory, model=perturbed(robot, 0.05, seed=3)).report
     assert max(joint.q.peak for joint in off.joints) > 1e-3
-    assert simulate(robot, trajectory, Setup(model=perturbed(robot, 0.05, seed=3))).report == off
-    assert simulate(robot, trajectory, Setup(model=perturbed(robot, 0.05, seed=4))).report != off
+    assert simulate(robot, trajectory, model=perturbed(robot, 0.05, seed=3)).report == off
+    assert simulate(robot, trajectory, model=perturbed(robot, 0.05, seed=4)).report != off
 
 
 def test_an_elastic_drive_comes_down_to_a_rigid_one():

@@ -19,7 +19,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.control.gains import Gains
-from vsacli.control.simulation import InitialError, Setup, Tolerances, perturbed, simulate
+from vsacli.control.simulation import InitialError, Tolerances, perturbed, simulate
 from vsacli.control.simulation.history import History
 from vsacli.control.simulation.measurement import RateFilter
 from vsacli.control.simulation.simulation_text import render
@@ -37,10 +37,10 @@ def with_torque_limit(robot, limit):
 
 
 def test_motors_saturate():
-    setup = Setup(gains=GAINS, initial_error=InitialError(0.02, 20))
-    free = simulate(vsa_3r(), short_motion(3), setup).report.joints[0].peak_tau_motor[0]
+    conditions = {"gains": GAINS, "initial_error": InitialError(0.02, 20)}
+    free = simulate(vsa_3r(), short_motion(3), **conditions).report.joints[0].peak_tau_motor[0]
     limit = 0.8 * free
-    simulation = simulate(with_torque_limit(vsa_3r(), limit), short_motion(3), setup)
+    simulation = simulate(with_torque_limit(vsa_3r(), limit), short_motion(3), **conditions)
     past, base = simulation.history, simulation.report.joints[0]
     beyond = np.abs(past.tau_motor[:, 0]) > limit
     assert base.peak_tau_motor[0] == limit
@@ -59,7 +59,7 @@ def test_motors_saturate():
 def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
     """The stiffness is driven to 805, below what the loaded joints can have."""
     trajectory = motion((850.0,) * 3, (805.0,) * 3)
-    simulation = simulate(vsa_3r(), trajectory, Setup(gains=GAINS))
+    simulation = simulate(vsa_3r(), trajectory, gains=GAINS)
     past, report = simulation.history, simulation.report
     assert report.verdict == "singular"
     assert not report.complete
@@ -90,8 +90,7 @@ def test_a_tendon_that_goes_slack_ends_the_run():
     joints = tuple(dataclasses.replace(joint, actuator=actuator) for joint in robot.joints)
     robot = dataclasses.replace(robot, joints=joints)
     # 509 N m/rad is what the shoulder's load takes; open loop, the error at the start swings below
-    setup = Setup(initial_error=InitialError(0.02, 50))
-    simulation = simulate(robot, motion((530.0,) * 3, (530.0,) * 3), setup)
+    simulation = simulate(robot, motion((530.0,) * 3, (530.0,) * 3), initial_error=InitialError(0.02, 50))
     assert simulation.report.verdict == "infeasible"
     assert "a spring left the range of its law" in simulation.report.ending
     phi = simulation.history.phi_actual[-1]
@@ -100,12 +99,12 @@ def test_a_tendon_that_goes_slack_ends_the_run():
 
 @pytest.mark.slow
 def test_measured_positions_cost_accuracy_and_the_report_says_how_much():
-    setup = Setup(gains=GAINS, initial_error=InitialError(0.01, 5), measured="positions")
+    conditions = {"gains": GAINS, "initial_error": InitialError(0.01, 5)}
     losses = {}
     for rate in (250, 1000):
         trajectory = short_motion(3, rate=rate, duration=0.3)
-        simulation = simulate(vsa_3r(), trajectory, setup)
-        ideal = simulate(vsa_3r(), trajectory, dataclasses.replace(setup, measured="state"))
+        simulation = simulate(vsa_3r(), trajectory, measured="positions", **conditions)
+        ideal = simulate(vsa_3r(), trajectory, **conditions)
         assert simulation.report.complete
         assert simulation.report.with_full_state == tuple(joint.q for joint in ideal.report.joints)
         assert np.array_equal(simulation.history.time, ideal.history.time)
@@ -126,7 +125,7 @@ def test_rates_of_a_ramp_are_found():
 
 def test_rigid_joints_can_be_driven_by_feedforward_but_not_linearized():
     with pytest.raises(InputError, match="needs springs at all joints or at none: elbow is rigid"):
-        simulate(with_actuators(vsa_3r(), {2: rigid()}), short_motion(3), Setup(gains=GAINS))
+        simulate(with_actuators(vsa_3r(), {2: rigid()}), short_motion(3), gains=GAINS)
 
 
 @pytest.mark.parametrize(
@@ -145,12 +144,12 @@ def test_rigid_joints_can_be_driven_by_feedforward_but_not_linearized():
 )
 def test_starts_that_cannot_be_had_are_refused(error, message):
     with pytest.raises(InputError, match=message):
-        simulate(vsa_3r(), motion(), Setup(initial_error=error))
+        simulate(vsa_3r(), motion(), initial_error=error)
 
 
-def test_setups_that_contradict_themselves_are_refused():
+def test_conditions_that_contradict_themselves_are_refused():
     with pytest.raises(InputError, match="measured positions need the controller feedback-linearization"):
-        Setup(measured="positions")
+        simulate(vsa_3r(), short_motion(3), measured="positions")
     with pytest.raises(InputError, match="the relative one at least 1e-13, not 1e-15"):
         Tolerances(rtol=1e-15)
     with pytest.raises(InputError, match="must lie between 0 and 1, not 1"):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import shlex
 import sys
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +29,7 @@ from vsacli.cli.console import Exit, Talk, talk_options
 
 if TYPE_CHECKING:
     from vsacli.control.gains import Gains
-    from vsacli.control.simulation import Setup
+    from vsacli.control.simulation import Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
     from vsacli.documents.source import Source
     from vsacli.results.store.simulation_writer import SimulationWriter
@@ -124,7 +126,7 @@ def simulate(
     """
     path = Path(f"{run_stem(robot, trajectory)}-simulation.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
-    setup, sources = _setup(inputs[0], **choices)
+    simulation, sources = _prepared(inputs, **choices)
     recorded = replace(inputs[0], sources=(*inputs[0].sources, *sources))
     refuse_input_as_output(path, (source.path for source in (*recorded.sources, *inputs[1].sources)))
     from vsacli.results.store.simulation_writer import SimulationWriter
@@ -136,7 +138,7 @@ def simulate(
         check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)
     command_line = shlex.join(["vsacli", *sys.argv[1:]])
     writer = SimulationWriter(path, recorded, inputs[1], overwrite=overwrite, command_line=command_line)
-    report = _run(*inputs, setup, writer, talk)
+    report = _run(simulation, inputs[1], writer, talk)
     code = _show(report, as_json)
     talk.note(f"wrote {path}")
     if plot_folder is not None:
@@ -146,8 +148,8 @@ def simulate(
     return code
 
 
-def _setup(
-    robot: Robot,
+def _prepared(
+    inputs: tuple[Robot, Trajectory],
     *,
     controller: str,
     poles: str | None,
@@ -160,24 +162,27 @@ def _setup(
     measured: Any,
     rtol: float,
     atol: float,
-) -> tuple[Setup, list[Source]]:
-    """The conditions that the options describe, and the files read for them."""
-    from vsacli.control.simulation import InitialError, Setup, Tolerances, perturbed
+) -> tuple[Callable[..., Simulation], list[Source]]:
+    """The simulation that the options describe, and the files read for them."""
+    from vsacli.control.simulation import InitialError, Tolerances, check_measured, perturbed, simulate
 
     gains: Gains | None = None
     sources: list[Source] = []
     if controller == FEEDBACK:
-        gains, sources = _gains(robot, poles, stiffness_poles, integral)
+        gains, sources = _gains(inputs[0], poles, stiffness_poles, integral)
     elif poles is not None or stiffness_poles is not None or integral:
         raise InputError.one(f"poles and integral action need --controller {FEEDBACK}")
-    setup = Setup(
+    check_measured(measured, gains)
+    simulation = partial(
+        simulate,
+        *inputs,
         gains=gains,
-        model=perturbed(robot, perturb, seed),
+        model=perturbed(inputs[0], perturb, seed),
         initial_error=InitialError(initial_error, initial_stiffness_error),
         measured=measured,
         tolerances=Tolerances(rtol, atol),
     )
-    return setup, sources
+    return simulation, sources
 
 
 def _gains(
@@ -194,18 +199,16 @@ def _gains(
 
 
 def _run(
-    robot: Robot, trajectory: Trajectory, setup: Setup, writer: SimulationWriter, talk: Talk
+    simulate: Callable[..., Simulation], trajectory: Trajectory, writer: SimulationWriter, talk: Talk
 ) -> SimulationReport:
     """Simulate, and write what happened."""
-    from vsacli.control.simulation import simulate
-
     first, last = trajectory.times.span
     with writer, talk.progress(PROGRESS_STEPS, shown_from=0) as bar:
 
         def progress(time: float) -> None:
             bar.update(int(PROGRESS_STEPS * (time - first) / (last - first)) - bar.pos)
 
-        simulation = simulate(robot, trajectory, setup, progress)
+        simulation = simulate(progress=progress)
         writer.write(simulation.history)
         writer.finish(simulation.report.as_json())
     return simulation.report

@@ -2,7 +2,7 @@
 
 from vsacli.control.simulation.integrator import Tolerances
 from vsacli.control.simulation.perturbation import perturbed
-from vsacli.control.simulation.simulate import Measured, Setup, Simulation, simulate
+from vsacli.control.simulation.simulate import Measured, Simulation, check_measured, simulate
 from vsacli.control.simulation.start import InitialError
 
-__all__ = ["InitialError", "Measured", "Setup", "Simulation", "Tolerances", "perturbed", "simulate"]
+__all__ = ["InitialError", "Measured", "Simulation", "Tolerances", "check_measured", "perturbed", "simulate"]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Literal
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
@@ -21,41 +23,11 @@ from vsacli.control.simulation.simulation_report import (
 )
 from vsacli.control.simulation.start import InitialError, start_state
 from vsacli.dynamics.forward import State
+from vsacli.dynamics.inverse import check_fit
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 Measured = Literal["state", "positions"]
-
-
-@dataclass(frozen=True)
-class Setup:
-    """Under which conditions a robot is simulated.
-
-    Attributes:
-        gains: of feedback linearization; None applies the torques of the inverse dynamics (feedforward).
-        model: what the controller takes the robot for; the robot itself if None.
-        initial_error: by how much the start differs from the command.
-        measured: what the controller knows: the full state at every instant, or the positions of joints and
-            motors at the steps of the trajectory, between which it holds its torques.
-        tolerances: of the integration.
-    """
-
-    gains: Gains | None = None
-    model: Robot | None = None
-    initial_error: InitialError = field(default_factory=InitialError)
-    measured: Measured = "state"
-    tolerances: Tolerances = field(default_factory=Tolerances)
-
-    def __post_init__(self) -> None:
-        if self.gains is None and self.measured == "positions":
-            raise InputError.one(
-                "feedforward measures nothing: measured positions need the controller feedback-linearization"
-            )
-
-    @property
-    def controller(self) -> str:
-        """The controller, as the command line calls it."""
-        return "feedforward" if self.gains is None else "feedback-linearization"
 
 
 @dataclass(frozen=True)
@@ -67,29 +39,52 @@ class Simulation:
 
 
 def simulate(
-    robot: Robot, trajectory: Trajectory, setup: Setup | None = None, progress: Progress | None = None
+    robot: Robot,
+    trajectory: Trajectory,
+    *,
+    gains: Gains | None = None,
+    model: Robot | None = None,
+    initial_error: InitialError = InitialError(),
+    measured: Measured = "state",
+    tolerances: Tolerances = Tolerances(),
+    progress: Progress = lambda _: None,
 ) -> Simulation:
     """Integrate the full model (5) of a robot under a controller.
 
     Args:
         robot: the robot as it is.
         trajectory: what it is to do; its wrench acts on the robot, and the controller knows it.
-        setup: controller, errors and tolerances; feedforward from the exact state by default.
+        gains: of feedback linearization; None applies the torques of the inverse dynamics (feedforward).
+        model: what the controller takes the robot for, e.g. by `perturbed`; the robot itself if None.
+        initial_error: by how much the start differs from the command.
+        measured: what the controller knows: the full "state" at every instant, or the "positions" of joints
+            and motors at the steps of the trajectory, between which it holds its torques.
+        tolerances: of the integration.
         progress: called with the time reached, s.
 
     Raises:
-        InputError: a start that cannot be had, gains that do not fit, feedback linearization of a robot that
-            mixes rigid joints with others, a mass matrix that is not positive definite.
+        InputError: a trajectory that is not for the robot, a start that cannot be had, measured positions
+            without gains, gains that do not fit, feedback linearization of a robot that mixes rigid joints
+            with others, a mass matrix that is not positive definite.
+        TypeError: robot or trajectory is none.
     """
-    setup = setup or Setup()
-    loop = _closed_loop(robot, trajectory, setup)
-    start = start_state(robot, trajectory, setup.initial_error)
-    course = _course(loop, trajectory, start, setup, progress or (lambda _: None))
+    check_fit(robot, trajectory)
+    check_measured(measured, gains)
+    loop = _closed_loop(robot, trajectory, model or robot, gains)
+    start = start_state(robot, trajectory, initial_error)
+    integrate = continuous if measured == "state" else sampled
+    course = _course(loop, trajectory, start, integrate, tolerances, progress)
     past = history(robot, loop, course)
+    ideal: tuple[Deviation, ...] = ()
+    if measured == "positions":
+        with_full_state = simulate(
+            robot, trajectory, gains=gains, model=model, initial_error=initial_error, tolerances=tolerances
+        )
+        ideal = tuple(joint.q for joint in with_full_state.report.joints)
     report = SimulationReport(
         robot=robot.name,
         trajectory=trajectory.name,
-        controller=setup.controller,
+        controller="feedforward" if gains is None else "feedback-linearization",
         samples=len(past.time),
         duration=trajectory.duration,
         verdict=verdict_on(past, complete=course.ending is None),
@@ -98,21 +93,37 @@ def simulate(
         warnings=(*robot.warnings, *trajectory.warnings),
         notes=trajectory.notes,
         joints=joint_trackings(robot, past),
-        with_full_state=_with_full_state(robot, trajectory, setup),
+        with_full_state=ideal,
     )
     return Simulation(past, report)
 
 
-def _closed_loop(robot: Robot, trajectory: Trajectory, setup: Setup) -> ClosedLoop:
+def check_measured(measured: Measured, gains: Gains | None) -> None:
+    """Refuse to measure what no controller uses.
+
+    Raises:
+        InputError: positions are measured, but there is no feedback.
+    """
+    if gains is None and measured == "positions":
+        raise InputError.one(
+            "feedforward measures nothing: measured positions need the controller feedback-linearization"
+        )
+
+
+def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gains | None) -> ClosedLoop:
     reference = Reference(trajectory)
-    model = setup.model or robot
-    if setup.gains is None:
+    if gains is None:
         return ClosedLoop(robot, Feedforward(model, trajectory), reference)
-    return ClosedLoop(robot, LinearizingFeedback(model, reference, setup.gains), reference)
+    return ClosedLoop(robot, LinearizingFeedback(model, reference, gains), reference)
 
 
 def _course(
-    loop: ClosedLoop, trajectory: Trajectory, start: State, setup: Setup, progress: Progress
+    loop: ClosedLoop,
+    trajectory: Trajectory,
+    start: State,
+    integrate: Callable[[ClosedLoop, Integrator, FloatArray, FloatArray], Course],
+    tolerances: Tolerances,
+    progress: Progress,
 ) -> Course:
     """Integrate as far as the controller has torques and the springs obey their laws."""
     last = loop.controller.ending
@@ -120,15 +131,6 @@ def _course(
     if last is not None and last.time <= times[0]:
         raise InputError.one("the controller's model cannot execute the start of the trajectory")
     vector = loop.packing.pack(*loop.plant.unpacked(start))
-    integrator = Integrator(list(boundaries(loop, vector)), setup.tolerances, progress)
-    integrate = continuous if setup.measured == "state" else sampled
+    integrator = Integrator(list(boundaries(loop, vector)), tolerances, progress)
     course = integrate(loop, integrator, times if last is None else times[times <= last.time], vector)
     return course if course.ending is not None else course._replace(ending=last)
-
-
-def _with_full_state(robot: Robot, trajectory: Trajectory, setup: Setup) -> tuple[Deviation, ...]:
-    """Deviations of q in the same run when the controller knows the full state, if it does not."""
-    if setup.measured == "state":
-        return ()
-    ideal = simulate(robot, trajectory, replace(setup, measured="state"))
-    return tuple(joint.q for joint in ideal.report.joints)
