@@ -215,7 +215,5 @@ def _run(
 
 
 def _show(report: SimulationReport, as_json: bool) -> Exit:
-    from vsacli.control.simulation.simulation_text import render
-
-    click.echo(json.dumps(report.as_json(), indent=1) if as_json else render(report))
+    click.echo(json.dumps(report.as_json(), indent=1) if as_json else str(report))
     return Exit.OK if report.verdict == "ok" else Exit.VERDICT

@@ -14,13 +14,9 @@ from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.controllers import Feedforward, LinearizingFeedback
 from vsacli.control.simulation.history import History, history
 from vsacli.control.simulation.integrator import Course, Integrator, Progress, Tolerances, continuous, sampled
+from vsacli.control.simulation.joint_tracking import Deviation, joint_trackings
 from vsacli.control.simulation.reference import Reference
-from vsacli.control.simulation.simulation_report import (
-    Deviation,
-    SimulationReport,
-    joint_trackings,
-    verdict_on,
-)
+from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
 from vsacli.control.simulation.start import InitialError, start_state
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import check_fit

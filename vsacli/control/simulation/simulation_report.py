@@ -2,132 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.report import VERDICTS
-from vsacli.base.arrays import FloatArray, by_joint, of_joint
-from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.analysis.report_text import WIDTH, aligned, energy_lines, warnings_and_notes
+from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Stored, named
-from vsacli.base.simulation_variables import actual
+from vsacli.base.units import POSITION
 from vsacli.control.simulation.history import History
-from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
-from vsacli.dynamics.limits import limit_checks
-from vsacli.robot.model import Joint, Robot
+from vsacli.control.simulation.joint_tracking import HEADER, Deviation, JointTracking, limit_sentence, row
 
 _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
-
-
-@dataclass(frozen=True)
-class Deviation(Stored):
-    """Of an actual value from the command: the largest, when (s), and the last; NaN if there is none."""
-
-    peak: float
-    time: float
-    final: float
-
-    @classmethod
-    def of(cls, time: FloatArray, error: FloatArray) -> Deviation:
-        """From errors, (samples,), at times."""
-        if np.isnan(error).all():
-            return cls(np.nan, np.nan, np.nan)
-        worst = int(np.nanargmax(np.abs(error)))
-        return cls(float(abs(error[worst])), float(time[worst]), float(error[-1]))
-
-
-@dataclass(frozen=True)
-class JointTracking(Stored):
-    """What a simulation found at one joint.
-
-    Attributes:
-        name: of the joint.
-        type: "revolute" or "prismatic".
-        q: deviation of the position, rad (m).
-        stiffness: deviation of the stiffness, N m/rad (N/m).
-        peak_tau_motor: largest |torque| that motors 1 and 2 gave, N m (N).
-        steps_over_limit: how many steps have a limit exceeded.
-        worst: the worst excess of each limit, by its name.
-        energy: work of the motors, elastic energy, co-contraction.
-    """
-
-    name: str
-    type: str
-    q: Deviation
-    stiffness: Deviation
-    peak_tau_motor: tuple[float, float]
-    steps_over_limit: int
-    worst: dict[str, Worst]
-    energy: JointEnergy
-
-    shape: ClassVar = {
-        **named("name", "type"),
-        "q_error": "q",
-        "stiffness_error": "stiffness",
-        "peak": {"tau_motor": "peak_tau_motor"},
-        "steps": {"over_limit": "steps_over_limit"},
-        **named("worst", "energy"),
-    }
-
-
-def joint_trackings(robot: Robot, history: History) -> tuple[JointTracking, ...]:
-    """What a history says about each joint."""
-    energies = enumerate(_energies(robot, history))
-    return tuple(_tracking(robot.joints[index], index, history, energy) for index, energy in energies)
-
-
-def _energies(robot: Robot, history: History) -> list[JointEnergy]:
-    time, work, power, tau_spring, elastic_energy = (
-        _led(getattr(history, name))
-        for name in ("time", *map(actual, ("motor_energy", "motor_power", "tau_spring", "elastic_energy")))
-    )
-    meter = EnergyMeter()
-    meter.add(Flow(np.diff(time), np.diff(work), power, tau_spring, elastic_energy))
-    return meter.report(robot)
-
-
-def _led(values: FloatArray) -> FloatArray:
-    """(..., samples + 1) from (samples, ...), the first step twice: a run may end with it."""
-    rows = by_joint(values)
-    return np.concatenate((rows[..., :1], rows), axis=-1)
-
-
-def _tracking(joint: Joint, index: int, history: History, energy: JointEnergy) -> JointTracking:
-    flags = history.flags[:, index]
-    first, second = np.fmax.reduce(np.abs(history.tau_motor_actual[:, index]), axis=0).tolist()
-    return JointTracking(
-        name=joint.name,
-        type=joint.type,
-        q=Deviation.of(history.time, history.q_error[:, index]),
-        stiffness=Deviation.of(history.time, history.stiffness_error[:, index]),
-        peak_tau_motor=(first, second),
-        steps_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
-        worst=_worst(joint, index, history),
-        energy=energy,
-    )
-
-
-def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
-    """The worst excess of each limit of a joint; of either motor."""
-    worst: dict[str, Worst] = {}
-    most: dict[str, float] = {}
-    checks = limit_checks(joint)
-    names = {check.variable: _checked(check.variable) for check in checks}
-    values = of_joint({variable: getattr(history, name) for variable, name in names.items()}, index)
-    for check in checks:
-        excess, label = check.worst(values, history.flags[:, index]), check.flag.label
-        if excess is not None and excess.size > most.get(label, 0.0):
-            time, unit = float(history.time[excess.step]), check.unit(joint.type)
-            worst[label] = Worst(label, time, excess.value, excess.bound, unit, check.motor)
-            most[label] = excess.size
-    return worst
-
-
-def _checked(variable: str) -> str:
-    """Where the values lie that a limit bounds: of the torque what is asked for, else what was."""
-    return variable if variable == "tau_motor" else actual(variable)
 
 
 def verdict_on(history: History, *, complete: bool) -> str:
@@ -181,3 +70,31 @@ class SimulationReport(Stored):
     def complete(self) -> bool:
         """Whether the run reached the end of the trajectory."""
         return self.ending is None
+
+    def __str__(self) -> str:
+        """The lines that the command prints, without a final newline."""
+        return "\n".join(
+            [
+                self._headline(),
+                *aligned([HEADER, *map(row, self.joints)]),
+                *warnings_and_notes(self.warnings, self.notes),
+                *(limit_sentence(joint, worst) for joint in self.joints for worst in joint.worst.values()),
+                *([] if self.ending is None else [self.ending]),
+                *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
+                *self._loss(),
+            ]
+        )
+
+    def _headline(self) -> str:
+        left = f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"
+        verdict = self.verdict.upper().replace("_", " ")
+        return f"{left:<{WIDTH - len(verdict) - 1}} {verdict}"
+
+    def _loss(self) -> Iterator[str]:
+        """What measuring positions alone costs."""
+        for joint, ideal in zip(self.joints, self.with_full_state, strict=False):
+            unit = POSITION.unit(joint.type)
+            yield (
+                f"{joint.name}: with the full state the q error is {ideal.peak:.2g} {unit} at its peak, "
+                f"{ideal.final:.2g} {unit} at the end"
+            )

@@ -122,12 +122,11 @@ def _result(result: Description) -> Iterator[str]:
 
 def _report(kind: str, report: Description) -> str:
     """What the command that made the file printed."""
-    from vsacli.control.simulation import simulation_text as simulation_text
     from vsacli.control.simulation.simulation_report import SimulationReport
 
     try:
         if kind == "simulation":
-            return simulation_text.render(SimulationReport.from_json(report))
+            return str(SimulationReport.from_json(report))
         return str(Report.from_json(report))
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError):
         return "its report has another form than this version writes; --json shows it"

@@ -1,0 +1,163 @@
+"""What a simulation found at one joint: its deviations from the command, its limits, its energy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vsacli.analysis.joint_report import Worst
+from vsacli.base.arrays import FloatArray, by_joint, of_joint
+from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.json_records import Stored, named
+from vsacli.base.simulation_variables import actual
+from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
+from vsacli.control.simulation.history import History
+from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
+from vsacli.dynamics.limits import limit_checks
+from vsacli.robot.model import Joint, Robot
+
+HEADER = ("joint", "q error: peak", "end", "stiffness error: peak", "end", "peak motor 1 / 2")
+
+
+@dataclass(frozen=True)
+class Deviation(Stored):
+    """Of an actual value from the command: the largest, when (s), and the last; NaN if there is none."""
+
+    peak: float
+    time: float
+    final: float
+
+    @classmethod
+    def of(cls, time: FloatArray, error: FloatArray) -> Deviation:
+        """From errors, (samples,), at times."""
+        if np.isnan(error).all():
+            return cls(np.nan, np.nan, np.nan)
+        worst = int(np.nanargmax(np.abs(error)))
+        return cls(float(abs(error[worst])), float(time[worst]), float(error[-1]))
+
+
+@dataclass(frozen=True)
+class JointTracking(Stored):
+    """What a simulation found at one joint.
+
+    Attributes:
+        name: of the joint.
+        type: "revolute" or "prismatic".
+        q: deviation of the position, rad (m).
+        stiffness: deviation of the stiffness, N m/rad (N/m).
+        peak_tau_motor: largest |torque| that motors 1 and 2 gave, N m (N).
+        steps_over_limit: how many steps have a limit exceeded.
+        worst: the worst excess of each limit, by its name.
+        energy: work of the motors, elastic energy, co-contraction.
+    """
+
+    name: str
+    type: str
+    q: Deviation
+    stiffness: Deviation
+    peak_tau_motor: tuple[float, float]
+    steps_over_limit: int
+    worst: dict[str, Worst]
+    energy: JointEnergy
+
+    shape: ClassVar = {
+        **named("name", "type"),
+        "q_error": "q",
+        "stiffness_error": "stiffness",
+        "peak": {"tau_motor": "peak_tau_motor"},
+        "steps": {"over_limit": "steps_over_limit"},
+        **named("worst", "energy"),
+    }
+
+
+def joint_trackings(robot: Robot, history: History) -> tuple[JointTracking, ...]:
+    """What a history says about each joint."""
+    energies = enumerate(_energies(robot, history))
+    return tuple(_tracking(robot.joints[index], index, history, energy) for index, energy in energies)
+
+
+def _energies(robot: Robot, history: History) -> list[JointEnergy]:
+    time, work, power, tau_spring, elastic_energy = (
+        _led(getattr(history, name))
+        for name in ("time", *map(actual, ("motor_energy", "motor_power", "tau_spring", "elastic_energy")))
+    )
+    meter = EnergyMeter()
+    meter.add(Flow(np.diff(time), np.diff(work), power, tau_spring, elastic_energy))
+    return meter.report(robot)
+
+
+def _led(values: FloatArray) -> FloatArray:
+    """(..., samples + 1) from (samples, ...), the first step twice: a run may end with it."""
+    rows = by_joint(values)
+    return np.concatenate((rows[..., :1], rows), axis=-1)
+
+
+def _tracking(joint: Joint, index: int, history: History, energy: JointEnergy) -> JointTracking:
+    flags = history.flags[:, index]
+    first, second = np.fmax.reduce(np.abs(history.tau_motor_actual[:, index]), axis=0).tolist()
+    return JointTracking(
+        name=joint.name,
+        type=joint.type,
+        q=Deviation.of(history.time, history.q_error[:, index]),
+        stiffness=Deviation.of(history.time, history.stiffness_error[:, index]),
+        peak_tau_motor=(first, second),
+        steps_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
+        worst=_worst(joint, index, history),
+        energy=energy,
+    )
+
+
+def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
+    """The worst excess of each limit of a joint; of either motor."""
+    worst: dict[str, Worst] = {}
+    most: dict[str, float] = {}
+    checks = limit_checks(joint)
+    names = {check.variable: _checked(check.variable) for check in checks}
+    values = of_joint({variable: getattr(history, name) for variable, name in names.items()}, index)
+    for check in checks:
+        excess, label = check.worst(values, history.flags[:, index]), check.flag.label
+        if excess is not None and excess.size > most.get(label, 0.0):
+            time, unit = float(history.time[excess.step]), check.unit(joint.type)
+            worst[label] = Worst(label, time, excess.value, excess.bound, unit, check.motor)
+            most[label] = excess.size
+    return worst
+
+
+def _checked(variable: str) -> str:
+    """Where the values lie that a limit bounds: of the torque what is asked for, else what was."""
+    return variable if variable == "tau_motor" else actual(variable)
+
+
+def row(joint: JointTracking) -> tuple[str, ...]:
+    """A joint in the table of the report, under `HEADER`."""
+    motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
+    return (
+        joint.name,
+        _with_unit(joint.q.peak, POSITION, joint),
+        _with_unit(joint.q.final, POSITION, joint),
+        _with_unit(joint.stiffness.peak, STIFFNESS, joint),
+        _with_unit(joint.stiffness.final, STIFFNESS, joint),
+        f"{motors} {TORQUE.unit(joint.type)}",
+    )
+
+
+def _with_unit(value: float, quantity: Quantity, joint: JointTracking) -> str:
+    return "-" if math.isnan(value) else f"{_number(value)} {quantity.unit(joint.type)}"
+
+
+def _number(value: float) -> str:
+    """One decimal for large numbers, two digits for small ones."""
+    return f"{value:.1f}" if abs(value) >= 10 else f"{value:.2g}"
+
+
+def limit_sentence(joint: JointTracking, worst: Worst) -> str:
+    """By how much a joint exceeds a limit, and when."""
+    whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
+    relation = "below" if worst.value < worst.bound else "above"
+    return (
+        f"{joint.name}: {whose} is {worst.value:.6g} {worst.unit} at t = {worst.time:.3f} s, "
+        f"{relation} its limit {worst.bound:.6g}"
+    )
