@@ -12,6 +12,7 @@ import pytest
 from oracles.spring_scan import turned
 from samples.springs import SPRINGS, measured
 
+from vsacli.actuators import laws
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.exponential import Exponential
@@ -81,6 +82,14 @@ def conditioning(law: SpringLaw, phi: FloatArray) -> FloatArray:
 
 def test_every_law_of_the_file_format_is_tested():
     assert {type(law) for law in EVERY.values()} == set(LAWS.values())
+
+
+def test_every_name_that_laws_offers_is_there():
+    assert set(dir(laws)) == set(laws.__all__) == {name for name in laws.__all__ if hasattr(laws, name)}
+    offered = [getattr(laws, name) for name in laws.__all__]
+    assert all(law in offered for law in LAWS.values())
+    with pytest.raises(AttributeError, match="has no attribute 'Cubik'"):
+        laws.Cubik  # noqa: B018  (looked up, not used)
 
 
 @formulas

@@ -9,7 +9,7 @@ from functools import cached_property, reduce
 
 import numpy as np
 
-from vsacli.actuators.laws.inverse import inverse, with_sign_of
+from vsacli.actuators.laws.inversion import inverse, with_sign_of
 from vsacli.actuators.laws.law import SpringLaw
 from vsacli.actuators.laws.state import SpringState
 from vsacli.base import units

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vsacli.actuators.laws.inverse import FirstGuess, inverse
+from vsacli.actuators.laws.inversion import FirstGuess, inverse
 from vsacli.actuators.laws.law import SpringLaw
 from vsacli.actuators.laws.measured_curve import MeasuredCurve, fit_curve
 from vsacli.actuators.laws.state import SpringState

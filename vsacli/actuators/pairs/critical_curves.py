@@ -55,14 +55,12 @@ class Hardening:
     Attributes:
         law: the spring.
         phi: deflections, rad (m).
-        tau: torques, N m (N).
         rho: relative hardening.
         peaks: indices where rho turns around.
     """
 
     law: SpringLaw
     phi: FloatArray
-    tau: FloatArray
     rho: FloatArray
     peaks: IndexArray
 
@@ -125,7 +123,7 @@ def sample_hardening(law: SpringLaw) -> Hardening | None:
     rho = law.hardening(phi)
     known = np.isfinite(rho)
     phi, rho = phi[known], rho[known]
-    return Hardening(law, phi, law.torque(phi), rho, np.searchsorted(phi, peaks))
+    return Hardening(law, phi, rho, np.searchsorted(phi, peaks))
 
 
 def _around(peak: float, phi: FloatArray) -> FloatArray:
