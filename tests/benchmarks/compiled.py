@@ -17,9 +17,9 @@ from subjects import chain, motion, seven_joints
 from timing import Seconds, medians
 
 from vsacli.base.arrays import FloatArray
+from vsacli.compute.engine.compiled_engine import CompiledEngine
 from vsacli.compute.engine.compiler import FLAGS, system_compiler
-from vsacli.compute.engine.engines import CompiledEngine, Engine, passes
-from vsacli.compute.engine.kernel import Kernel, record
+from vsacli.compute.engine.engines import Engine, Kernel, kernel_program, passes
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.dynamics.inverse import InverseDynamics
@@ -135,8 +135,8 @@ def _cost(robot: Robot) -> Cost:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         begin = time.perf_counter()
-        listing = record(InverseDynamics(robot))
-        (folder / "batch.c").write_text(batch_source(listing), encoding="utf-8")
+        program = kernel_program(InverseDynamics(robot))
+        (folder / "batch.c").write_text(batch_source(program), encoding="utf-8")
         recorded = time.perf_counter()
         subprocess.run(["cc", *FLAGS, "batch.c", "-o", "batch.so", "-lm"], cwd=folder, check=True)
         compiled = time.perf_counter()
@@ -151,4 +151,4 @@ def _cost(robot: Robot) -> Cost:
     wanted = f"{prefix}_inverse_dynamics"
     code = next(int(line.split()[1], 16) for line in symbols if line.endswith(f" {wanted}"))
     stack = next(int(line.split()[-2]) for line in stacks if wanted in line)
-    return Cost(len(listing.operations), code, stack, recorded - begin, compiled - recorded)
+    return Cost(len(program.operations), code, stack, recorded - begin, compiled - recorded)

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from samples.generated_code import COMPILERS, Compiled, compile_c
 from samples.marks import slow
-from samples.recorded_functions import CONTROL_FLOW, ELEMENTWISE, operands
+from samples.traced_functions import CONTROL_FLOW, ELEMENTWISE, operands
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.compute.engine.kernel import record
+from vsacli.compute.engine.compiler import Library
+from vsacli.compute.engine.engines import kernel_program
 from vsacli.compute.engine.lanes import batch_source
-from vsacli.compute.engine.library import Library
 from vsacli.control.codegen.interface import Array, Function, Structure
 from vsacli.control.codegen.scalar import source_text
 
@@ -90,7 +90,7 @@ def test_of_single_samples(tmp_path: Path) -> None:
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("processor", PROCESSORS)
 def test_of_lanes(compiler: str, processor: str, tmp_path: Path) -> None:
-    (tmp_path / "lanes.c").write_text(batch_source(record(Everything())))
+    (tmp_path / "lanes.c").write_text(batch_source(kernel_program(Everything())))
     machine = ["-std=gnu11", "-O1", "-fno-math-errno", "-fPIC", "-shared", f"-march={processor}"]
     compile_c(tmp_path, *machine, "lanes.c", "-o", "lanes.so", "-lm", compiler=compiler)
     library = Library(tmp_path / "lanes.so", Everything.outputs)

@@ -24,7 +24,7 @@ from vsacli.compute.engine.cache import (
     CacheError,
     open_cache,
 )
-from vsacli.compute.engine.loading import _loaded
+from vsacli.compute.engine.compiled_engine import _loaded
 from vsacli.dynamics.link_torques import LinkTorques, link_torques
 
 KERNEL = LinkTorques(vsa_3r())

@@ -14,8 +14,7 @@ from samples.robots import random_motion, vsa_3r
 from vsacli.base.errors import InputError
 from vsacli.compute.engine import NUMPY, choice, choose
 from vsacli.compute.engine.choice import LOOK_FROM
-from vsacli.compute.engine.engines import CompiledEngine
-from vsacli.compute.engine.loading import _loaded
+from vsacli.compute.engine.compiled_engine import CompiledEngine, _loaded
 from vsacli.dynamics.link_torques import LinkTorques, link_torques
 
 KERNEL = LinkTorques(vsa_3r())

@@ -1,4 +1,4 @@
-"""What is recorded of NumPy's functions computes what NumPy computes."""
+"""What is traced of NumPy's functions computes what NumPy computes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from samples.listings import carry_out, recorded
-from samples.recorded_functions import ELEMENTWISE, NODES, SPECIAL, operands
+from samples.programs import carry_out, traced
+from samples.traced_functions import ELEMENTWISE, NODES, SPECIAL, operands
 
-from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray
+from vsacli.compute.tracing import Symbol, Tape, TracedArray
+from vsacli.compute.tracing.python_code import StateFunction
 
 
 @pytest.mark.parametrize("name", ELEMENTWISE)
 def test_functions_mean_what_they_mean_in_numpy(name: str) -> None:
     function, (x, y) = ELEMENTWISE[name], operands()
-    (found,) = carry_out(recorded(function, 2), [x, y])
+    (found,) = carry_out(traced(function, 2), [x, y])
     with np.errstate(all="ignore"):
         expected = function(x, y)
     np.testing.assert_array_equal(found, expected)
@@ -33,7 +34,7 @@ BINARY = [
 
 @pytest.mark.parametrize("ufunc", BINARY, ids=lambda ufunc: ufunc.__name__)
 def test_a_constant_beside_a_value_is_simplified_only_if_the_result_is_the_same(ufunc: np.ufunc) -> None:
-    """But for the sign of a zero: x + 0 is recorded as x, also where x is -0."""
+    """But for the sign of a zero: x + 0 is traced as x, also where x is -0."""
 
     def with_constants(x: Any) -> Any:
         sides = [ufunc(x, constant) for constant in SPECIAL], [ufunc(constant, x) for constant in SPECIAL]
@@ -42,15 +43,15 @@ def test_a_constant_beside_a_value_is_simplified_only_if_the_result_is_the_same(
     x, _ = operands()
     with np.errstate(all="ignore"):
         expected = with_constants(x)
-    for found, right in zip(carry_out(recorded(with_constants, 1), [x]), expected, strict=True):
+    for found, right in zip(carry_out(traced(with_constants, 1), [x]), expected, strict=True):
         np.testing.assert_array_equal(np.broadcast_to(found, right.shape), right)
 
 
 @pytest.mark.parametrize("ufunc", BINARY, ids=lambda ufunc: ufunc.__name__)
 def test_the_order_of_operands_counts(ufunc: np.ufunc) -> None:
-    """An operation that was recorded is taken for another only if it is the same."""
+    """An operation that was traced is taken for another only if it is the same."""
     x, y = operands()
-    found = carry_out(recorded(lambda x, y: [ufunc(x, y), ufunc(y, x)], 2), [x, y])
+    found = carry_out(traced(lambda x, y: [ufunc(x, y), ufunc(y, x)], 2), [x, y])
     with np.errstate(all="ignore"):
         np.testing.assert_array_equal(found, [ufunc(x, y), ufunc(y, x)])
 
@@ -59,7 +60,7 @@ def test_the_order_of_operands_counts(ufunc: np.ufunc) -> None:
 def test_powers_by_products_are_off_by_rounding_alone(exponent: float, units: int) -> None:
     """Each product or root rounds by half a unit in the last place, NumPy's power by one."""
     x = np.abs(operands()[0][len(SPECIAL) ** 2 :])
-    (found,) = carry_out(recorded(lambda x: x**exponent, 1), [x])
+    (found,) = carry_out(traced(lambda x: x**exponent, 1), [x])
     np.testing.assert_array_max_ulp(found, x**exponent, units)
 
 
@@ -84,8 +85,8 @@ def test_arrays_are_arranged_as_by_numpy(name: str) -> None:
     function = ARRAYS[name]
     x, y = np.random.default_rng(1).normal(size=(2, 5))
     for k in range(5):
-        listing = recorded(function, 2)
-        found = np.array([np.ravel(value)[0] for value in carry_out(listing, [x[k : k + 1], y[k : k + 1]])])
+        program = traced(function, 2)
+        found = np.array([np.ravel(value)[0] for value in carry_out(program, [x[k : k + 1], y[k : k + 1]])])
         np.testing.assert_array_equal(found, np.ravel(function(x[k : k + 1], y[k : k + 1])))
 
 
@@ -97,7 +98,7 @@ def test_entries_are_written_in_place() -> None:
     target[1] = 2 * row
     target[0], kept = row, target.copy()
     (first, second, zero) = carry_out(
-        tape.listing([*target.cells.ravel(), kept.cells[0].item()]), [np.array([3.0])]
+        tape.program([*target.cells.ravel(), kept.cells[0].item()]), [np.array([3.0])]
     )
     assert (first, second, zero) == (3, 6, 0)
     assert len(target) == 2
@@ -164,7 +165,7 @@ def test_constants_are_computed_at_once() -> None:
     assert np.sin(constant * 3 + 1).cells.item() == math.sin(7)
     assert bool(constant > 1)
     assert np.where(constant > 1, 5.0, 6.0).cells.item() == 5
-    assert tape.listing([]).operations == ()
+    assert tape.program([]).operations == ()
 
 
 def test_an_operation_is_recorded_once_and_only_if_needed() -> None:
@@ -174,18 +175,18 @@ def test_an_operation_is_recorded_once_and_only_if_needed() -> None:
     assert y * x is product
     assert isinstance(product, Symbol)
     np.sin(TracedArray(tape, [product]))
-    assert tape.listing([product]).operations == (product,)
+    assert tape.program([product]).operations == (product,)
 
 
 def test_a_program_computes_numbers_rows_and_becomes_part_of_another() -> None:
     tape = Tape()
     x, y = tape.inputs(2)
-    program = Program(tape.listing([x * y - 1, x.sin(), 4.0]))
+    function = StateFunction(tape.program([x * y - 1, x.sin(), 4.0]))
     single, rows = np.array([0.3, 2.0]), np.array([[0.3, 2.0], [0.5, -1.0]])
-    np.testing.assert_array_equal(program(single), [0.3 * 2 - 1, math.sin(0.3), 4])
-    np.testing.assert_array_equal(program(rows)[0], program(single))
+    np.testing.assert_array_equal(function(single), [0.3 * 2 - 1, math.sin(0.3), 4])
+    np.testing.assert_array_equal(function(rows)[0], function(single))
 
-    listing = recorded(lambda a, b: program(np.concatenate([a + b, b])), 2)
-    found = carry_out(listing, [rows[:, 0], rows[:, 1]])
-    expected = program(np.column_stack([rows.sum(axis=1), rows[:, 1]])).T
+    program = traced(lambda a, b: function(np.concatenate([a + b, b])), 2)
+    found = carry_out(program, [rows[:, 0], rows[:, 1]])
+    expected = function(np.column_stack([rows.sum(axis=1), rows[:, 1]])).T
     np.testing.assert_array_equal(np.stack(np.broadcast_arrays(*found)), expected)

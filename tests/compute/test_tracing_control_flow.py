@@ -1,4 +1,4 @@
-"""Loops, branches and tables in recorded programs, against the same text on NumPy's arrays."""
+"""Loops, branches and tables in traced programs, against the same text on NumPy's arrays."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from samples.listings import carry_out, recorded
-from samples.recorded_functions import (
+from samples.programs import carry_out, traced
+from samples.traced_functions import (
     CONTROL_FLOW,
     square_root,
 )
@@ -23,7 +23,7 @@ X = np.concatenate([RNG.uniform(0.01, 50, 40), [1.0, 0.25, np.inf, np.nan]])
 def test_a_program_does_for_each_sample_what_numpy_does_for_all(function: Any) -> None:
     with np.errstate(all="ignore"):
         expected = function(X)
-    found = carry_out(recorded(function, 1), [X])
+    found = carry_out(traced(function, 1), [X])
     np.testing.assert_array_equal(np.array(found).reshape(-1, len(X)), np.array(expected).reshape(-1, len(X)))
 
 
@@ -33,13 +33,13 @@ def test_a_position_lies_in_the_cell_that_begins_before_it() -> None:
 
 
 def test_the_loop_is_the_square_root() -> None:
-    (root, steps) = carry_out(recorded(square_root, 1), [X[:42]])
+    (root, steps) = carry_out(traced(square_root, 1), [X[:42]])
     np.testing.assert_allclose(root, np.sqrt(X[:42]), rtol=1e-15)  # the last step's change is below this
     assert 1 <= steps.min() < steps.max() <= 12
 
 
 def test_a_loop_is_recorded_once() -> None:
-    nested_operations = [symbol.operation for symbol in recorded(square_root, 1).operations]
+    nested_operations = [symbol.operation for symbol in traced(square_root, 1).operations]
     assert nested_operations.count("loop") == 1
     assert "divide" not in nested_operations
 
@@ -50,7 +50,7 @@ def test_what_is_known_while_recording_leaves_no_branch() -> None:
     (result,) = where_needed(
         np.ones_like(row, dtype=bool) & (row != row) & False, lambda y: (y,), (row,), (-row,)
     )
-    assert [symbol.operation for symbol in tape.listing(result.cells).operations] == ["negative"]
+    assert [symbol.operation for symbol in tape.program(result.cells).operations] == ["negative"]
 
 
 def test_a_body_does_not_reach_outside() -> None:

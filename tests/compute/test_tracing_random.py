@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from samples.listings import carry_out, recorded
+from samples.programs import carry_out, traced
 
 from vsacli.base.arrays import FloatArray
 
@@ -60,7 +60,7 @@ def larger(parts: st.SearchStrategy[Expression]) -> st.SearchStrategy[Expression
 def check(expression: Expression) -> None:
     x, y = rows()
     with np.errstate(all="ignore"):
-        (found,) = carry_out(recorded(expression, 2), [x, y])
+        (found,) = carry_out(traced(expression, 2), [x, y])
         expected = expression(x, y)
     np.testing.assert_array_equal(found, expected)
 
@@ -84,10 +84,10 @@ def polynomials(parts: st.SearchStrategy[Expression]) -> st.SearchStrategy[Expre
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(st.recursive(leaves([0.0, 1.0, -1.0, 2.0, np.inf, np.nan]), polynomials, max_leaves=12))
 def test_adding_zero_is_left_out_and_multiplying_by_it_is_not(expression: Expression) -> None:
-    """x + 0 is recorded as x: they differ where x is -0, in the sign of the zero alone."""
+    """x + 0 is traced as x: they differ where x is -0, in the sign of the zero alone."""
     check(expression)
 
 
 def test_zero_times_a_value_is_not_zero() -> None:
-    (found,) = carry_out(recorded(lambda x: 0 * x, 1), [np.array([np.inf, np.nan, -1.0])])
+    (found,) = carry_out(traced(lambda x: 0 * x, 1), [np.array([np.inf, np.nan, -1.0])])
     np.testing.assert_array_equal(found, [np.nan, np.nan, 0])

@@ -1,1 +1,1 @@
-"""One text of a computation, carried out by NumPy, as a recorded program, or in C."""
+"""One text of a computation, carried out by NumPy, as a traced program, or in C."""

@@ -1,8 +1,9 @@
 """Loops and branches over samples, each of which runs as if it were alone.
 
 Everything else in the solvers is elementwise: NumPy functions, comparisons, `np.where`, and lookups in
-constant arrays with `np.searchsorted` and `look_up`. So one text computes blocks of samples, or is recorded
-as a program for a single one, for which the functions here have another text.
+constant arrays with `np.searchsorted` and `look_up`. So one text computes blocks of samples, or is traced to
+a program for a single one. The functions here have two texts: that of `..._on` is chosen by the class of
+its first argument, and `vsacli.compute.tracing` registers the second text, for arrays of symbols.
 """
 
 from __future__ import annotations
@@ -29,19 +30,19 @@ def repeat(step: Step, state: Values, constants: Values, limit: int) -> Values:
         constants: what else the step needs of each sample; arrays of that shape.
         limit: largest number of steps.
     """
-    result: Values = repeating(state[0], step, state, constants, limit)
+    result: Values = repeat_on(state[0], step, state, constants, limit)
     return result
 
 
 def where_needed(mask: BoolArray, function: Function, arguments: Values, otherwise: Values) -> Values:
     """`function(*arguments)` where the mask holds, computed for those samples only; `otherwise` elsewhere."""
-    result: Values = branching(mask, function, arguments, otherwise)
+    result: Values = where_needed_on(mask, function, arguments, otherwise)
     return result
 
 
 def look_up(tables: Sequence[FloatArray], index: IndexArray) -> Values:
     """What each of several tables of constants, (count,), has at indices of any shape."""
-    result: Values = looking_up(index, tables)
+    result: Values = look_up_on(index, tables)
     return result
 
 
@@ -50,12 +51,12 @@ def cell_of(position: FloatArray, count: int) -> IndexArray:
 
     NaN lies in any.
     """
-    result: IndexArray = finding_cell(position, count)
+    result: IndexArray = cell_on(position, count)
     return result
 
 
 @singledispatch
-def repeating(_: Any, step: Step, state: Values, constants: Values, limit: int) -> Values:
+def repeat_on(_: Any, step: Step, state: Values, constants: Values, limit: int) -> Values:
     """`repeat` on NumPy arrays."""
     found = _repeated(step, _flat(state), _flat(constants), limit)
     return _shaped(found, state[0].shape)
@@ -84,7 +85,7 @@ def _kept(over: BoolArray, result: Values, latest: Values) -> Values:
 
 
 @singledispatch
-def branching(mask: Any, function: Function, arguments: Values, otherwise: Values) -> Values:
+def where_needed_on(mask: Any, function: Function, arguments: Values, otherwise: Values) -> Values:
     """`where_needed` on NumPy arrays."""
     samples = np.flatnonzero(mask)
     if not samples.size:
@@ -96,13 +97,13 @@ def branching(mask: Any, function: Function, arguments: Values, otherwise: Value
 
 
 @singledispatch
-def looking_up(index: Any, tables: Sequence[FloatArray]) -> Values:
+def look_up_on(index: Any, tables: Sequence[FloatArray]) -> Values:
     """`look_up` on NumPy arrays."""
     return tuple(table[index] for table in tables)
 
 
 @singledispatch
-def finding_cell(position: Any, count: int) -> IndexArray:
+def cell_on(position: Any, count: int) -> IndexArray:
     """`cell_of` on NumPy arrays."""
     cell: IndexArray = np.fmin(np.fmax(position, 0), count - 1).astype(np.intp)
     return cell

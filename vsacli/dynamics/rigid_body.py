@@ -5,9 +5,10 @@ Each is a program recorded from the recursion (36)-(60), so that a single sample
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,8 @@ from vsacli.actuators.rigid import Rigid
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
-from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray
-from vsacli.compute.tracing.linear_solve import solve_positive_definite
+from vsacli.compute.tracing import Symbol, Tape, TracedArray
+from vsacli.compute.tracing.python_code import StateFunction
 from vsacli.compute.vector import ZERO, Scalar, Vector
 from vsacli.dynamics.link_torques import joint_state, link_constants, tip_load
 from vsacli.dynamics.recursion import TipLoad, TorqueDerivatives, recursion
@@ -83,10 +84,10 @@ class Chain:
 
         Raises:
             InputError: the matrix is not positive definite; names the first joint whose leading minor fails.
-                A recorded program gives NaN instead.
+                A traced program gives NaN instead.
         """
         if isinstance(matrix, TracedArray):
-            return solve_positive_definite(matrix, torque, SMALLEST_PIVOT)
+            return _solve_positive_definite(matrix, torque, SMALLEST_PIVOT)
         self._check_positive_definite(matrix)
         return np.asarray(np.linalg.solve(matrix, torque[..., None])[..., 0], dtype=np.float64)
 
@@ -113,6 +114,42 @@ class Chain:
 def _derivatives(wrench: Wrench | None, order: int) -> list[FloatArray]:
     """The wrench and its derivatives up to an order."""
     return [] if wrench is None else [getattr(wrench, name) for name in WRENCH_NAMES[: order + 1]]
+
+
+def _solve_positive_definite(matrix: Any, right: Any, smallest_pivot: float) -> Any:
+    """matrix^-1 right, by L D L^T without pivoting; NaN where the matrix is not positive definite.
+
+    Args:
+        matrix: (n, n), symmetric.
+        right: (n,).
+        smallest_pivot: relative to the diagonal entry, below which a pivot of D counts as not positive.
+    """
+    size = len(right)
+    lower: dict[tuple[int, int], Any] = {}
+    pivots: list[Any] = []
+    for column in range(size):
+        scaled = {inner: lower[column, inner] * pivots[inner] for inner in range(column)}
+        pivot = _subtracted(
+            matrix[column, column], [lower[column, inner] * scaled[inner] for inner in range(column)]
+        )
+        regular = pivot > smallest_pivot * matrix[column, column]
+        pivots.append(np.where(regular, pivot, math.nan))
+        for row in range(column + 1, size):
+            products = [lower[row, inner] * scaled[inner] for inner in range(column)]
+            lower[row, column] = _subtracted(matrix[row, column], products) / pivots[column]
+
+    forward: list[Any] = []
+    for row in range(size):
+        forward.append(_subtracted(right[row], [lower[row, inner] * forward[inner] for inner in range(row)]))
+    solution: dict[int, Any] = {}
+    for row in reversed(range(size)):
+        known = [lower[below, row] * solution[below] for below in range(row + 1, size)]
+        solution[row] = _subtracted(forward[row] / pivots[row], known)
+    return np.stack([solution[row] for row in range(size)])
+
+
+def _subtracted(value: Any, terms: list[Any]) -> Any:
+    return reduce(lambda rest, term: rest - term, terms, value)
 
 
 def _last_pivot(matrices: FloatArray) -> float:
@@ -144,7 +181,7 @@ def _recorded(robot: Robot, frame: str | None) -> Chain:
     return Chain(robot, frame)
 
 
-def _inertia_program(robot: Robot) -> Program:
+def _inertia_program(robot: Robot) -> StateFunction:
     """Lower triangle of M, row by row."""
     tape = Tape()
     q = tape.inputs(len(robot.joints))
@@ -154,10 +191,10 @@ def _inertia_program(robot: Robot) -> Program:
         for moving in numbers
     ]
     lower = [columns[column][row].tau for row in numbers for column in range(row + 1)]
-    return Program(tape.listing(lower))
+    return StateFunction(tape.program(lower))
 
 
-def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -> Program:
+def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -> StateFunction:
     """An output of the recursion; derivatives of q beyond `orders` are zero."""
     tape = Tape()
     joints = len(robot.joints)
@@ -165,7 +202,7 @@ def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -
     rates = [tape.inputs(joints) if order < orders else [0] * joints for order in range(4)]
     tip = None if frame is None else _load(tape, robot, frame, ("tau", "dtau", "ddtau").index(output))
     torques = _torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), tip)
-    return Program(tape.listing([getattr(torque, output) for torque in torques]))
+    return StateFunction(tape.program([getattr(torque, output) for torque in torques]))
 
 
 def _load(tape: Tape, robot: Robot, frame: str, order: int) -> TipLoad:

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.compute.engine.engines import CompiledEngine, Engine, NumPyEngine
-from vsacli.compute.engine.kernel import Kernel
+from vsacli.compute.engine.engines import Engine, Kernel, NumPyEngine, TracedEngine
 
 NAMES = ("numpy", "c", "auto")
 """Engines that may be asked for."""
@@ -22,17 +21,17 @@ COMPILER_SECONDS = (0.25, 2.5e-8)
 LOOK_FROM = 20_000
 """Samples with which it is busy for longer than it takes to see whether there is compiled code."""
 
-RECORD_FROM = 100_000
-"""Samples from which on NumPy saves more time with a recorded program than recording it takes."""
+TRACE_FROM = 100_000
+"""Samples from which on NumPy saves more time with a traced program than tracing it takes."""
 
 NUMPY: Engine = NumPyEngine()
 
 
 class Choice(NamedTuple):
-    """An engine.
+    """An engine, and why it is this one.
 
     Attributes:
-        engine: it.
+        engine: the engine chosen.
         reason: what computes, and why; a clause.
         warnings: what went wrong before it was found, one sentence each.
     """
@@ -61,6 +60,7 @@ def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) 
         return Choice(_numpy(samples), "NumPy computes, as asked for")
     if name == "auto" and samples < LOOK_FROM:
         return Choice(NUMPY, f"NumPy computes: {samples} samples are few")
+    from vsacli.compute.engine.compiled_engine import CompiledEngine
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
     threads = threads or _processors()
@@ -91,11 +91,7 @@ def _repays(operations: int, samples: int) -> bool:
 
 
 def _numpy(samples: int) -> Engine:
-    if samples < RECORD_FROM:
-        return NUMPY
-    from vsacli.compute.engine.row_engine import RecordedEngine
-
-    return RecordedEngine()
+    return NUMPY if samples < TRACE_FROM else TracedEngine()
 
 
 def _counted(threads: int) -> str:

@@ -1,19 +1,18 @@
-"""The engines: what carries out a kernel on rows of samples."""
+"""What is computed on rows of samples, and the engines of NumPy that carry it out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from functools import cache
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Hashable, Iterator, Sequence
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.engine.kernel import Kernel
 
 if TYPE_CHECKING:
-    from vsacli.compute.engine.compiler import Compiler
-    from vsacli.compute.engine.loading import Build, Loaded, Tell
+    from vsacli.compute.tracing import Program
+    from vsacli.compute.tracing.python_code import RowFunction, Workspace
 
 SAMPLES_PER_PASS = 12288
 """Samples that NumPy takes at a time: fewer waste time in the interpreter, more leave the caches."""
@@ -23,6 +22,27 @@ INPUTS_PER_PASS = 5 * 2**19
 
 KEPT_MEMORY = 31 * 2**20
 """Bytes: glibc then keeps twice that, more than a pass takes in arrays; from 32 MiB on it learns nothing."""
+
+KEPT_PROGRAMS = 8
+"""Programs of kernels that are kept for the next call."""
+
+
+class Kernel(Hashable, Protocol):
+    """A function of rows of samples, computed by NumPy or traced; equal ones compute the same."""
+
+    @property
+    def inputs(self) -> int:
+        """How many rows it takes."""
+
+    @property
+    def outputs(self) -> int:
+        """How many rows it gives."""
+
+    def __call__(self, rows: Sequence[Any]) -> Sequence[Any]:
+        """Rows of results, (samples,), or constants in their place.
+
+        Every sample is computed by itself, without a branch on its values.
+        """
 
 
 def samples_per_pass(inputs: int) -> int:
@@ -68,37 +88,42 @@ def keep_freed_memory() -> None:
     np.empty(KEPT_MEMORY, dtype=np.uint8)
 
 
-class CompiledEngine:
-    """Machine code, compiled for each kernel when it is first needed.
+class TracedEngine:
+    """NumPy on the program of each kernel, traced when it is first needed; a kernel with loops runs as it is.
 
-    Args:
-        compiler: what compiles.
-        threads: how many run at once.
-        tell: learns what is wrong with the cache of compiled code.
+    Tracing is repaid from many samples on. The numbers are those of `NumPyEngine`, to the last bit but for
+    powers: exponents of 3, 4 and 1.5 are traced as products. Not for several threads at a time.
     """
 
-    def __init__(self, compiler: Compiler, threads: int, tell: Tell) -> None:
-        self._compiler = compiler
-        self._threads = threads
-        self._tell = tell
-        self._loaded: dict[Kernel, Loaded] = {}
-
-    def prepare(self, kernel: Kernel, build: Build = lambda _operations: True) -> Loaded | None:
-        """Load a kernel's code, compiled if need be and if `build` wants it; None if there is no such code.
-
-        Raises:
-            CompilerError: it cannot be compiled.
-        """
-        if kernel not in self._loaded:
-            from vsacli.compute.engine.loading import load
-
-            loaded = load(kernel, self._compiler, self._tell, build)
-            if loaded is None:
-                return None
-            self._loaded[kernel] = loaded
-        return self._loaded[kernel]
+    def __init__(self) -> None:
+        self._workspaces: dict[RowFunction, Workspace] = {}
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
         """As of `Engine`."""
-        self.prepare(kernel)
-        return self._loaded[kernel].library(rows, self._threads)
+        function = _row_function(kernel)
+        if function is None:
+            return NumPyEngine().run(kernel, rows)
+        if function not in self._workspaces:
+            self._workspaces[function] = function.workspace(samples_per_pass(len(rows)))
+        outputs = np.empty((kernel.outputs, len(rows[0])))
+        for part in passes(rows):
+            function([row[part] for row in rows], outputs[:, part], self._workspaces[function])
+        return outputs
+
+
+@lru_cache(maxsize=KEPT_PROGRAMS)
+def _row_function(kernel: Kernel) -> RowFunction | None:
+    """The program of a kernel on rows; None if it has loops or tables."""
+    from vsacli.compute.tracing.python_code import RowFunction
+
+    try:
+        return RowFunction(kernel_program(kernel))
+    except NotImplementedError:
+        return None
+
+
+def kernel_program(kernel: Kernel) -> Program:
+    """What a kernel does to one sample."""
+    from vsacli.compute.tracing import Kind, trace
+
+    return trace(kernel, [Kind.REAL] * kernel.inputs)

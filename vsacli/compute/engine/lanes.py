@@ -1,13 +1,12 @@
-"""C for a recorded program that computes several samples at once, one a lane of a vector register."""
+"""C for a program that computes several samples at once, one a lane of a vector register."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
-from vsacli.compute.tracing import Kind, Listing, Symbol
-from vsacli.compute.tracing.c_dialect import Dialect, digits
-from vsacli.compute.tracing.c_text import Writer, table_declarations, table_names
+from vsacli.compute.tracing import Kind, Program, Symbol
+from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations, table_names
 
 _OPERATORS = {"and": " & ", "or": " | "}
 _CHOOSE = {
@@ -18,7 +17,7 @@ _CHOOSE = {
 }
 
 
-class Lanes(Dialect):
+class VectorDialect(Dialect):
     """Vector types of GCC and Clang, as in lanes.c: comparisons give masks, all bits set or none."""
 
     def __init__(self) -> None:
@@ -65,29 +64,29 @@ class Lanes(Dialect):
         return self.where(kind, truth, new, old)
 
 
-def batch_source(listing: Listing) -> str:
+def batch_source(program: Program) -> str:
     """A translation unit with the function `run` over rows of samples."""
-    counts = [f"#define INPUTS {len(listing.inputs)}", f"#define OUTPUTS {len(listing.outputs)}"]
+    counts = [f"#define INPUTS {len(program.inputs)}", f"#define OUTPUTS {len(program.outputs)}"]
     support = files("vsacli.compute.engine").joinpath("lanes.c").read_text(encoding="utf-8")
-    return "\n".join([*counts, "", support, *_group(listing), ""])
+    return "\n".join([*counts, "", support, *_group(program), ""])
 
 
-def _group(listing: Listing) -> Iterator[str]:
+def _group(program: Program) -> Iterator[str]:
     """The function that computes one sample a lane."""
-    tables = table_names([listing])
-    yield from table_declarations(tables, LANES)
-    writer = Writer(LANES, tables)
-    names = {symbol.index: f"x{number}" for number, symbol in enumerate(listing.inputs)}
+    tables = table_names([program])
+    yield from table_declarations(tables, VECTORS)
+    writer = Writer(VECTORS, tables)
+    names = {symbol.index: f"x{number}" for number, symbol in enumerate(program.inputs)}
     yield "static void group(const double *const *in, double *const *out, int64_t at)"
     yield "{"
-    for number, symbol in enumerate(listing.inputs):
+    for number, symbol in enumerate(program.inputs):
         yield f"const reals {names[symbol.index]} = load(in[{number}] + at);"
-    yield from writer.statements(listing, names)
-    for number, output in enumerate(listing.outputs):
+    yield from writer.statements(program, names)
+    for number, output in enumerate(program.outputs):
         kind = output.kind if isinstance(output, Symbol) else Kind.REAL
         value = writer.value(output, kind, names)
         yield f"store(out[{number}] + at, {value if kind is Kind.REAL else f'counted({value})'});"
     yield "}"
 
 
-LANES = Lanes()
+VECTORS = VectorDialect()

@@ -1,10 +1,8 @@
-"""Programs recorded from computations: run on symbols, the text that NumPy runs leaves its operations."""
+"""Tracing: run on symbols, the text that NumPy runs leaves a program, which becomes Python or C."""
 
-from vsacli.compute.tracing import control_flow as nested  # noqa: F401  (so that `vsacli.loops` knows arrays of symbols)
-from vsacli.compute.tracing.array import TracedArray, cells_of
-from vsacli.compute.tracing.dead_code import Listing
-from vsacli.compute.tracing.program import Program
-from vsacli.compute.tracing.symbol import Kind, Operand, Symbol
+from vsacli.compute.tracing import traced_control_flow  # noqa: F401  (registers loops and branches of symbols)
+from vsacli.compute.tracing.array import TracedArray, cells_of, trace
+from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol
 from vsacli.compute.tracing.tape import Tape
 
-__all__ = ["Kind", "Listing", "Operand", "Program", "Symbol", "Tape", "TracedArray", "cells_of"]
+__all__ = ["Kind", "Operand", "Program", "Symbol", "Tape", "TracedArray", "cells_of", "trace"]

@@ -1,20 +1,17 @@
-"""Arrays of symbols and constants that NumPy's functions accept, so that one text computes and records."""
+"""Arrays of symbols and constants that NumPy's functions accept, so that one text computes and is traced."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from vsacli.compute.tracing.functions import FUNCTIONS, STRUCTURAL
-from vsacli.compute.tracing.symbol import Kind, Operand, Symbol
+from vsacli.compute.tracing.numpy_functions import ARRANGING, FUNCTIONS, Cells, apply_ufunc
+from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol
 from vsacli.compute.tracing.tape import Tape
-from vsacli.compute.tracing.ufuncs import apply
-
-Cells = npt.NDArray[np.object_]
 
 
 class TracedArray(NDArrayOperatorsMixin):
@@ -23,7 +20,7 @@ class TracedArray(NDArrayOperatorsMixin):
     A row of samples is an array (1,): what NumPy broadcasts along samples is broadcast along the one.
 
     Attributes:
-        tape: where operations are recorded.
+        tape: where operations go.
         cells: the entries.
     """
 
@@ -33,7 +30,7 @@ class TracedArray(NDArrayOperatorsMixin):
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> TracedArray:
         out = options.pop("out", (None,))[0]
-        cells = apply(self.tape, ufunc, method, [cells_of(array) for array in inputs], options)
+        cells = apply_ufunc(self.tape, ufunc, method, [cells_of(array) for array in inputs], options)
         if out is None:
             return TracedArray(self.tape, cells)
         if not isinstance(out, TracedArray):
@@ -46,7 +43,7 @@ class TracedArray(NDArrayOperatorsMixin):
     ) -> Any:
         if function in FUNCTIONS:
             return TracedArray(self.tape, FUNCTIONS[function](self.tape, *_unpacked(arguments), **options))
-        if function not in STRUCTURAL:
+        if function not in ARRANGING:
             raise NotImplementedError(f"numpy.{function.__name__} cannot be recorded")
         result = function(
             *_unpacked(arguments), **{name: _unpacked(value) for name, value in options.items()}
@@ -98,7 +95,7 @@ class TracedArray(NDArrayOperatorsMixin):
     def _cast(self, cell: Operand, wanted: str) -> Operand:
         if isinstance(cell, Symbol):
             if cell.kind is Kind.TRUTH and wanted == "u":
-                return self.tape.record("bits", cell, 1)
+                return self.tape.emit("bits", cell, 1)
             if (cell.kind, wanted) in {(Kind.REAL, "f"), (Kind.TRUTH, "b"), (Kind.BITS, "u")}:
                 return cell
             raise NotImplementedError(f"no conversion of {cell.kind} to the NumPy kind {wanted!r}")
@@ -147,3 +144,15 @@ def _known(index: Any) -> Any:
     if any(isinstance(cell, Symbol) for cell in index.cells.flat):
         raise NotImplementedError("what is known only when the program runs cannot decide what is recorded")
     return index.cells.astype(bool)
+
+
+def trace(function: Callable[[Sequence[Any]], Sequence[Any]], kinds: Sequence[Kind]) -> Program:
+    """The program of a function of rows of samples: what it does to one sample.
+
+    Args:
+        function: from rows of samples to rows of results; each sample is computed by itself.
+        kinds: of the rows that it takes.
+    """
+    tape = Tape()
+    rows = [TracedArray(tape, [tape.input(kind)]) for kind in kinds]
+    return tape.program([cells_of(result).item() for result in function(rows)])

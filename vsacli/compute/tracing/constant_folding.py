@@ -1,21 +1,20 @@
-"""Operations that need not be recorded because a constant among their operands decides the result."""
+"""Constant folding: operations that a constant among their operands decides are not carried out."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 
-from vsacli.compute.tracing.operations import COMPARISONS, LETTING_NAN_PASS
-from vsacli.compute.tracing.symbol import Operand, Symbol
+from vsacli.compute.tracing.program import COMPARISONS, NAN_PROPAGATING, Operand, Symbol
 
 
-def simplified(operation: str, operands: Sequence[Operand]) -> Operand | None:
+def folded(operation: str, operands: Sequence[Operand]) -> Operand | None:
     """The result if it is a constant or one of the operands; None if the operation has to be carried out.
 
     What NumPy would compute is kept, NaN and infinity included: 0 x is not 0. But x + 0 is x, also where x
     is -0.
     """
-    if operation in LETTING_NAN_PASS and any(map(_is_nan, operands)):
+    if operation in NAN_PROPAGATING and any(map(_is_nan, operands)):
         return math.nan
     if operation in COMPARISONS and any(map(_is_nan, operands)):
         return operation == "not_equal"

@@ -1,56 +1,18 @@
-"""Programs without the operations that their outputs do not need, loops and branches included."""
+"""Dead code elimination: programs without the operations that their outputs do not need, in bodies also."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
-from vsacli.compute.tracing.symbol import Operand, Symbol
-
-
-class Listing(NamedTuple):
-    """A program: the operations that its outputs need, each after its operands.
-
-    Attributes:
-        inputs: what the program receives.
-        operations: what it does, in this order.
-        outputs: what it returns.
-    """
-
-    inputs: tuple[Symbol, ...]
-    operations: tuple[Symbol, ...]
-    outputs: tuple[Operand, ...]
+from vsacli.compute.tracing.program import Branch, Loop, Operand, Program, Symbol
 
 
-class Loop(NamedTuple):
-    """A program that is repeated.
-
-    Attributes:
-        body: receives the state and constants; returns the next state and whether that is the last one.
-        limit: largest number of times.
-        numbers: of the entries of the state.
-    """
-
-    body: Listing
-    limit: int
-    numbers: tuple[int, ...]
-
-
-class Branch(NamedTuple):
-    """A program that runs only where a truth value holds.
-
-    Attributes:
-        body: the program.
-        numbers: of its outputs.
-    """
-
-    body: Listing
-    numbers: tuple[int, ...]
-
-
-def pruned(inputs: Sequence[Symbol], operations: Sequence[Symbol], outputs: Sequence[Operand]) -> Listing:
-    """What computes these outputs, by some of the operations."""
+def without_dead_code(
+    inputs: Sequence[Symbol], operations: Sequence[Symbol], outputs: Sequence[Operand]
+) -> Program:
+    """The program that computes these outputs by those of the operations that they need."""
     needed = {output.index for output in outputs if isinstance(output, Symbol)}
     items: dict[int, set[int]] = defaultdict(set)
     kept = []
@@ -66,7 +28,7 @@ def pruned(inputs: Sequence[Symbol], operations: Sequence[Symbol], outputs: Sequ
             symbol = _branch(symbol, items[symbol.index])
         needed.update(operand.index for operand in symbol.operands if isinstance(operand, Symbol))
         kept.append(symbol)
-    return Listing(tuple(inputs), tuple(reversed(kept)), tuple(outputs))
+    return Program(tuple(inputs), tuple(reversed(kept)), tuple(outputs))
 
 
 def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
@@ -76,7 +38,9 @@ def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
     live: set[int] = set()
     while places - live:
         live |= places
-        shorter = pruned(body.inputs, body.operations, [*_chosen(body.outputs, live), body.outputs[-1]])
+        shorter = without_dead_code(
+            body.inputs, body.operations, [*_chosen(body.outputs, live), body.outputs[-1]]
+        )
         places = {place for place in range(len(numbers)) if body.inputs[place].index in _used(shorter)}
     used = _used(shorter)
     inputs, given = [], []
@@ -92,7 +56,7 @@ def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
     """A branch with the wanted outputs."""
     (body, numbers), truth, *operands = symbol.operands
     places = _places(numbers, wanted)
-    shorter = pruned(body.inputs, body.operations, _chosen(body.outputs, places))
+    shorter = without_dead_code(body.inputs, body.operations, _chosen(body.outputs, places))
     used = _used(shorter)
     arguments = [
         (inner, operand)
@@ -107,7 +71,7 @@ def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
 
 
 def _places(numbers: Sequence[int], wanted: Iterable[int]) -> set[int]:
-    """Where results are among those that an earlier pruning has left, by their numbers."""
+    """Where results are among those that an earlier elimination has left, by their numbers."""
     return {numbers.index(number) for number in wanted}
 
 
@@ -115,10 +79,10 @@ def _chosen(entries: Sequence[Any], places: Iterable[int]) -> list[Any]:
     return [entries[place] for place in sorted(places)]
 
 
-def _used(listing: Listing) -> set[int]:
+def _used(program: Program) -> set[int]:
     """Values that a program reads or returns."""
-    operands = (operand for symbol in listing.operations for operand in symbol.operands)
-    return {operand.index for operand in (*operands, *listing.outputs) if isinstance(operand, Symbol)}
+    operands = (operand for symbol in program.operations for operand in symbol.operands)
+    return {operand.index for operand in (*operands, *program.outputs) if isinstance(operand, Symbol)}
 
 
 def _like(symbol: Symbol, operands: Sequence[Any]) -> Symbol:

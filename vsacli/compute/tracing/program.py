@@ -1,70 +1,205 @@
-"""Recorded programs of + - * / cos sin in Python: what single states of a simulation are computed with."""
+"""The intermediate representation: programs of operations on values that are known only when they run.
+
+Each value is assigned once, and an operation stands after its operands. Loops and branches are operations,
+too: they hold the program of their body, and operations called "item" take their results apart.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from types import CodeType, FunctionType
-from typing import Any
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
-import numpy as np
+from vsacli.compute.vector import Scalar
 
-from vsacli.base.arrays import FloatArray, by_joint, over_time
-from vsacli.compute.tracing.array import TracedArray, cells_of
-from vsacli.compute.tracing.dead_code import Listing
-from vsacli.compute.tracing.symbol import Operand, Symbol
 
-_FORMS = {
-    "add": "{} + {}",
-    "subtract": "{} - {}",
-    "multiply": "{} * {}",
-    "divide": "{} / {}",
-    "negative": "-{}",
-    "cos": "cos({})",
-    "sin": "sin({})",
+class Kind(enum.Enum):
+    """What a value is: a floating-point number, a truth value, a field of bits, or an index of a table."""
+
+    REAL = enum.auto()
+    TRUTH = enum.auto()
+    BITS = enum.auto()
+    INDEX = enum.auto()
+
+
+@dataclass(frozen=True)
+class Table:
+    """Constants among which an operation chooses."""
+
+    values: tuple[float, ...]
+
+
+class Emitter(Protocol):
+    """What the operators of symbols add operations to: a tape."""
+
+    def emit(self, operation: str, *operands: Any) -> Operand:
+        """The result of an operation on symbols and constants."""
+
+
+class Symbol:
+    """An input of a program, or the result of an operation, as a scalar with + - * / cos sin.
+
+    Attributes:
+        tape: where the operation is.
+        index: number of the value on the tape.
+        operation: as `Tape.emit` has it; "input" for an input.
+        operands: of the operation; first comes what is fixed, a table or the body of a loop, if anything is.
+        kind: of the value.
+    """
+
+    __slots__ = ("index", "kind", "operands", "operation", "tape")
+
+    def __init__(
+        self, tape: Emitter, index: int, operation: str, operands: tuple[Any, ...], kind: Kind
+    ) -> None:
+        self.tape = tape
+        self.index = index
+        self.operation = operation
+        self.operands = operands
+        self.kind = kind
+
+    def __add__(self, other: Scalar) -> Operand:
+        return self.tape.emit("add", self, other)
+
+    def __sub__(self, other: Scalar) -> Operand:
+        return self.tape.emit("subtract", self, other)
+
+    def __mul__(self, other: Scalar) -> Operand:
+        return self.tape.emit("multiply", self, other)
+
+    def __truediv__(self, other: Scalar) -> Operand:
+        return self.tape.emit("divide", self, other)
+
+    def __rsub__(self, other: Scalar) -> Operand:
+        return self.tape.emit("subtract", other, self)
+
+    def __rtruediv__(self, other: Scalar) -> Operand:
+        return self.tape.emit("divide", other, self)
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Operand:
+        return self.tape.emit("negative", self)
+
+    def cos(self) -> Operand:
+        """Cosine; what `numpy.cos` calls."""
+        return self.tape.emit("cos", self)
+
+    def sin(self) -> Operand:
+        """Sine; what `numpy.sin` calls."""
+        return self.tape.emit("sin", self)
+
+
+Operand: TypeAlias = Symbol | float | int | bool
+"""What an operation acts on: a symbol or a constant."""
+
+
+class Program(NamedTuple):
+    """A program: what its outputs need, without a jump.
+
+    Attributes:
+        inputs: what the program receives.
+        operations: what it does, in this order.
+        outputs: what it returns.
+    """
+
+    inputs: tuple[Symbol, ...]
+    operations: tuple[Symbol, ...]
+    outputs: tuple[Operand, ...]
+
+
+class Loop(NamedTuple):
+    """A program that is repeated.
+
+    Attributes:
+        body: receives the state and constants; returns the next state and whether that is the last one.
+        limit: largest number of times.
+        numbers: of the entries of the state among those that were traced.
+    """
+
+    body: Program
+    limit: int
+    numbers: tuple[int, ...]
+
+
+class Branch(NamedTuple):
+    """A program that runs only where a truth value holds.
+
+    Attributes:
+        body: the program.
+        numbers: of its outputs among those that were traced.
+    """
+
+    body: Program
+    numbers: tuple[int, ...]
+
+
+COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")
+LOGICAL = {"logical_and": "and", "logical_or": "or", "logical_not": "not"}
+BITWISE = {"bitwise_and": "and", "bitwise_or": "or", "invert": "not"}
+COMMUTATIVE = frozenset({"add", "multiply", "logical_and", "logical_or", "bitwise_and", "bitwise_or"})
+
+FUNCTIONS = frozenset(
+    {
+        *("absolute", "sqrt", "cbrt", "exp", "expm1", "log", "log1p", "power", "hypot", "copysign"),
+        *("sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "sinh", "cosh", "tanh", "arcsinh"),
+    }
+)
+"""Real functions of real values."""
+
+CHOOSING = frozenset({"maximum", "minimum"})
+ARITHMETIC = frozenset({"add", "subtract", "multiply", "divide", "negative"})
+NAN_PROPAGATING = (FUNCTIONS | ARITHMETIC | CHOOSING) - {"power", "hypot", "copysign"}
+"""Operations that give NaN wherever an operand is; the others do not: 1 to the power of NaN is 1."""
+
+_KINDS = {
+    **dict.fromkeys(FUNCTIONS, Kind.REAL),
+    **dict.fromkeys((*COMPARISONS, *LOGICAL, "isnan"), Kind.TRUTH),
+    **dict.fromkeys(("bits", "bitwise_and", "bitwise_or"), Kind.BITS),
+    "searchsorted": Kind.INDEX,
+    "take": Kind.REAL,
 }
 
 
-class Program:
-    """A recorded computation on single numbers or on rows of samples, some hundred times faster than Python.
+def kind_of(operand: Any) -> Kind:
+    """The kind of a value; a plain integer is a real number wherever it may be one."""
+    if isinstance(operand, Symbol):
+        return operand.kind
+    return Kind.TRUTH if isinstance(operand, bool) else Kind.REAL
 
-    It is compiled to one function without a loop or a branch.
+
+def result_kind(operation: str, operands: Sequence[Any]) -> Kind:
+    """The kind of an operation's result.
+
+    Raises:
+        NotImplementedError: it is none of those that can be recorded.
     """
-
-    def __init__(self, listing: Listing) -> None:
-        self.source = _source(listing)
-        module = compile(self.source, "<recorded program>", "exec")
-        code = next(constant for constant in module.co_consts if isinstance(constant, CodeType))
-        self._on_numbers: Callable[..., list[Any]] = FunctionType(code, {"cos": math.cos, "sin": math.sin})
-        self._on_rows: Callable[..., list[Any]] = FunctionType(code, {"cos": np.cos, "sin": np.sin})
-
-    def __call__(self, *inputs: FloatArray) -> FloatArray:
-        """Run on arrays (n,) or (samples, n), whose columns are the inputs; the outputs come likewise.
-
-        On traced arrays it becomes part of the program that they record.
-        """
-        if isinstance(first := inputs[0], TracedArray):
-            entries = np.concatenate([cells_of(array) for array in inputs])
-            return TracedArray(first.tape, self._on_rows(*entries))
-        if inputs[0].ndim == 1:
-            return np.array(self._on_numbers(*(number for array in inputs for number in array.tolist())))
-        outputs = self._on_rows(*(row for array in inputs for row in by_joint(array)))
-        rows = np.empty((len(outputs), len(inputs[0])))
-        for row, output in zip(rows, outputs, strict=True):
-            row[:] = output
-        return over_time(rows)
+    if operation in _KINDS:
+        return _KINDS[operation]
+    if operation == "where":
+        return _common_kind(operands[1:])
+    if operation in ARITHMETIC | CHOOSING:
+        return _kind_of_number(operation, operands)
+    raise NotImplementedError(f"the operation {operation} cannot be recorded")
 
 
-def _source(listing: Listing) -> str:
-    arguments = ", ".join(map(_name, listing.inputs))
-    lines = [
-        f" {_name(symbol)} = {_FORMS[symbol.operation].format(*map(_name, symbol.operands))}"
-        for symbol in listing.operations
-    ]
-    results = ", ".join(map(_name, listing.outputs))
-    return "\n".join([f"def program({arguments}):", *lines, f" return [{results}]"])
+def _kind_of_number(operation: str, operands: Sequence[Any]) -> Kind:
+    kind = _common_kind(operands)
+    if kind is Kind.TRUTH:
+        raise NotImplementedError(
+            f"{operation} of a truth value cannot be recorded; numpy.where makes a number of it"
+        )
+    if kind is Kind.INDEX and not all(isinstance(operand, Symbol | int) for operand in operands):
+        raise NotImplementedError(f"{operation} of an index is recorded with whole numbers only")
+    return kind
 
 
-def _name(operand: Operand) -> str:
-    """Constants exactly."""
-    return f"v{operand.index}" if isinstance(operand, Symbol) else repr(operand)
+def _common_kind(operands: Sequence[Any]) -> Kind:
+    """That of the symbols; constants adapt."""
+    kinds = {operand.kind for operand in operands if isinstance(operand, Symbol)}
+    kinds = kinds or set(map(kind_of, operands))
+    if len(kinds) > 1:
+        raise NotImplementedError(f"values of different kinds cannot be joined: {kinds}")
+    return kinds.pop()

@@ -1,18 +1,28 @@
-"""Programs recorded from a computation."""
+"""The tape: operations in the order in which a computation carries them out, folded and shared."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
-from vsacli.compute.tracing.constant_folding import simplified
-from vsacli.compute.tracing.dead_code import Branch, Listing, Loop, pruned
-from vsacli.compute.tracing.operations import COMMUTATIVE, kind_of, kind_of_result
-from vsacli.compute.tracing.symbol import Kind, Operand, Symbol, Table
+from vsacli.compute.tracing.constant_folding import folded
+from vsacli.compute.tracing.dead_code import without_dead_code
+from vsacli.compute.tracing.program import (
+    COMMUTATIVE,
+    Branch,
+    Kind,
+    Loop,
+    Operand,
+    Program,
+    Symbol,
+    Table,
+    kind_of,
+    result_kind,
+)
 
 
 class Tape:
-    """Operations in the order in which they were carried out, each distinct one once."""
+    """Operations in the order in which they were carried out; a common subexpression is there once."""
 
     def __init__(self) -> None:
         self._symbols: dict[Hashable, Symbol] = {}
@@ -28,34 +38,33 @@ class Tape:
         self._inputs.append(symbol)
         return symbol
 
-    def record(self, operation: str, *operands: Operand | Table) -> Operand:
+    def emit(self, operation: str, *operands: Operand | Table) -> Operand:
         """The result of an operation on symbols and constants, named as the function of NumPy.
 
         Beyond these there are `bits(truth, mask)`, the mask where true, else 0; and `take(table, index)`.
         """
         plain = tuple(map(_plain, operands))
-        simple = simplified(operation, plain)
-        if simple is not None:
-            return simple
-        return self._symbols.get(_key(operation, plain)) or self._new(
-            operation, plain, kind_of_result(operation, plain)
-        )
+        known = folded(operation, plain)
+        if known is not None:
+            return known
+        common = self._symbols.get(_key(operation, plain))
+        return common or self._new(operation, plain, result_kind(operation, plain))
 
-    def record_loop(
-        self, body: Listing, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
+    def emit_loop(
+        self, body: Program, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
     ) -> list[Symbol]:
-        """The state after the repetition of a program that was recorded on a tape of its own."""
+        """The state after the repetition of a program that was traced on a tape of its own."""
         loop = Loop(body, limit, tuple(range(len(state))))
-        return self._record_nested("loop", body.outputs[:-1], (loop, *state, *constants))
+        return self._emit_nested("loop", body.outputs[:-1], (loop, *state, *constants))
 
-    def record_branch(
-        self, truth: Operand, body: Listing, arguments: Sequence[Operand], otherwise: Sequence[Operand]
+    def emit_branch(
+        self, truth: Operand, body: Program, arguments: Sequence[Operand], otherwise: Sequence[Operand]
     ) -> list[Symbol]:
         """What a program returns where a truth value holds, and the other values elsewhere."""
         branch = Branch(body, tuple(range(len(otherwise))))
-        return self._record_nested("branch", body.outputs, (branch, truth, *otherwise, *arguments))
+        return self._emit_nested("branch", body.outputs, (branch, truth, *otherwise, *arguments))
 
-    def _record_nested(
+    def _emit_nested(
         self, operation: str, outputs: Sequence[Operand], operands: tuple[Any, ...]
     ) -> list[Symbol]:
         nested = self._new(operation, operands, Kind.REAL)
@@ -69,16 +78,10 @@ class Tape:
         self._symbols[symbol if fresh else _key(operation, operands)] = symbol
         return symbol
 
-    def listing(self, outputs: Sequence[Operand]) -> Listing:
-        """What computes these outputs from the inputs."""
+    def program(self, outputs: Sequence[Operand]) -> Program:
+        """What computes these outputs from the inputs, without dead code."""
         operations = [symbol for symbol in self._symbols.values() if symbol.operation != "input"]
-        return pruned(self._inputs, operations, outputs)
-
-
-def record(function: Callable[[list[Symbol]], Sequence[Operand]], kinds: Sequence[Kind]) -> Listing:
-    """What a function of symbols of these kinds does, on a tape of its own."""
-    tape = Tape()
-    return tape.listing(function([tape.input(kind) for kind in kinds]))
+        return without_dead_code(self._inputs, operations, outputs)
 
 
 def _plain(operand: Any) -> Any:
@@ -87,7 +90,7 @@ def _plain(operand: Any) -> Any:
 
 
 def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:
-    """Symbols by their number, constants as they are written: exactly, and integers apart from floats."""
+    """What common subexpressions share: operands, constants to the digit, integers apart from floats."""
     names = [
         operand.index
         if isinstance(operand, Symbol)

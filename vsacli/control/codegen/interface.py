@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from vsacli.compute.tracing import Listing, Tape, TracedArray, cells_of
+from vsacli.compute.tracing import Kind, Program, trace
 
 Rows = Sequence[Any]
 
@@ -80,9 +80,6 @@ class Function:
     compute: Callable[[Rows], Rows]
     flagged: bool
 
-    def record(self) -> Listing:
-        """The operations on one sample."""
-        tape = Tape()
-        count = sum(structure.size for _, structure in self.arguments)
-        rows = [TracedArray(tape, [symbol]) for symbol in tape.inputs(count)]
-        return tape.listing([cells_of(row).item() for row in self.compute(rows)])
+    def program(self) -> Program:
+        """What the function does to one sample."""
+        return trace(self.compute, [Kind.REAL] * sum(structure.size for _, structure in self.arguments))

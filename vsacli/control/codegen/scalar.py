@@ -1,4 +1,4 @@
-"""Recorded programs as C99 for one sample at a time."""
+"""Traced programs as C99 for one sample at a time."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from vsacli.compute.tracing import Kind, Listing, Symbol
-from vsacli.compute.tracing.c_dialect import Dialect, digits
-from vsacli.compute.tracing.c_text import Writer, table_declarations, table_names
+from vsacli.compute.tracing import Kind, Program, Symbol
+from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations, table_names
 from vsacli.control.codegen.interface import Function
 
 PRECISIONS = ("double", "float")
@@ -123,12 +122,12 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
         head: the comment at its beginning.
     """
     dialect = Scalar(precision)
-    listings = [function.record() for function in functions]
-    tables = table_names(listings)
+    programs = [function.program() for function in functions]
+    tables = table_names(programs)
     writer = Writer(dialect, tables)
     bodies = [
-        "\n".join(_definition(prefix, function, listing, writer))
-        for function, listing in zip(functions, listings, strict=True)
+        "\n".join(_definition(prefix, function, program, writer))
+        for function, program in zip(functions, programs, strict=True)
     ]
     declarations = list(table_declarations(tables, dialect))
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
@@ -153,17 +152,17 @@ def signature(prefix: str, function: Function) -> str:
     return "\n    ".join(lines)
 
 
-def _definition(prefix: str, function: Function, listing: Listing, writer: Writer) -> Iterator[str]:
+def _definition(prefix: str, function: Function, program: Program, writer: Writer) -> Iterator[str]:
     entries = [f"{name}->{entry}" for name, structure in function.arguments for entry in structure.entries]
-    names = {symbol.index: entry for symbol, entry in zip(listing.inputs, entries, strict=True)}
+    names = {symbol.index: entry for symbol, entry in zip(program.inputs, entries, strict=True)}
     yield f"{signature(prefix, function)}\n{{"
     depth = 1
-    for line in writer.statements(listing, names):
+    for line in writer.statements(program, names):
         depth -= line == "}"
         yield "    " * depth + line
         depth += line.endswith("{")
     flags = []
-    outputs = iter(listing.outputs)
+    outputs = iter(program.outputs)
     for array in function.result.arrays:
         for entry in array.entries:
             output = next(outputs)

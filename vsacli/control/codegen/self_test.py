@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.tracing.c_dialect import digits
+from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.interface import Array, Function
 from vsacli.control.codegen.reference_vectors import CASES, Arrays, Reference
 

@@ -1,4 +1,4 @@
-"""Recorded programs on rows: the numbers of the text they were recorded from, to the bit but for powers."""
+"""Traced programs on rows: the numbers of the text they were traced from, to the bit but for powers."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from samples.command_line import REPOSITORY
 
 from vsacli import load_robot
 from vsacli.compute.engine import NUMPY, choose
-from vsacli.compute.engine.choice import RECORD_FROM
-from vsacli.compute.engine.kernel import record
-from vsacli.compute.engine.row_engine import RecordedEngine
-from vsacli.compute.tracing.row_program import RowProgram
+from vsacli.compute.engine.choice import TRACE_FROM
+from vsacli.compute.engine.engines import TracedEngine, kernel_program
+from vsacli.compute.tracing.python_code import RowFunction
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.dynamics.link_torques import LinkTorques
 from vsacli.robot.model import Robot
@@ -37,7 +36,7 @@ def demands(robot: Robot, samples: int) -> list[np.ndarray]:
 def test_inverse_dynamics_to_the_last_bit(name):
     robot = robot_named(name)
     kernel, rows = InverseDynamics(robot), demands(robot, 5000)
-    expected, found = NUMPY.run(kernel, rows), RecordedEngine().run(kernel, rows)
+    expected, found = NUMPY.run(kernel, rows), TracedEngine().run(kernel, rows)
     assert np.isnan(expected).any()  # infeasible steps, or variables that an actuator does not have
     np.testing.assert_array_equal(found, expected)
 
@@ -46,28 +45,28 @@ def test_any_number_of_samples_at_a_time():
     robot = robot_named("vsa_3r")
     kernel, rows = LinkTorques(robot), demands(robot, 9000)[:15]
     expected = NUMPY.run(kernel, rows)
-    engine = RecordedEngine()
+    engine = TracedEngine()
     for start, stop in ((0, 3), (3, 4), (4, 8500), (8500, 9000)):  # the rows kept for more are used for fewer
         found = engine.run(kernel, [row[start:stop] for row in rows])
         np.testing.assert_array_equal(found, expected[:, start:stop])
 
 
 def test_rows_are_used_again():
-    listing = record(LinkTorques(robot_named("lwr_7r_vsa")))
-    program = RowProgram(listing)
+    program = kernel_program(LinkTorques(robot_named("lwr_7r_vsa")))
+    function = RowFunction(program)
     # The forward pass leaves some thirty numbers a joint for the backward pass, and the rest is short-lived.
-    assert sum(program.rows.values()) < len(listing.operations) / 10
+    assert sum(function.rows.values()) < len(program.operations) / 10
 
 
 def test_a_kernel_with_loops_runs_as_it_is():
     robot = robot_named("measured_1r")
     kernel, rows = InverseDynamics(robot), demands(robot, 50)
     with pytest.raises(NotImplementedError, match="has no form on rows"):
-        RowProgram(record(kernel))
-    np.testing.assert_array_equal(RecordedEngine().run(kernel, rows), NUMPY.run(kernel, rows))
+        RowFunction(kernel_program(kernel))
+    np.testing.assert_array_equal(TracedEngine().run(kernel, rows), NUMPY.run(kernel, rows))
 
 
-def test_recording_has_to_repay():
+def test_tracing_has_to_repay():
     kernel = LinkTorques(robot_named("vsa_3r"))
-    assert choose("numpy", kernel, RECORD_FROM - 1).engine is NUMPY
-    assert isinstance(choose("numpy", kernel, RECORD_FROM).engine, RecordedEngine)
+    assert choose("numpy", kernel, TRACE_FROM - 1).engine is NUMPY
+    assert isinstance(choose("numpy", kernel, TRACE_FROM).engine, TracedEngine)

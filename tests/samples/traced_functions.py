@@ -1,4 +1,4 @@
-"""Functions that are recorded: operations on values of any kind, and loops, branches and tables."""
+"""Functions that are traced: operations on values of any kind, and loops, branches and tables."""
 
 from __future__ import annotations
 

@@ -1,24 +1,29 @@
-"""From a kernel to machine code: recorded, compiled unless it was before, loaded."""
+"""From a kernel to machine code: traced, compiled unless it was before, loaded."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
+from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine.cache import LIBRARY, Cache, CacheError, key_of, open_cache
-from vsacli.compute.engine.compiler import Compiler
-from vsacli.compute.engine.kernel import Kernel, operations, record
+from vsacli.compute.engine.compiler import Compiler, Library
+from vsacli.compute.engine.engines import Kernel, kernel_program
 from vsacli.compute.engine.lanes import batch_source
-from vsacli.compute.engine.library import Library
+from vsacli.compute.tracing import Program, Symbol
 
 Tell = Callable[[str], None]
 """Receives a message for the user."""
 
 Build = Callable[[int], bool]
 """Says whether code of so many operations shall be compiled."""
+
+
+USUAL_ITERATIONS = 5
+"""How often a loop is usually repeated."""
 
 
 class Loaded(NamedTuple):
@@ -28,7 +33,41 @@ class Loaded(NamedTuple):
     compiled: bool
 
 
-def load(kernel: Kernel, compiler: Compiler, tell: Tell, build: Build) -> Loaded | None:
+class CompiledEngine:
+    """Machine code, compiled for each kernel when it is first needed.
+
+    Args:
+        compiler: what compiles.
+        threads: how many run at once.
+        tell: learns what is wrong with the cache of compiled code.
+    """
+
+    def __init__(self, compiler: Compiler, threads: int, tell: Tell) -> None:
+        self._compiler = compiler
+        self._threads = threads
+        self._tell = tell
+        self._loaded: dict[Kernel, Loaded] = {}
+
+    def prepare(self, kernel: Kernel, build: Build = lambda _operations: True) -> Loaded | None:
+        """Load a kernel's code, compiled if need be and if `build` wants it; None if there is no such code.
+
+        Raises:
+            CompilerError: it cannot be compiled.
+        """
+        if kernel not in self._loaded:
+            loaded = _load(kernel, self._compiler, self._tell, build)
+            if loaded is None:
+                return None
+            self._loaded[kernel] = loaded
+        return self._loaded[kernel]
+
+    def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
+        """As of `Engine`."""
+        self.prepare(kernel)
+        return self._loaded[kernel].library(rows, self._threads)
+
+
+def _load(kernel: Kernel, compiler: Compiler, tell: Tell, build: Build) -> Loaded | None:
     """The library of a kernel.
 
     Args:
@@ -59,8 +98,19 @@ _loaded: dict[str, Loaded] = {}
 @lru_cache(maxsize=32)
 def _source(kernel: Kernel) -> tuple[str, int]:
     """The code of a kernel, and how many operations it has."""
-    listing = record(kernel)
-    return batch_source(listing), operations(listing)
+    program = kernel_program(kernel)
+    return batch_source(program), operation_count(program)
+
+
+def operation_count(program: Program) -> int:
+    """How many operations a program has, those of loops counted as often as they are usually repeated."""
+    return sum(map(_weight, program.operations))
+
+
+def _weight(symbol: Symbol) -> int:
+    if symbol.operation == "loop":
+        return USUAL_ITERATIONS * operation_count(symbol.operands[0].body)
+    return operation_count(symbol.operands[0].body) if symbol.operation == "branch" else 1
 
 
 def _opened(tell: Tell) -> Cache | None:

@@ -1,14 +1,24 @@
-"""Recorded programs as statements of C."""
+"""Programs as statements of C, in a dialect for single samples or one for vectors of them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from vsacli.compute.tracing.c_dialect import Dialect, digits
-from vsacli.compute.tracing.dead_code import Branch, Listing, Loop
-from vsacli.compute.tracing.operations import BITWISE, LOGICAL, kind_of
-from vsacli.compute.tracing.symbol import Kind, Operand, Symbol, Table
+from vsacli.compute.tracing.program import (
+    BITWISE,
+    LOGICAL,
+    Branch,
+    Kind,
+    Loop,
+    Operand,
+    Program,
+    Symbol,
+    Table,
+    kind_of,
+)
 
 INFIX = {
     "add": "+",
@@ -37,6 +47,74 @@ Names = Mapping[int, str]
 """What inputs of a program are called, by index."""
 
 
+class Dialect(ABC):
+    """How values and operations are written.
+
+    Attributes:
+        types: C type of each kind of value.
+        table_type: that of the constants in a table.
+    """
+
+    def __init__(self, types: Mapping[Kind, str], table_type: str) -> None:
+        self.types = types
+        self.table_type = table_type
+
+    @abstractmethod
+    def real(self, number: float) -> str:
+        """A constant."""
+
+    @abstractmethod
+    def integer(self, number: int) -> str:
+        """A constant field of bits or index."""
+
+    @abstractmethod
+    def truth(self, value: bool) -> str:
+        """A constant truth value."""
+
+    @abstractmethod
+    def logical(self, operator: str, operands: Sequence[str]) -> str:
+        """`and`, `or`, `not` of truth values."""
+
+    @abstractmethod
+    def where(self, kind: Kind, truth: str, a: str, b: str) -> str:
+        """One of two values of a kind."""
+
+    @abstractmethod
+    def masked(self, truth: str, mask: str) -> str:
+        """The mask where true, else 0."""
+
+    @abstractmethod
+    def function(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
+        """A call that gives a value of a kind.
+
+        The name is one of math.h; or `maximum`, `minimum`, which NaN passes through; or `take`, `search` in a
+        table.
+        """
+
+    @abstractmethod
+    def any(self, truth: str) -> str:
+        """Whether a truth value holds for any sample, as a condition of C."""
+
+    @abstractmethod
+    def replaced(self, kind: Kind, truth: str, new: str, old: str) -> str:
+        """The new value, for samples for which a truth value holds, in a place where it does for one."""
+
+    def constant(self, value: float | int | bool, kind: Kind) -> str:
+        """A constant of a kind."""
+        if kind is Kind.TRUTH:
+            return self.truth(bool(value))
+        return self.real(float(value)) if kind is Kind.REAL else self.integer(int(value))
+
+
+def digits(number: float) -> str:
+    """A constant with all its digits; those that are not finite by their names of math.h."""
+    if math.isnan(number):
+        return "NAN"
+    if math.isinf(number):
+        return "INFINITY" if number > 0 else "(-INFINITY)"
+    return f"({number!r})" if number < 0 else repr(number)
+
+
 class Writer:
     """Writes programs in a dialect.
 
@@ -49,9 +127,9 @@ class Writer:
         self._dialect = dialect
         self._tables = tables
 
-    def statements(self, listing: Listing, names: Names, prefix: str = "v") -> Iterator[str]:
+    def statements(self, program: Program, names: Names, prefix: str = "v") -> Iterator[str]:
         """Declarations of all values of a program, in its order; names of values begin with the prefix."""
-        for symbol in listing.operations:
+        for symbol in program.operations:
             if symbol.operation in {"loop", "branch"}:
                 yield from self._nested(symbol, names, prefix)
             elif symbol.operation != "item":
@@ -136,7 +214,7 @@ class Writer:
         for name, value, kind in zip(names, values, kinds, strict=False):
             yield f"{self._dialect.types[kind]} {name} = {value};"
 
-    def _body(self, body: Listing, own: str, names: Names, results: list[str], where: str) -> Iterator[str]:
+    def _body(self, body: Program, own: str, names: Names, results: list[str], where: str) -> Iterator[str]:
         """Statements of a body, and its outputs put into variables all at once."""
         prefix = f"{own}_v"
         yield from self.statements(body, names, prefix)
@@ -148,9 +226,9 @@ class Writer:
             yield f"{result} = {self._dialect.replaced(kind, where, f'{result}_new', result)};"
 
 
-def table_names(listings: Iterable[Listing]) -> dict[Table, str]:
+def table_names(programs: Iterable[Program]) -> dict[Table, str]:
     """What the tables of programs are called."""
-    found = dict.fromkeys(table for listing in listings for table in _tables(listing))
+    found = dict.fromkeys(table for program in programs for table in _tables(program))
     return {table: f"table_{number}" for number, table in enumerate(found)}
 
 
@@ -161,8 +239,8 @@ def table_declarations(names: Mapping[Table, str], dialect: Dialect) -> Iterator
         yield f"static const {dialect.table_type} {name}[{len(table.values)}] = {{{values}}};"
 
 
-def _tables(listing: Listing) -> Iterator[Table]:
-    for symbol in listing.operations:
+def _tables(program: Program) -> Iterator[Table]:
+    for symbol in program.operations:
         for operand in symbol.operands:
             if isinstance(operand, Table):
                 yield operand
@@ -177,7 +255,7 @@ def _name(symbol: Symbol, names: Names, prefix: str) -> str:
     return names.get(symbol.index, f"{prefix}{symbol.index}")
 
 
-def _renamed(body: Listing, texts: list[str]) -> Names:
+def _renamed(body: Program, texts: list[str]) -> Names:
     """The inputs of a body by what they are given."""
     return {symbol.index: text for symbol, text in zip(body.inputs, texts, strict=True)}
 

@@ -1,4 +1,4 @@
-"""NumPy's elementwise functions on symbols and constants."""
+"""NumPy's functions on arrays of symbols and constants."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.compute.tracing.operations import BITWISE
-from vsacli.compute.tracing.symbol import Kind, Operand, Symbol
+from vsacli.compute.tracing.program import BITWISE, Kind, Operand, Symbol, Table
 from vsacli.compute.tracing.tape import Tape
 
 Cells = npt.NDArray[np.object_]
 
 
-def apply(
+def apply_ufunc(
     tape: Tape, ufunc: np.ufunc, method: str, operands: Sequence[Cells], options: Mapping[str, Any]
 ) -> Any:
     """What `ufunc(*operands)`, or `ufunc.reduce(operand, axis=...)`, leaves: symbols and constants."""
@@ -34,12 +33,12 @@ def elementwise(tape: Tape, ufunc: np.ufunc, *operands: Cells) -> Cells:
     """A function on each entry."""
     if all(cells.size == 1 for cells in operands):
         single = np.empty(max((cells.shape for cells in operands), key=len), dtype=object)
-        single[...] = one(tape, ufunc, *(cells.item() for cells in operands))
+        single[...] = _one(tape, ufunc, *(cells.item() for cells in operands))
         return single
-    return each(lambda *entries: one(tape, ufunc, *entries), *operands)
+    return each_entry(lambda *entries: _one(tape, ufunc, *entries), *operands)
 
 
-def each(function: Callable[..., Operand], *operands: Any) -> Cells:
+def each_entry(function: Callable[..., Operand], *operands: Any) -> Cells:
     """A function of single entries on all of some arrays."""
     spread = np.broadcast_arrays(*(np.asarray(cells, dtype=object) for cells in operands))
     result = np.empty(spread[0].size, dtype=object)
@@ -47,23 +46,23 @@ def each(function: Callable[..., Operand], *operands: Any) -> Cells:
     return result.reshape(spread[0].shape)
 
 
-def one(tape: Tape, ufunc: np.ufunc, *operands: Operand) -> Operand:
+def _one(tape: Tape, ufunc: np.ufunc, *operands: Operand) -> Operand:
     """A function of symbols or constants."""
     if not any(isinstance(operand, Symbol) for operand in operands):
         with np.errstate(all="ignore"):
             plain: Operand = ufunc(*operands).item()
         return plain
     name = ufunc.__name__
-    if name in _REDUCED:
-        return _REDUCED[name](tape, *operands)
-    if name in BITWISE and _truth(operands):
+    if name in _BY_OTHERS:
+        return _BY_OTHERS[name](tape, *operands)
+    if name in BITWISE and _any_truth(operands):
         name = f"logical_{BITWISE[name]}"
     if name == "multiply" and (shifted := _scaled_bits(tape, operands)) is not None:
         return shifted
-    return tape.record(name, *operands)
+    return tape.emit(name, *operands)
 
 
-def _truth(operands: Sequence[Operand]) -> bool:
+def _any_truth(operands: Sequence[Operand]) -> bool:
     return any(
         isinstance(operand, bool) or (isinstance(operand, Symbol) and operand.kind is Kind.TRUTH)
         for operand in operands
@@ -75,37 +74,37 @@ def _scaled_bits(tape: Tape, operands: Sequence[Operand]) -> Operand | None:
     for symbol, factor in (operands, operands[::-1]):
         if isinstance(symbol, Symbol) and symbol.operation == "bits":
             truth, mask = symbol.operands
-            return tape.record("bits", truth, mask * factor)
+            return tape.emit("bits", truth, mask * factor)
     return None
 
 
 def _power(tape: Tape, base: Operand, exponent: Operand) -> Operand:
     """By products where the exponent is a small whole number, or 1.5."""
     if exponent == 1.5:
-        return tape.record("multiply", base, tape.record("sqrt", base))
+        return tape.emit("multiply", base, tape.emit("sqrt", base))
     if exponent not in (2, 3, 4):
-        return tape.record("power", base, exponent)
-    square = tape.record("multiply", base, base)
+        return tape.emit("power", base, exponent)
+    square = tape.emit("multiply", base, base)
     if exponent == 2:
         return square
-    return tape.record("multiply", square, base if exponent == 3 else square)
+    return tape.emit("multiply", square, base if exponent == 3 else square)
 
 
 def _isfinite(tape: Tape, a: Operand) -> Operand:
-    return tape.record("less", tape.record("absolute", a), float("inf"))
+    return tape.emit("less", tape.emit("absolute", a), float("inf"))
 
 
 def _isinf(tape: Tape, a: Operand) -> Operand:
-    return tape.record("equal", tape.record("absolute", a), float("inf"))
+    return tape.emit("equal", tape.emit("absolute", a), float("inf"))
 
 
-_REDUCED: dict[str, Callable[..., Operand]] = {
+_BY_OTHERS: dict[str, Callable[..., Operand]] = {
     "power": _power,
     "float_power": _power,
-    "square": lambda tape, a: tape.record("multiply", a, a),
-    "reciprocal": lambda tape, a: tape.record("divide", 1.0, a),
+    "square": lambda tape, a: tape.emit("multiply", a, a),
+    "reciprocal": lambda tape, a: tape.emit("divide", 1.0, a),
     "positive": lambda _tape, a: a,
-    "fabs": lambda tape, a: tape.record("absolute", a),
+    "fabs": lambda tape, a: tape.emit("absolute", a),
     "isfinite": _isfinite,
     "isinf": _isinf,
 }
@@ -117,8 +116,54 @@ def _matmul(tape: Tape, a: Cells, b: Cells) -> Cells:
 
     def dot(row: Cells, column: Cells) -> Operand:
         pairs = [pair for pair in zip(row, column, strict=True) if 0 not in pair]
-        products = [one(tape, np.multiply, *pair) for pair in pairs]
-        return reduce(lambda total, term: one(tape, np.add, total, term), products) if products else 0.0
+        products = [_one(tape, np.multiply, *pair) for pair in pairs]
+        return reduce(lambda total, term: _one(tape, np.add, total, term), products) if products else 0.0
 
     result = [[dot(row, column) for column in b.reshape(len(b), -1).T] for row in np.atleast_2d(a)]
     return np.array(result, dtype=object).reshape(*a.shape[:-1], *b.shape[1:])
+
+
+ARRANGING: frozenset[Callable[..., Any]] = frozenset(
+    {
+        *(np.stack, np.concatenate, np.broadcast_to, np.moveaxis, np.transpose, np.reshape, np.ravel),
+        *(np.full_like, np.zeros_like, np.ones_like, np.empty_like, np.atleast_1d, np.shape, np.ndim),
+        *(np.diag, np.diagonal, np.copy),
+    }
+)
+"""Functions that only arrange entries, whatever these are."""
+
+
+def _where(tape: Tape, truth: Any, a: Any, b: Any) -> Cells:
+    if any(np.asarray(argument).dtype.kind == "u" for argument in (a, b)):
+        raise NotImplementedError("bits are recorded as set or not: truth.astype(numpy.uint16) * bits")
+    return each_entry(lambda *entries: _choice(tape, *entries), truth, a, b)
+
+
+def _choice(tape: Tape, truth: Operand, a: Operand, b: Operand) -> Operand:
+    if not isinstance(truth, Symbol):
+        return a if truth else b
+    return tape.emit("where", truth, a, b)
+
+
+def _clip(tape: Tape, values: Any, low: Any, high: Any) -> Cells:
+    raised = elementwise(tape, np.maximum, *map(_objects, (values, low)))
+    return elementwise(tape, np.minimum, raised, _objects(high))
+
+
+def _searchsorted(tape: Tape, nodes: Any, values: Any, *, side: str = "left") -> Cells:
+    if side != "right":
+        raise NotImplementedError("numpy.searchsorted is recorded with side='right' only")
+    table = Table(tuple(np.asarray(nodes, dtype=np.float64).tolist()))
+    return each_entry(lambda cell: tape.emit("searchsorted", table, cell), values)
+
+
+def _objects(argument: Any) -> Cells:
+    return np.asarray(argument, dtype=object)
+
+
+FUNCTIONS: dict[Callable[..., Any], Callable[..., Cells]] = {
+    np.where: _where,
+    np.clip: _clip,
+    np.searchsorted: _searchsorted,
+}
+"""Functions of entries."""

@@ -1,4 +1,4 @@
-"""Recorded programs, carried out by NumPy operation by operation: what they mean, apart from any C."""
+"""Traced programs, carried out by NumPy operation by operation: what they mean, apart from any C."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.tracing import Listing, Symbol, Tape, TracedArray, cells_of
+from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray, cells_of
 
 Values = list[Any]
 
@@ -20,27 +20,27 @@ MEANING: dict[str, Callable[..., Any]] = {
 """Operations that are no function of NumPy with these operands."""
 
 
-def recorded(function: Callable[..., Any], count: int) -> Listing:
+def traced(function: Callable[..., Any], count: int) -> Program:
     """What a function of `count` rows of samples does."""
     tape = Tape()
     rows = [TracedArray(tape, [symbol]) for symbol in tape.inputs(count)]
     results = function(*rows)
     results = results if isinstance(results, tuple | list) else [results]
-    return tape.listing([cell for result in results for cell in cells_of(result).ravel()])
+    return tape.program([cell for result in results for cell in cells_of(result).ravel()])
 
 
-def carry_out(listing: Listing, inputs: Sequence[FloatArray]) -> Values:
+def carry_out(program: Program, inputs: Sequence[FloatArray]) -> Values:
     """The outputs for rows of samples; constants among them are as they are."""
-    found: dict[int, Any] = {symbol.index: row for symbol, row in zip(listing.inputs, inputs, strict=True)}
+    found: dict[int, Any] = {symbol.index: row for symbol, row in zip(program.inputs, inputs, strict=True)}
 
     def value(operand: Any) -> Any:
         return found[operand.index] if isinstance(operand, Symbol) else operand
 
     with np.errstate(all="ignore"):
-        for symbol in listing.operations:
+        for symbol in program.operations:
             operands = [value(operand) for operand in symbol.operands]
             found[symbol.index] = _result(symbol.operation, operands)
-    return [value(output) for output in listing.outputs]
+    return [value(output) for output in program.outputs]
 
 
 def _result(operation: str, operands: Values) -> Any:
@@ -75,6 +75,6 @@ def _branched(branch: Any, entries: Values) -> Values:
     return _single(branch.body, arguments) if truth else otherwise
 
 
-def _single(listing: Listing, entries: Values) -> Values:
-    outputs = carry_out(listing, [np.array([entry]) for entry in entries])
+def _single(program: Program, entries: Values) -> Values:
+    outputs = carry_out(program, [np.array([entry]) for entry in entries])
     return [np.ravel(output)[0] for output in outputs]

@@ -1,0 +1,89 @@
+"""Loops, branches and tables of single samples, on arrays of symbols and constants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from vsacli.compute.control_flow import cell_on, look_up_on, repeat_on, where_needed_on
+from vsacli.compute.tracing.array import TracedArray, cells_of, trace
+from vsacli.compute.tracing.numpy_functions import each_entry
+from vsacli.compute.tracing.program import Operand, Table, kind_of
+
+Function = Callable[..., Any]
+
+
+@repeat_on.register(TracedArray)
+def repeat_traced(
+    first: TracedArray, step: Function, state: Sequence[Any], constants: Sequence[Any], limit: int
+) -> tuple[TracedArray, ...]:
+    """`vsacli.compute.control_flow.repeat`: the step is traced once, and repeated when the program runs."""
+    count = len(state)
+
+    def body(rows: Sequence[Any]) -> Sequence[Any]:
+        following, done = step(tuple(rows[:count]), tuple(rows[count:]))
+        return [*following, done]
+
+    def loop(*entries: Operand) -> Sequence[Operand]:
+        program = trace(body, list(map(kind_of, entries)))
+        return first.tape.emit_loop(program, limit, entries[:count], entries[count:])
+
+    return _for_each_entry(loop, first, [*state, *constants], count)
+
+
+@where_needed_on.register(TracedArray)
+def where_needed_traced(
+    mask: TracedArray, function: Function, arguments: Sequence[Any], otherwise: Sequence[Any]
+) -> tuple[TracedArray, ...]:
+    """`vsacli.compute.control_flow.where_needed`: the function is traced, and runs where the mask holds."""
+    count = len(otherwise)
+
+    def branch(truth: Operand, *entries: Operand) -> Sequence[Operand]:
+        if truth is False:
+            return entries[:count]
+        program = trace(lambda rows: function(*rows), list(map(kind_of, entries[count:])))
+        return mask.tape.emit_branch(truth, program, entries[count:], entries[:count])
+
+    return _for_each_entry(branch, mask, [mask, *otherwise, *arguments], count)
+
+
+@look_up_on.register(TracedArray)
+def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArray, ...]:
+    """`vsacli.compute.control_flow.look_up`."""
+    return tuple(
+        _taken(index, Table(tuple(np.asarray(table, dtype=np.float64).tolist()))) for table in tables
+    )
+
+
+@cell_on.register(TracedArray)
+def cell_traced(position: Any, count: int) -> Any:
+    """`cell_of`: as many of the edges between the cells as the position is not below."""
+    return np.searchsorted(np.arange(1, count), position, side="right")
+
+
+def _taken(index: TracedArray, table: Table) -> TracedArray:
+    tape = index.tape
+    return TracedArray(tape, each_entry(lambda cell: tape.emit("take", table, cell), index.cells))
+
+
+def _for_each_entry(
+    emit: Callable[..., Sequence[Operand]], like: TracedArray, arrays: Sequence[Any], count: int
+) -> tuple[TracedArray, ...]:
+    """A loop or branch with `count` results for each entry of arrays."""
+    spread = np.broadcast_arrays(*map(cells_of, arrays), subok=False)
+    results: Iterator[Sequence[Operand]] = (
+        emit(*entries) for entries in zip(*(cells.flat for cells in spread), strict=True)
+    )
+    columns = zip(*results, strict=True)
+    shape = spread[0].shape
+    made = tuple(TracedArray(like.tape, _shaped(column, shape)) for column in columns)
+    assert len(made) == count
+    return made
+
+
+def _shaped(entries: Sequence[Operand], shape: tuple[int, ...]) -> Any:
+    cells = np.empty(len(entries), dtype=object)
+    cells[:] = entries
+    return cells.reshape(shape)
