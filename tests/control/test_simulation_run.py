@@ -122,6 +122,18 @@ def test_rates_of_a_ramp_are_found():
     assert rates.phase.dtheta == pytest.approx([-2.0], rel=1e-14)
 
 
+@pytest.mark.parametrize("step", [0.1, 0.001])
+def test_rates_follow_a_step_as_a_low_pass_at_a_tenth_of_the_sampling_rate_does(step):
+    """1 - exp(-2 pi f t), at f = 0.1/step and t = k step."""
+    start = Phase(*(np.zeros(1) for _ in range(4)), integral=None)
+    rates = RateFilter(start)
+    for k in range(1, 6):
+        rates.add(start._replace(q=np.array([3.0 * step * k]), theta=np.array([-2.0 * step * k])), step)
+        reached = 1 - np.exp(-2 * np.pi * 0.1 * k)
+        assert rates.phase.dq == pytest.approx([3.0 * reached], rel=1e-12)  # rounding of differences
+        assert rates.phase.dtheta == pytest.approx([-2.0 * reached], rel=1e-12)
+
+
 def test_rigid_joints_can_be_driven_by_feedforward_but_not_linearized():
     with pytest.raises(InputError, match="needs springs at all joints or at none: elbow is rigid"):
         simulate(with_actuators(vsa_3r(), {2: rigid()}), short_motion(3), gains=GAINS)

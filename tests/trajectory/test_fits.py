@@ -158,19 +158,52 @@ def test_refined_solution_keeps_the_digits():
     np.testing.assert_allclose(spline(inside, nu=4)[:, 0], exact.deriv(4)(inside), rtol=0, atol=2e-10)
 
 
+def score(time, row, spans, degree=7):
+    """Generalised cross-validation, a coefficient counting 1.4 times."""
+    knots = np.concatenate([[0] * degree, np.linspace(0, time[-1], spans + 1), [time[-1]] * degree])
+    error = row - make_lsq_spline(time, row, knots, k=degree)(time)
+    return np.sum(error**2) / (1 - 1.4 * (spans + degree) / len(time)) ** 2
+
+
 def test_choice_is_the_minimum_of_the_score():
     time = np.arange(2001) / 1000
     row = motion(time) + noise(2001, 1e-4)
     (chosen,) = best_spans(time, row[None], 7)
-
-    def score(spans):
-        knots = np.concatenate([[0] * 7, np.linspace(0, 2, spans + 1), [2] * 7])
-        error = row - make_lsq_spline(time, row, knots, k=7)(time)
-        return np.sum(error**2) / (1 - 1.4 * (spans + 7) / len(time)) ** 2
-
-    least = min(score(spans) for spans in range(1, 61))
-    assert score(chosen) < 1.002 * least  # the finest ratio tried is 1.19
+    least = min(score(time, row, spans) for spans in range(1, 61))
+    assert score(time, row, chosen) < 1.002 * least  # the finest ratio tried is 1.19
     assert chosen < most_spans(2001, 7)
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_choice_for_a_short_record_is_that_of_all_numbers(seed):
+    """Ten coefficients for a hundred samples: their price decides; at 1.3 or 1.45 some of these differ."""
+    time = np.arange(101) / 100
+    row = motion(time) + noise(101, 1e-2, seed)
+    (chosen,) = best_spans(time, row[None], 7)
+    assert chosen == min(range(1, most_spans(101, 7) + 1), key=lambda spans: score(time, row, spans))
+
+
+def test_a_fast_motion_gets_almost_half_as_many_knots_as_samples():
+    count = np.arange(401)
+    row = np.sin(2 * np.pi * count / 7) + noise(401, 0.1)  # seven samples to a period
+    fit = fitted(count / 100, row)
+    assert not fit.exact[0]
+    assert 401 / 3 < len(fit.parts[0].knots) < 401 / 2
+
+
+@pytest.mark.parametrize(("share", "exact"), [(0.003, True), (0.03, False)])
+def test_noise_of_a_percent_of_the_highest_derivative_is_too_much(share, exact):
+    time = np.arange(4001) / 1000
+    size = np.sqrt(np.mean(motion(time, 4) ** 2))
+    deviation = share * size * 1e-3**4 / INTERPOLATION_GAIN[7][4]
+    assert fitted(time, motion(time) + noise(4001, deviation)).exact.tolist() == [exact]
+
+
+def test_rounding_of_a_component_that_rests_beside_one_that_moves_is_no_noise():
+    time = np.arange(2001) / 1000
+    resting = 0.01 + noise(2001, 3e-17)
+    assert not fitted(time, resting).exact[0]
+    assert fit_samples(time, np.array([motion(time), resting]), 7, 4, None).exact.all()
 
 
 def test_gaps_leave_no_span_without_samples():

@@ -1,0 +1,63 @@
+"""The progress bar: for long work on a terminal, and nowhere else."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from contextlib import redirect_stderr
+from pathlib import Path
+from typing import Any
+
+import pytest
+from samples.command_line import ROBOT, edited
+
+from vsacli.cli.console import Talk
+
+LONG = 100_000
+"""Steps from which on a run takes seconds."""
+
+
+class Terminal(io.StringIO):
+    """What is written to a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def bar_of(steps: int, *, quiet: bool = False) -> None:
+    """Do some steps, which a bar may show."""
+    with Talk(quiet=quiet, verbose=False).progress(steps) as bar:
+        bar.update(steps // 2)
+        bar.update(steps - steps // 2)
+        assert bar.pos == steps
+
+
+def test_long_work_has_a_bar() -> None:
+    with redirect_stderr(Terminal()) as shown:
+        bar_of(LONG)
+    assert all(text in shown.getvalue() for text in ("computing", "50%", "100%"))
+
+
+@pytest.mark.parametrize(("steps", "quiet"), [(LONG - 1, False), (LONG, True)])
+def test_shorter_or_quiet_work_has_none(steps: int, quiet: bool) -> None:
+    with redirect_stderr(Terminal()) as shown:
+        bar_of(steps, quiet=quiet)
+    assert shown.getvalue() == ""
+
+
+def test_there_is_none_without_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    bar_of(LONG)
+    assert capsys.readouterr().err == ""
+
+
+def test_a_short_run_shows_none(vsacli: Callable[..., Any], motion: Path) -> None:
+    with redirect_stderr(Terminal()) as shown:
+        assert vsacli("invdyn", ROBOT, motion).code == 0
+    assert shown.getvalue() == "wrote vsa_3r-move.h5\n"
+
+
+def test_a_simulation_always_shows_one(vsacli: Callable[..., Any], motion: Path) -> None:
+    edited(motion, motion, ("duration: 4.0", "duration: 0.5"))
+    with redirect_stderr(Terminal()) as shown:
+        assert vsacli("simulate", ROBOT, motion).code == 0
+    assert "computing" in shown.getvalue()
