@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.trajectory.curves import POSITION
+from vsacli.base.signals import POSITION
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, Fit, fit_samples
 
 FREQUENCIES = np.array([0.3, 0.7, 1.1, 1.9])[:, None]

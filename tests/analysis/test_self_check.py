@@ -14,10 +14,11 @@ from samples.robots import random_robot, vsa_3r
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.analysis.report import Report
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.link_torques import LinkTorques
 from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import POSITION, STIFFNESS, Constant, RestToRest
+from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.times import UniformTimes
 
 ROOT = Path(__file__).parents[2]

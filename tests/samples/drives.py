@@ -16,9 +16,10 @@ from vsacli.actuators.laws.pair import Pair
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.drive import drive
 from vsacli.robot.model import Joint, Limits, Robot
-from vsacli.trajectory.curves import POSITION, STIFFNESS, RestToRest
+from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 

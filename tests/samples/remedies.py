@@ -16,11 +16,13 @@ from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.variables import Block
 from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Robot
-from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH, Constant, RestToRest
+from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory, WrenchProfile
+from vsacli.trajectory.trajectory import Trajectory
 
 PAPER_END = (math.pi / 2, math.pi / 4, -math.pi / 3)
 BASE, SHOULDER, ELBOW = range(3)

@@ -16,12 +16,13 @@ import numpy as np
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
+from vsacli.base.signals import WRENCH
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.documents.source import Source
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Robot
-from vsacli.trajectory.curves import WRENCH, Constant
-from vsacli.trajectory.trajectory import WrenchProfile
+from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.profile import WrenchProfile
 
 REPORT = {"format": "vsacli-report/1", "verdict": "ok", "samples": 0, "complete": True, "warnings": ["µ: –"]}
 SOURCE = Source("robots/two.yaml", "0" * 64, "name: two\n# °\n")

@@ -11,6 +11,7 @@ from samples.robots import vsa_3r
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop
@@ -22,9 +23,10 @@ from vsacli.control.simulation.start import InitialError
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH, RestToRest
+from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory, WrenchProfile
+from vsacli.trajectory.trajectory import Trajectory
 
 
 def short_motion(

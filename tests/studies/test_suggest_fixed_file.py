@@ -10,12 +10,14 @@ from samples.robots import vsa_3r
 from vsacli import load_trajectory
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError, StorageError
+from vsacli.base.signals import POSITION, WRENCH
 from vsacli.studies.remedies import StiffnessProfile, check_fixed_target, suggest, write_fixed
 from vsacli.studies.remedies.stiffness_profile import with_changed_stiffness
-from vsacli.trajectory.curves import POSITION, WRENCH, Constant, RestToRest
+from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.curves.piecewise import stepwise
 from vsacli.trajectory.curves.via_points import ViaPoints
-from vsacli.trajectory.trajectory import Trajectory, WrenchProfile
+from vsacli.trajectory.profile import WrenchProfile
+from vsacli.trajectory.trajectory import Trajectory
 
 
 def still_and_soft():

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from vsacli.trajectory.curves import POSITION, STIFFNESS, RestToRest
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from vsacli.trajectory.curves import POSITION, STIFFNESS
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 
 TIME = np.arange(4001) / 1000

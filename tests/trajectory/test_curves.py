@@ -10,7 +10,8 @@ import pytest
 import sympy
 
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves import DEGREES, POSITION, STIFFNESS, Constant, RestToRest
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.trajectory.curves import DEGREES, Constant, RestToRest
 
 EPS = np.finfo(float).eps
 SPAN = (0.1, 0.8)  # neither these nor their difference are binary fractions

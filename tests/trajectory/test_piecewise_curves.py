@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves import POSITION, STIFFNESS, Constant, RestToRest
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.curves.piecewise import Chain, Jump, stepwise
 from vsacli.trajectory.curves.via_points import ViaPoints
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves import POSITION, STIFFNESS
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 
 JOINTS = {"base": "revolute", "elbow": "revolute"}

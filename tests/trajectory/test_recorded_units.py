@@ -7,8 +7,8 @@ import pytest
 
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
+from vsacli.base.signals import POSITION
 from vsacli.robot.file import load_robot
-from vsacli.trajectory.curves import POSITION
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 from vsacli.trajectory.trajectory import Trajectory

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves import POSITION, STIFFNESS
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES
 from vsacli.trajectory.recorded.samples import (
     SampledProfile,

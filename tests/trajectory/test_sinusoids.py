@@ -10,7 +10,7 @@ import pytest
 import sympy
 
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves import POSITION
+from vsacli.base.signals import POSITION
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 
 EPS = np.finfo(float).eps

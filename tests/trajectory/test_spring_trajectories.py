@@ -21,8 +21,9 @@ from vsacli.actuators.laws.sinh import Sinh
 from vsacli.analysis.result import Result
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has
+from vsacli.base.signals import POSITION
 from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
-from vsacli.trajectory.curves import POSITION, RestToRest
+from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.trajectory import Trajectory
 
 ARM = """\

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from vsacli.base.errors import InputError
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.documents.source import Source
-from vsacli.trajectory.curves import POSITION, STIFFNESS, Constant, RestToRest
+from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -239,7 +240,8 @@ def test_scipy_is_loaded_only_for_splines():
     script = """
 import sys
 import numpy as np
-from vsacli.trajectory.curves import POSITION, Constant
+from vsacli.trajectory.curves import Constant
+from vsacli.base.signals import POSITION
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory, no_stiffness
 times = UniformTimes(7.0, 1.0)

@@ -9,7 +9,8 @@ import pytest
 from oracles.via_spline import spline_pieces, spline_value
 
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves import POSITION, STIFFNESS, RestToRest
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.via_points import ViaPoints, passing_shares
 
 EPS = np.finfo(float).eps

@@ -9,11 +9,12 @@ from samples.wrenches import held
 
 from vsacli import Trajectory, inverse_dynamics
 from vsacli.base.errors import InputError
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES
 from vsacli.dynamics.link_torques import link_torques
-from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH, Constant, RestToRest
+from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import WrenchProfile
 
 frames = pytest.mark.parametrize("frame", WRENCH_FRAMES)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,9 @@ class Antagonistic:
         "branch of the deflections: positive has phi_1 up and phi_2 down",
         default="positive",
     )
+
+    commanded: ClassVar[tuple[str, ...]] = ("stiffness",)
+    """Signals that the actuator takes, by their keys in `COMMANDED`."""
 
     def __post_init__(self) -> None:
         problems = []
@@ -67,17 +70,17 @@ def transmit(
     actuator: Antagonistic, command: Command, near_singular: float, followed: FloatArray | None
 ) -> Transmission:
     """Deflections on the actuator's branch, their rates, and motor accelerations; arguments as of `drive`."""
-    solution = solve_deflections(actuator, command.tau_e, command.stiffness)
-    reached = reach(command.stiffness, solution, near_singular)
+    solution = solve_deflections(actuator, command.tau_e, command.commanded["stiffness"])
+    reached = reach(command.commanded["stiffness"], solution, near_singular)
     phi = (solution.phi_1, solution.phi_2)  # (61)
     if followed is not None:
         phi = (followed[0], followed[1])
         reached = reached._replace(infeasible=reached.infeasible | np.isnan(followed[0]))
     motors = motor_motion(actuator, command, reached, phi)
     return Transmission(
-        stiffness=command.stiffness,
-        dstiffness=command.dstiffness,
-        ddstiffness=command.ddstiffness,
+        stiffness=command.commanded["stiffness"],
+        dstiffness=command.commanded["dstiffness"],
+        ddstiffness=command.commanded["ddstiffness"],
         phi=np.stack(motors.phi),
         dphi=np.stack(motors.dphi),
         ddtheta=np.stack(motors.ddtheta),
@@ -100,8 +103,8 @@ def motor_motion(actuator: Antagonistic, command: Command, reached: Reach, defle
     (energy_1, one), (energy_2, two) = first.energy_and_state(phi_1), second.energy_and_state(phi_2)
     det_a = determinant(one, two)  # (67)
     divisor = np.where(reached.singular, np.nan, det_a)
-    dphi = solve(one, two, divisor, command.dtau_e, command.dstiffness)  # (68)
-    accelerating = beta(one, two, dphi, command.ddtau_e, command.ddstiffness, command.ddq)
+    dphi = solve(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
+    accelerating = beta(one, two, dphi, command.ddtau_e, command.commanded["ddstiffness"], command.ddq)
     return Motors(
         phi=(phi_1, phi_2),
         dphi=dphi,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command, Transmission, single_motor
@@ -18,6 +19,9 @@ class Elastic:
     stiffness: float = number(units.STIFFNESS, "stiffness of the transmission", check=POSITIVE)
 
     no_choice = "its actuator is elastic, with the constant stiffness that the robot file says"
+
+    commanded: ClassVar[tuple[str, ...]] = ()
+    """Signals that the actuator takes, by their keys in `COMMANDED`."""
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,6 +20,9 @@ class Rigid:
     motor: Motor = value(Record(Motor), "the motor")
 
     no_choice = "its actuator is rigid and has no stiffness"
+
+    commanded: ClassVar[tuple[str, ...]] = ()
+    """Signals that the actuator takes, by their keys in `COMMANDED`."""
 
     def __post_init__(self) -> None:
         check_fields(self)

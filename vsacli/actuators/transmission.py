@@ -2,28 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FlagArray, FloatArray
+from vsacli.base.signals import commanded_names
 
 
 class Command(NamedTuple):
     """What a joint is asked to do and what its link demands of it; arrays (samples,), SI units.
 
-    The stiffness and its derivatives count at antagonistic joints only.
+    Attributes:
+        q, dq, ddq: motion of the joint.
+        tau_e, dtau_e, ddtau_e: elastic torque and its derivatives.
+        commanded: the signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`; those that the
+            actuator does not take do not count.
     """
 
     q: FloatArray
     dq: FloatArray
     ddq: FloatArray
-    stiffness: FloatArray
-    dstiffness: FloatArray
-    ddstiffness: FloatArray
     tau_e: FloatArray
     dtau_e: FloatArray
     ddtau_e: FloatArray
+    commanded: Mapping[str, FloatArray]
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Names of all its arrays, as of the result variables."""
+        return (*cls._fields[:-1], *commanded_names())
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, FloatArray]) -> Command:
+        """From arrays by their names; others are passed over."""
+        commanded = {name: arrays[name] for name in commanded_names()}
+        own = {name: arrays[name] for name in cls._fields[:-1]}
+        return cls(**own, commanded=commanded)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """All arrays by their names."""
+        return {**dict(zip(self._fields[:-1], self[:-1], strict=True)), **self.commanded}
 
 
 class Transmission(NamedTuple):

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 from vsacli.analysis.report import Report
+from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import Block
 
 
-@dataclass(frozen=True, eq=False)
 class Result(Block):
-    """Every variable over the whole trajectory, and the report on it."""
+    """Every variable over the whole trajectory, and the report on it.
 
-    report: Report = field(kw_only=True)
-    joint_names: tuple[str, ...] = field(kw_only=True)
+    Attributes:
+        report: the verdict.
+        joint_names: names of the joints, base to tip.
+    """
+
+    def __init__(self, *, report: Report, joint_names: tuple[str, ...], **arrays: AnyArray) -> None:
+        super().__init__(**arrays)
+        self.report = report
+        self.joint_names = joint_names

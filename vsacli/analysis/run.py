@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -103,7 +102,7 @@ class Run:
             summary.add(block)
         for drift in self._drifts:
             drift.add(block)
-        return replace(block, motor_energy=self._energy.add(block))
+        return Block(**block.arrays(), motor_energy=self._energy.add(block))
 
     def report(self) -> Report:
         """The verdict on the blocks so far, with the self-check of the whole."""

@@ -5,15 +5,14 @@ The declaration feeds the pipeline, the HDF5 attributes, the CSV headers, the pl
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from vsacli.base import units
-from vsacli.base.arrays import AnyArray, FlagArray, FloatArray, of_joint
+from vsacli.base.arrays import AnyArray, of_joint
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import wrench_columns
 
@@ -45,134 +44,116 @@ class Variable(NamedTuple):
     geared: int = 0
 
 
-def _variable(
-    dims: tuple[str, ...],
-    quantity: Quantity,
-    long_name: str,
-    equation: str,
-    default: Any = dataclasses.MISSING,
-    actuators: tuple[str, ...] = EVERY_ACTUATOR,
-    geared: int = 0,
-) -> Any:
-    metadata = {
-        "dims": dims,
-        "quantity": quantity,
-        "long_name": long_name,
-        "equation": equation,
-        "actuators": actuators,
-        "geared": geared,
-    }
-    return dataclasses.field(default=default, kw_only=True, metadata=metadata)
+def _of_signal(signal: Signal, dim: str, actuators: tuple[str, ...] = EVERY_ACTUATOR) -> Iterator[Variable]:
+    for name, quantity, long_name in zip(signal.names, signal.quantities, signal.long_names, strict=True):
+        yield Variable(name, (dim,), quantity, long_name, "given", actuators)
 
 
-def _of_joint(
-    quantity: Quantity, long_name: str, equation: str, actuators: tuple[str, ...] = EVERY_ACTUATOR
-) -> Any:
-    return _variable(("joint",), quantity, long_name, equation, actuators=actuators)
+def _given() -> Iterator[Variable]:
+    yield Variable("time", (), units.TIME, "time", "given")
+    yield from _of_signal(POSITION, "joint")
+    for signal in COMMANDED.values():
+        yield from _of_signal(signal, "joint", COMPLIANT)
+    yield from _of_signal(WRENCH, "wrench_axis")
 
 
-def _of_motor(
-    quantity: Quantity, long_name: str, equation: str, default: Any = dataclasses.MISSING, geared: int = 0
-) -> Any:
-    return _variable(("joint", "motor"), quantity, long_name, equation, default, geared=geared)
+_JOINT, _MOTOR = ("joint",), ("joint", "motor")
 
-
-def _of_wrench(quantity: Quantity, long_name: str) -> Any:
-    return _variable(("wrench_axis",), quantity, long_name, "given", default=None)
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Every variable over a block of consecutive steps; shapes (samples, joints) or (samples, joints, 2).
-
-    A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have
-    is NaN throughout. The wrench, (samples, 6), is None if the trajectory has none, and `motor_energy`, which
-    sums over the steps before, until the block has its place in a run.
-    """
-
-    time: FloatArray = _variable((), units.TIME, "time", "given")
-
-    q: FloatArray = _of_joint(units.POSITION, "commanded joint position", "given")
-    dq: FloatArray = _of_joint(units.VELOCITY, "commanded joint velocity", "given")
-    ddq: FloatArray = _of_joint(units.JOINT_ACCELERATION, "commanded joint acceleration", "given")
-    d3q: FloatArray = _of_joint(units.JERK, "commanded joint jerk", "given")
-    d4q: FloatArray = _of_joint(units.SNAP, "commanded joint snap", "given")
-
-    stiffness: FloatArray = _of_joint(units.STIFFNESS, "commanded joint stiffness", "given", COMPLIANT)
-    dstiffness: FloatArray = _of_joint(
-        units.STIFFNESS_RATE, "rate of the commanded stiffness", "given", COMPLIANT
-    )
-    ddstiffness: FloatArray = _of_joint(
-        units.STIFFNESS_ACCELERATION, "second derivative of the commanded stiffness", "given", COMPLIANT
-    )
-
-    wrench: FloatArray | None = _of_wrench(units.WRENCH, "wrench exerted on the end effector")
-    dwrench: FloatArray | None = _of_wrench(units.WRENCH_RATE, "rate of the wrench")
-    ddwrench: FloatArray | None = _of_wrench(units.WRENCH_ACCELERATION, "second derivative of the wrench")
-
-    tau_e: FloatArray = _of_joint(units.TORQUE, "total elastic torque", "(58)")
-    dtau_e: FloatArray = _of_joint(units.TORQUE_RATE, "rate of the elastic torque", "(59)")
-    ddtau_e: FloatArray = _of_joint(
-        units.TORQUE_ACCELERATION, "second derivative of the elastic torque", "(60)"
-    )
-
-    phi: FloatArray = _of_motor(units.POSITION, "deflection theta - q of each transmission", "(61)")
-    dphi: FloatArray = _of_motor(units.VELOCITY, "deflection rate", "(68)")
-    theta: FloatArray = _of_motor(units.POSITION, "motor position, joint side of the gear", "(69)", geared=1)
-    dtheta: FloatArray = _of_motor(units.VELOCITY, "motor velocity, joint side of the gear", "(69)", geared=1)
-    ddtheta: FloatArray = _of_motor(
-        units.JOINT_ACCELERATION, "motor acceleration, joint side of the gear", "(72)", geared=1
-    )
-    tau_spring: FloatArray = _of_motor(units.TORQUE, "torque of each transmission", "(62)")
-    tau_motor: FloatArray = _of_motor(
-        units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)", geared=-1
-    )
-
-    elastic_energy: FloatArray = _of_joint(
-        units.ENERGY, "energy in the springs of the joint", "integral of (62)"
-    )
-    motor_power: FloatArray = _of_motor(units.POWER, "mechanical power of the motor", "tau_motor * dtheta")
-    motor_energy: FloatArray | None = _of_motor(
+_COMPUTED = (
+    Variable("tau_e", _JOINT, units.TORQUE, "total elastic torque", "(58)"),
+    Variable("dtau_e", _JOINT, units.TORQUE_RATE, "rate of the elastic torque", "(59)"),
+    Variable("ddtau_e", _JOINT, units.TORQUE_ACCELERATION, "second derivative of the elastic torque", "(60)"),
+    Variable("phi", _MOTOR, units.POSITION, "deflection theta - q of each transmission", "(61)"),
+    Variable("dphi", _MOTOR, units.VELOCITY, "deflection rate", "(68)"),
+    Variable("theta", _MOTOR, units.POSITION, "motor position, joint side of the gear", "(69)", geared=1),
+    Variable("dtheta", _MOTOR, units.VELOCITY, "motor velocity, joint side of the gear", "(69)", geared=1),
+    Variable(
+        "ddtheta",
+        _MOTOR,
+        units.JOINT_ACCELERATION,
+        "motor acceleration, joint side of the gear",
+        "(72)",
+        geared=1,
+    ),
+    Variable("tau_spring", _MOTOR, units.TORQUE, "torque of each transmission", "(62)"),
+    Variable(
+        "tau_motor", _MOTOR, units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)", geared=-1
+    ),
+    Variable(
+        "elastic_energy", _JOINT, units.ENERGY, "energy in the springs of the joint", "integral of (62)"
+    ),
+    Variable("motor_power", _MOTOR, units.POWER, "mechanical power of the motor", "tau_motor * dtheta"),
+    Variable(
+        "motor_energy",
+        _MOTOR,
         units.ENERGY,
         "mechanical work of the motor since the first step",
         "integral of motor_power",
-        default=None,
-    )
-
-    det_A: FloatArray = _of_joint(  # noqa: N815  (the published name)
-        units.DECOUPLING, "determinant of the decoupling block of the joint", "(67)", VARIABLE_STIFFNESS
-    )
-    stiffness_lower: FloatArray = _of_joint(
+    ),
+    Variable(
+        "det_A",
+        _JOINT,
+        units.DECOUPLING,
+        "determinant of the decoupling block of the joint",
+        "(67)",
+        VARIABLE_STIFFNESS,
+    ),
+    Variable(
+        "stiffness_lower",
+        _JOINT,
         units.STIFFNESS,
         "smallest stiffness reachable at this elastic torque on the joint's branch",
         "(14)",
         VARIABLE_STIFFNESS,
-    )
-    stiffness_upper: FloatArray = _of_joint(
+    ),
+    Variable(
+        "stiffness_upper",
+        _JOINT,
         units.STIFFNESS,
         "largest stiffness reachable at this elastic torque on the joint's branch",
         "(14)",
         VARIABLE_STIFFNESS,
-    )
-    flags: FlagArray = _of_joint(
-        units.DIMENSIONLESS, "what is wrong with this step of the joint", "margins of (14)"
-    )
+    ),
+    Variable(
+        "flags",
+        _JOINT,
+        units.DIMENSIONLESS,
+        "what is wrong with this step of the joint",
+        "margins of (14)",
+    ),
+)
+
+VARIABLES: dict[str, Variable] = {variable.name: variable for variable in (*_given(), *_COMPUTED)}
+"""Every variable by name, `time` first."""
+
+
+class Block:
+    """Variables over a block of consecutive steps, each an attribute of the shape (samples, joints[, 2]).
+
+    A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have
+    is NaN throughout. What a block does not have is None: the wrench, (samples, 6), if the trajectory has
+    none, and `motor_energy`, which sums over the steps before, until the block has its place in a run.
+    """
+
+    def __init__(self, **arrays: AnyArray) -> None:
+        unknown = arrays.keys() - VARIABLES.keys()
+        if unknown:
+            raise TypeError(f"no variable is called {', '.join(sorted(unknown))}")
+        vars(self).update(arrays)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in VARIABLES:
+            return None
+        raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}")
 
     def of_joint(self, index: int) -> dict[str, AnyArray]:
         """The variables of one joint by name, (samples,), those of its motors (2, samples)."""
-        joints = (name for name, variable in VARIABLES.items() if "joint" in variable.dims)
-        there = {name: array for name in joints if (array := getattr(self, name)) is not None}
-        return of_joint(there, index)
+        of_joints = {name: array for name, array in self.arrays().items() if "joint" in VARIABLES[name].dims}
+        return of_joint(of_joints, index)
 
     def arrays(self) -> dict[str, AnyArray]:
         """The variables there are, by name."""
-        return {name: array for name in VARIABLES if (array := getattr(self, name)) is not None}
-
-
-VARIABLES: dict[str, Variable] = {
-    field.name: Variable(field.name, **field.metadata) for field in dataclasses.fields(Block)
-}
-"""Every variable by name, `time` first."""
+        return {name: vars(self)[name] for name in VARIABLES if name in vars(self)}
 
 
 def select_variables(

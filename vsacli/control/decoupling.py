@@ -9,6 +9,7 @@ import numpy as np
 from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.pairs.decoupling_matrix import beta, determinant, solve
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import STIFFNESS
 from vsacli.base.wrench import Wrench
 from vsacli.control.gains import Gains
 from vsacli.control.linear_control import Integral, linear_control
@@ -58,7 +59,7 @@ class Decoupling:
             self._gains.position, self._gains.position_integral, integral.q,
         )  # fmt: skip
         v_sigma = linear_control(  # (32b)
-            (reference.stiffness, reference.dstiffness, reference.ddstiffness),
+            tuple(reference.commanded[name] for name in STIFFNESS.names),
             (link.stiffness, link.dstiffness),
             self._gains.stiffness, self._gains.stiffness_integral, integral.stiffness,
         )  # fmt: skip

@@ -73,7 +73,7 @@ def drive(
         tau_motor=tau_motor,
         motor_power=tau_motor * dtheta,
     )
-    of_joint = {**command._asdict(), **driven._asdict()}
+    of_joint = {**command.arrays(), **driven._asdict()}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
     return driven._replace(flags=driven.flags | exceeded)
 

@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.limit_check import LimitCheck
 from vsacli.actuators.reach import NEAR_SINGULAR
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FloatArray, by_joint, over_time
+from vsacli.base.arrays import AnyArray, FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.json_records import Stored
+from vsacli.base.signals import COMMANDED, commanded_names, orders_of_derivation
 from vsacli.base.variables import VARIABLES, Block
-from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
+from vsacli.compute.rows import Layout
 from vsacli.compute.vector import Scalar
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.limits import limit_checks
-from vsacli.dynamics.link_torques import MOTION_NAMES, LinkTorques, link_torques
+from vsacli.dynamics.link_torques import TORQUES, LinkTorques, link_torques
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
-TORQUES = ("tau_e", "dtau_e", "ddtau_e")
 COMPUTED = (*TORQUES, *Drive._fields)
 """The variables that inverse dynamics computes."""
-
-STIFFNESS_NAMES = ("stiffness", "dstiffness", "ddstiffness")
 
 
 def usual_block(joints: int) -> int:
     """Steps computed at a time: one pass of NumPy's, which hides the interpreter and bounds the memory."""
-    return samples_per_pass(joints * (len(MOTION_NAMES) + len(STIFFNESS_NAMES)))
+    return samples_per_pass(joints * len(orders_of_derivation()))
 
 
 @dataclass(frozen=True)
@@ -52,8 +47,8 @@ class Stop(Stored):
 class InverseDynamics:
     """Inverse dynamics (36)-(74) over rows of samples, for an engine.
 
-    Inputs are those of `LinkTorques`, stiffness, dstiffness, ddstiffness of the joints, then the deflections
-    if they are followed, joint by joint; outputs the variables of `COMPUTED` one after the other.
+    Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, then the
+    deflections if they are followed; outputs the variables of `COMPUTED` one after the other.
 
     Attributes:
         robot: the robot.
@@ -79,43 +74,46 @@ class InverseDynamics:
         return LinkTorques(self.robot, self.frame)
 
     @property
+    def arguments(self) -> Layout:
+        """Rows that inverse dynamics takes."""
+        joints = len(self.robot.joints)
+        commanded = dict.fromkeys(commanded_names(), (joints,))
+        followed = {"phi": (joints, SIDES)} if self.followed else {}
+        return Layout({**self.links.arguments.shapes, **commanded, **followed})
+
+    @property
+    def results(self) -> Layout:
+        """Rows that inverse dynamics gives."""
+        joints = len(self.robot.joints)
+        of_motors = {name for name in COMPUTED if "motor" in VARIABLES[name].dims}
+        return Layout({name: (joints, SIDES) if name in of_motors else (joints,) for name in COMPUTED})
+
+    @property
     def inputs(self) -> int:
-        """Rows it takes."""
-        of_joint = len(STIFFNESS_NAMES) + (SIDES if self.followed else 0)
-        return self.links.inputs + of_joint * len(self.robot.joints)
+        """Number of rows taken."""
+        return self.arguments.size
 
     @property
     def outputs(self) -> int:
-        """Rows it gives."""
-        return sum(math.prod(shape) for shape in self.shapes.values())
-
-    @property
-    def shapes(self) -> dict[str, tuple[int, ...]]:
-        """Shape of each output at one instant, by name."""
-        joints = len(self.robot.joints)
-        return {name: (joints, SIDES) if "motor" in VARIABLES[name].dims else (joints,) for name in COMPUTED}
+        """Number of rows given."""
+        return self.results.size
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74)."""
-        joints, links = len(self.robot.joints), self.links
-        torques = links(rows[: links.inputs])
-        given = [
-            *rows[: 3 * joints],
-            *rows[links.inputs : links.inputs + len(STIFFNESS_NAMES) * joints],
-            *torques,
-        ]
-        followed = rows[links.inputs + len(STIFFNESS_NAMES) * joints :]
+        links, given = self.links, self.arguments.unpack(rows)
+        torques = links.results.unpack(links(rows[: links.inputs]))
+        of_joints = {**given, **torques}
         drives = [
             drive(
                 joint,
-                Command(*given[index::joints]),
+                Command.of({name: of_joints[name][index] for name in Command.names()}),
                 self.near_singular,
-                np.stack(followed[SIDES * index : SIDES * (index + 1)]) if self.followed else None,
+                np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.followed else None,
             )
             for index, joint in enumerate(self.robot.joints)
         ]
-        driven = (getattr(of_joint, name) for name in Drive._fields for of_joint in drives)
-        return [*torques, *(row for values in driven for row in (values if values.ndim > 1 else [values]))]
+        driven = {name: [getattr(each, name) for each in drives] for name in Drive._fields}
+        return self.results.pack({**torques, **{name: _rows(of_all) for name, of_all in driven.items()}})
 
 
 def compute_block(
@@ -139,22 +137,19 @@ def compute_block(
     frame = None if motion.wrench is None else motion.wrench.frame
     kernel = InverseDynamics(robot, frame, near_singular, followed is not None)
     given = motion.variables()
-    names = (*MOTION_NAMES, *(WRENCH_NAMES if frame is not None else ()), *STIFFNESS_NAMES)
-    rows = [row for name in names for row in by_joint(given[name])]
+    rows = {name: by_joint(given[name]) for name in kernel.arguments.shapes if name in given}
     if followed is not None:
-        rows += [row for sides in followed for row in np.ascontiguousarray(sides)]
-    computed = _named(kernel.shapes, engine.run(kernel, rows))
-    return Block(**{**given, **computed, "flags": computed["flags"].astype(np.uint16)})
+        rows["phi"] = followed.reshape(-1, followed.shape[-1])
+    found = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack(rows)))
+    computed = {name: over_time(array) for name, array in found.items()}
+    arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(np.uint16)}
+    return Block(**arrays)
 
 
-def _named(shapes: Mapping[str, tuple[int, ...]], rows: FloatArray) -> dict[str, Any]:
-    """Arrays over time by name, from all their rows."""
-    counts = [math.prod(shape) for shape in shapes.values()]
-    parts = np.split(rows, np.cumsum(counts)[:-1])
-    return {
-        name: over_time(part.reshape(*shape, -1))
-        for (name, shape), part in zip(shapes.items(), parts, strict=True)
-    }
+def _rows(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
+    """The rows (samples,) of arrays of the joints, each (samples,) or (2, samples)."""
+    for array in of_joints:
+        yield from array if array.ndim > 1 else [array]
 
 
 def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
@@ -177,18 +172,19 @@ def check_fit(robot: Robot, trajectory: Trajectory) -> None:
     if trajectory.joints != len(robot.joints):
         joints = f"{trajectory.joints} joints, the robot {robot.name} {len(robot.joints)}"
         raise InputError.one(f"the trajectory {trajectory.name} has {joints}")
-    lacking = [
-        joint.name
-        for joint, chosen in zip(robot.joints, trajectory.stiffened, strict=True)
-        if isinstance(joint.actuator, Antagonistic) and not chosen
-    ]
-    if lacking:
-        raise InputError.one(
-            f"the trajectory {trajectory.name} has no stiffness for {', '.join(lacking)}; "
-            "each antagonistic joint needs one"
-        )
+    for key in COMMANDED:
+        lacking = [
+            joint.name
+            for joint, chosen in zip(robot.joints, trajectory.chosen(key), strict=True)
+            if key in joint.actuator.commanded and not chosen
+        ]
+        if lacking:
+            raise InputError.one(
+                f"the trajectory {trajectory.name} has no {key} for {', '.join(lacking)}; "
+                "each antagonistic joint needs one"
+            )
 
 
 def command_of(index: int, commanded: Mapping[str, FloatArray]) -> Command:
     """The part of one joint in variables by name, each (samples, joints)."""
-    return Command(*(commanded[name][:, index] for name in Command._fields))
+    return Command.of({name: commanded[name][:, index] for name in Command.names()})

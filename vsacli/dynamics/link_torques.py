@@ -11,8 +11,10 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, by_joint, checked_shape, over_time
 from vsacli.base.errors import InputError
+from vsacli.base.signals import POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
 from vsacli.compute.engine import Engine, choose
+from vsacli.compute.rows import Layout
 from vsacli.compute.vector import (
     ZERO,
     Scalar,
@@ -28,7 +30,8 @@ from vsacli.robot.model import Joint, Robot, check_robot
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-MOTION_NAMES = ("q", "dq", "ddq", "d3q", "d4q")
+TORQUES = ("tau_e", "dtau_e", "ddtau_e")
+"""What the recursion computes."""
 
 
 def link_constants(joint: Joint) -> LinkConstants:
@@ -83,34 +86,39 @@ class LinkTorques:
     frame: str | None = None
 
     @property
+    def arguments(self) -> Layout:
+        """Rows that the recursion takes."""
+        joints, names = (len(self.robot.joints),), () if self.frame is None else WRENCH_NAMES
+        return Layout(dict.fromkeys(POSITION.names, joints) | dict.fromkeys(names, (len(WRENCH_AXES),)))
+
+    @property
+    def results(self) -> Layout:
+        """Rows that the recursion gives."""
+        return Layout(dict.fromkeys(TORQUES, (len(self.robot.joints),)))
+
+    @property
     def inputs(self) -> int:
-        """Rows it takes."""
-        of_wrench = 0 if self.frame is None else len(WRENCH_NAMES) * len(WRENCH_AXES)
-        return len(MOTION_NAMES) * len(self.robot.joints) + of_wrench
+        """Number of rows taken."""
+        return self.arguments.size
 
     @property
     def outputs(self) -> int:
-        """Rows it gives."""
-        return 3 * len(self.robot.joints)
+        """Number of rows given."""
+        return self.results.size
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(60)."""
-        joints = self.robot.joints
-        motion = [rows[order * len(joints) :] for order in range(len(MOTION_NAMES))]
+        given, joints = self.arguments.unpack(rows), self.robot.joints
         states = [
             joint_state(joint, q, (dq, ddq, d3q, d4q))
-            for joint, q, dq, ddq, d3q, d4q in zip(joints, *motion, strict=False)
+            for joint, q, dq, ddq, d3q, d4q in zip(
+                joints, *(given[name] for name in POSITION.names), strict=True
+            )
         ]
-        links = [link_constants(joint) for joint in joints]
-        torques = recursion(links, states, base_gravity(self.robot), self._tip(rows))
-        return [row for rows_of_order in zip(*torques, strict=True) for row in rows_of_order]
-
-    def _tip(self, rows: Sequence[Scalar]) -> TipLoad | None:
-        if self.frame is None:
-            return None
-        axes, start = len(WRENCH_AXES), len(MOTION_NAMES) * len(self.robot.joints)
-        wrench = [rows[first : first + axes] for first in range(start, len(rows), axes)]
-        return tip_load(self.robot, self.frame, wrench)
+        wrench = [given[name] for name in WRENCH_NAMES if name in given]
+        tip = None if self.frame is None else tip_load(self.robot, self.frame, wrench)
+        torques = recursion(list(map(link_constants, joints)), states, base_gravity(self.robot), tip)
+        return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
 
 
 class ElasticTorques(NamedTuple):
@@ -164,16 +172,16 @@ def link_torques(
     check_robot(robot)
     if wrench is not None:
         check_wrench(wrench)
-    given = _given(robot, dict(zip(MOTION_NAMES, (q, dq, ddq, d3q, d4q), strict=True)))
+    given = _given(robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True)))
     shape = given[0].shape
     motion = [by_joint(np.atleast_2d(array)) for array in given]
-    motion += [np.zeros_like(motion[0])] * (len(MOTION_NAMES) - len(motion))
+    motion += [np.zeros_like(motion[0])] * (len(POSITION.names) - len(motion))
 
     kernel = LinkTorques(robot, None if wrench is None else wrench.frame)
-    rows = [row for array in (*motion, *_wrench_rows(wrench, shape[:-1])) for row in array]
+    rows = dict(zip(kernel.arguments.shapes, (*motion, *_wrench_rows(wrench, shape[:-1])), strict=True))
     chosen = choose(engine, kernel, motion[0].shape[1]).engine if isinstance(engine, str) else engine
-    torques = map(over_time, chosen.run(kernel, rows).reshape(3, *motion[0].shape))
-    tau_e, dtau_e, ddtau_e = (torque.reshape(shape) for torque in torques)
+    computed = kernel.results.arrays(chosen.run(kernel, kernel.arguments.pack(rows)))
+    tau_e, dtau_e, ddtau_e = (over_time(computed[name]).reshape(shape) for name in TORQUES)
     return ElasticTorques(tau_e, dtau_e if len(given) > 3 else None, ddtau_e if len(given) > 4 else None)
 
 
@@ -183,7 +191,7 @@ def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatAr
         checked_shape(name, array, len(robot.joints)) for name, array in motion.items() if array is not None
     ]
     names = [name for name, array in motion.items() if array is not None]
-    missing = [name for name in MOTION_NAMES[: max(len(names), 3)] if name not in names]
+    missing = [name for name in POSITION.names[: max(len(names), 3)] if name not in names]
     if missing and names != ["q"]:
         raise InputError.one(
             f"{names[-1]} is given without {' and '.join(missing)}; give q alone if the robot holds still, "

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, check_fields, number, text, value
 from vsacli.documents.reading import read_document
 from vsacli.robot.model import Robot
-from vsacli.trajectory import curves as profiles
-from vsacli.trajectory.curves import Signal
 from vsacli.trajectory.declared import POSITIONS, RIGID_POSITIONS, STIFFNESSES, WRENCHES, Course, WrenchCourse
+from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes, uniform_times_over
-from vsacli.trajectory.trajectory import Profile, Trajectory, WrenchProfile, no_stiffness
+from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from vsacli.trajectory.declared.csv_samples import Recorded
@@ -66,9 +66,9 @@ class TrajectoryFile:
     def recorded(self) -> dict[Signal, Recorded]:
         """The courses that are recorded."""
         courses = {
-            profiles.POSITION: self.position,
-            profiles.STIFFNESS: self.stiffness,
-            profiles.WRENCH: self.wrench,
+            POSITION: self.position,
+            STIFFNESS: self.stiffness,
+            WRENCH: self.wrench,
         }
         return {
             signal: course
@@ -148,10 +148,10 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     recorded = {profile.signal: profile for recording in recordings for profile in recording.profiles}
     return Trajectory(
         times,
-        _profile(document.position, profiles.POSITION, times, recorded),
-        no_stiffness(len(robot.joints), times)
+        _profile(document.position, POSITION, times, recorded),
+        {}
         if document.stiffness is None
-        else _profile(document.stiffness, profiles.STIFFNESS, times, recorded),
+        else {"stiffness": _profile(document.stiffness, STIFFNESS, times, recorded)},
         wrench=_wrench(document.wrench, times, recorded),
         name=document.name,
         warnings=_warnings(document, times, members),
@@ -229,7 +229,7 @@ def _wrench(
 ) -> WrenchProfile | None:
     if course is None:
         return None
-    return WrenchProfile(_profile(course, profiles.WRENCH, times, recorded), course.frame)
+    return WrenchProfile(_profile(course, WRENCH, times, recorded), course.frame)
 
 
 def _profile(

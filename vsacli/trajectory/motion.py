@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import POSITION, commanded_names, orders_of_derivation
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Motion and stiffness over a block of times.
+    """Motion and commanded signals over a block of times.
 
     Attributes:
         time: (samples,) in s.
         q, dq, ddq, d3q, d4q: position and its four derivatives, (samples, joints), rad (m) per s^k.
-        stiffness, dstiffness, ddstiffness: joint stiffness and two derivatives, (samples, joints),
-            N m/rad (N/m) per s^k; NaN for a joint for which none is chosen.
+        commanded: the signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`, (samples,
+            joints); NaN for a joint that is not commanded so.
         wrench: what the environment exerts on the end effector meanwhile, if anything.
     """
 
@@ -26,14 +28,30 @@ class Motion:
     ddq: FloatArray
     d3q: FloatArray
     d4q: FloatArray
-    stiffness: FloatArray
-    dstiffness: FloatArray
-    ddstiffness: FloatArray
+    commanded: Mapping[str, FloatArray]
     wrench: Wrench | None = field(default=None, kw_only=True)
+
+    @classmethod
+    def of(cls, time: FloatArray, arrays: Mapping[str, FloatArray], wrench: Wrench | None = None) -> Motion:
+        """From arrays of the joints by the names of result variables; others are passed over."""
+        q, dq, ddq, d3q, d4q = (arrays[name] for name in POSITION.names)
+        commanded = {name: arrays[name] for name in commanded_names()}
+        return cls(time, q, dq, ddq, d3q, d4q, commanded, wrench=wrench)
+
+    @property
+    def of_joints(self) -> dict[str, FloatArray]:
+        """The arrays of the joints by the names of result variables."""
+        return {**{name: getattr(self, name) for name in POSITION.names}, **self.commanded}
 
     def variables(self) -> dict[str, FloatArray]:
         """All arrays by the names of result variables."""
-        arrays = {name: array for name, array in vars(self).items() if name != "wrench"}
+        arrays = {"time": self.time, **self.of_joints}
         if self.wrench is not None:
             arrays |= {name: getattr(self.wrench, name) for name in WRENCH_NAMES}
         return arrays
+
+    def mapped(self, time: FloatArray, function: Callable[[FloatArray, int], FloatArray]) -> Motion:
+        """The motion at other times, with a function applied to each array and its order of derivation."""
+        orders = orders_of_derivation()
+        arrays = {name: function(array, orders[name]) for name, array in self.of_joints.items()}
+        return Motion.of(time, arrays, self.wrench and self.wrench.mapped(function))

@@ -1,20 +1,21 @@
-"""The trajectory a robot is asked to execute: motion, stiffness and wrench at any block of its steps."""
+"""The trajectory a robot is asked to execute: motion, commanded signals and wrench at any of its steps."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, over_time
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.wrench import WRENCH_AXES, Wrench, check_frame
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_names
+from vsacli.base.wrench import Wrench
 from vsacli.documents.source import Source
-from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH, Constant, Signal
+from vsacli.trajectory.curves import Constant
 from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import RecordedTimes, Times
 
 if TYPE_CHECKING:
@@ -23,68 +24,14 @@ if TYPE_CHECKING:
     from vsacli.trajectory.recorded.samples import Samples
 
 
-class Profile(Protocol):
-    """A function of time with one component a joint or axis, and its first derivatives."""
-
-    @property
-    def components(self) -> int:
-        """Number of components: one a joint, or six of a wrench."""
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Why the values, or some of them, may not be what was meant."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """How they were understood, where that is not obvious."""
-
-    @property
-    def breakpoints(self) -> FloatArray:
-        """Ascending times between which the function is analytic; the first and last are its span."""
-
-    def at(self, time: FloatArray) -> FloatArray:
-        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
-
-    def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
-        """The same at the steps start..stop-1, whose times are `time`; given columns pass through."""
-
-    def stretched(self, factor: float) -> Profile:
-        """The same course, slower by a factor, from the same first time on."""
-
-    def summary(self) -> dict[str, Any] | None:
-        """The spline that values at the steps come from, in JSON values; None if they come from none."""
-
-
-@dataclass(frozen=True)
-class WrenchProfile:
-    """What the environment exerts on the end effector, over time.
-
-    Attributes:
-        profile: force and moment about the origin of the tool frame, `WRENCH_AXES`, N and N m.
-        frame: along whose axes these are, "end_effector" or "base".
-    """
-
-    profile: Profile
-    frame: str = "end_effector"
-
-    def __post_init__(self) -> None:
-        check_frame(self.frame)
-        if self.profile.components != len(WRENCH_AXES):
-            expected = f"{len(WRENCH_AXES)} ({', '.join(WRENCH_AXES)})"
-            raise InputError.one(f"the wrench has {self.profile.components} components, not {expected}")
-
-    def stretched(self, factor: float) -> WrenchProfile:
-        """The same course, slower by a factor, from the same first time on."""
-        return replace(self, profile=self.profile.stretched(factor))
-
-
 class Trajectory:
-    """Motion and stiffness of all joints, and the wrench at the end effector, over the same times.
+    """Motion and commanded signals of all joints, and the wrench at the end effector, over the same times.
 
     Attributes:
         times: the steps.
-        position, stiffness: what happens at them and between them; the stiffness of a joint for which none is
-            chosen is NaN.
+        position: the motion at them and between them.
+        commanded: each signal of `COMMANDED` by its key, e.g. `stiffness`; NaN for a joint for which none is
+            chosen.
         wrench: what the environment exerts meanwhile; None if nothing.
         name: used in reports and for the name of the result file.
         warnings: why times and profiles may not be what was meant.
@@ -96,7 +43,7 @@ class Trajectory:
         self,
         times: Times,
         position: Profile,
-        stiffness: Profile,
+        commanded: Mapping[str, Profile],
         *,
         wrench: WrenchProfile | None = None,
         name: str,
@@ -106,11 +53,16 @@ class Trajectory:
     ) -> None:
         """Join profiles that have the same joints and the span of the times.
 
+        A signal that is not among `commanded` is chosen for no joint.
+
         Raises:
             InputError: they have not.
         """
-        self.times, self.position, self.stiffness, self.wrench = times, position, stiffness, wrench
-        self.name = name
+        self.times, self.position, self.wrench, self.name = times, position, wrench, name
+        self.commanded = {
+            key: commanded[key] if key in commanded else _nothing(signal, position.components, times)
+            for key, signal in COMMANDED.items()
+        }
         profiles = [profile for _, profile in self._profiles()]
         self.warnings = (*warnings, *(each for profile in profiles for each in profile.warnings))
         self.notes = (*notes, *times.notes, *(each for profile in profiles for each in profile.notes))
@@ -118,15 +70,15 @@ class Trajectory:
         self._check()
 
     def _profiles(self) -> Iterator[tuple[str, Profile]]:
-        yield "position", self.position
-        yield "stiffness", self.stiffness
+        yield POSITION.key, self.position
+        yield from self.commanded.items()
         if self.wrench is not None:
-            yield "wrench", self.wrench.profile
+            yield WRENCH.key, self.wrench.profile
 
     def _check(self) -> None:
-        if self.position.components != self.stiffness.components:
-            joints = f"{self.position.components} joints, the stiffness {self.stiffness.components}"
-            raise InputError.one(f"the position has {joints}")
+        for key, profile in self.commanded.items():
+            if self.joints != profile.components:
+                raise InputError.one(f"the position has {self.joints} joints, the {key} {profile.components}")
         first, last = self.times.span
         for part, profile in self._profiles():
             start, end = profile.breakpoints[[0, -1]]
@@ -146,14 +98,13 @@ class Trajectory:
         ddq: ArrayLike | None = None,
         d3q: ArrayLike | None = None,
         d4q: ArrayLike | None = None,
-        dstiffness: ArrayLike | None = None,
-        ddstiffness: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
         dwrench: ArrayLike | None = None,
         ddwrench: ArrayLike | None = None,
         wrench_frame: str = "end_effector",
         fit: str | None = None,
         name: str = "samples",
+        **commanded: ArrayLike | None,
     ) -> Trajectory:
         """A trajectory through samples; derivatives that are given are used at the samples as they are.
 
@@ -169,8 +120,6 @@ class Trajectory:
             ddq: second derivative of q.
             d3q: third derivative of q.
             d4q: fourth derivative of q.
-            dstiffness: first derivative of the stiffness.
-            ddstiffness: second derivative of the stiffness.
             wrench: what the environment exerts on the end effector, (samples, 6): force and moment about the
                 origin of the tool frame, N and N m, as are its derivatives per s^k; None if nothing.
             dwrench: first derivative of its components.
@@ -180,14 +129,16 @@ class Trajectory:
                 with knots by generalised cross-validation; then the values are those of the spline too. By
                 default what the noise of each column asks for, see `vsacli.trajectory.fits.fit_samples`.
             name: used in reports and for the name of the result file.
+            **commanded: derivatives of the stiffness, `dstiffness` and `ddstiffness`; further signals of
+                `COMMANDED` and their derivatives, likewise.
 
         Raises:
+            TypeError: there is no such signal.
             InputError: `fit` is no such word; or naming each array that does not fit, by index.
         """
         from vsacli.trajectory.fits import METHODS
         from vsacli.trajectory.recorded.samples import (
             SampledProfile,
-            Samples,
             checked_array,
             time_problems,
             value_problems,
@@ -196,29 +147,31 @@ class Trajectory:
         if fit not in (None, *METHODS):
             raise InputError.one(f"fit must be one of {', '.join(METHODS)}, not {fit!r}")
         times = checked_array("time", time, None)
-        position = Samples.from_arrays(POSITION, times, q, dq, ddq, d3q, d4q)
-        stiffnesses = _recorded(STIFFNESS, times, stiffness, dstiffness, ddstiffness)
-        wrenches = _recorded(WRENCH, times, wrench, dwrench, ddwrench)
-        records = [position, *stiffnesses, *wrenches]
+        of_joints = {"stiffness": stiffness, **commanded}
+        unknown = of_joints.keys() - set(commanded_names())
+        if unknown:
+            raise TypeError(f"no signal is called {', '.join(sorted(unknown))}")
+        given = {
+            POSITION: (q, dq, ddq, d3q, d4q),
+            **{each: tuple(map(of_joints.get, each.names)) for each in COMMANDED.values()},
+            WRENCH: (wrench, dwrench, ddwrench),
+        }
+        records = [record for each, arrays in given.items() for record in _recorded(each, times, *arrays)]
         problems = [*time_problems(times), *(found for part in records for found in value_problems(part))]
         if problems:
             raise InputError(Problem("", 0, str(problem)) for problem in problems)
-        profiles = {record.signal: SampledProfile.of(record, fit) for record in records}
-        exerted = WrenchProfile(profiles[WRENCH], wrench_frame) if wrenches else None
-        recorded = RecordedTimes(times)
-        moving = profiles[POSITION]
-        chosen = profiles[STIFFNESS] if stiffnesses else no_stiffness(moving.components, recorded)
-        return cls(recorded, moving, chosen, wrench=exerted, name=name)
+        profiles = {record.signal.key: SampledProfile.of(record, fit) for record in records}
+        exerted = WrenchProfile(profiles[WRENCH.key], wrench_frame) if WRENCH.key in profiles else None
+        return cls(RecordedTimes(times), profiles[POSITION.key], profiles, wrench=exerted, name=name)
 
     @property
     def joints(self) -> int:
         """Number of joints."""
         return self.position.components
 
-    @property
-    def stiffened(self) -> BoolArray:
-        """The joints for which a stiffness is chosen, (joints,)."""
-        chosen: BoolArray = ~np.isnan(self.block(0, 1).stiffness[0])
+    def chosen(self, key: str) -> BoolArray:
+        """The joints for which a signal is chosen, by its key; (joints,)."""
+        chosen: BoolArray = ~np.isnan(self.block(0, 1).commanded[key][0])
         return chosen
 
     @property
@@ -242,11 +195,16 @@ class Trajectory:
         return self._motion(time, lambda profile: profile.at(time))
 
     def _motion(self, time: FloatArray, rows: Callable[[Profile], FloatArray]) -> Motion:
-        commanded = map(over_time, (*rows(self.position), *rows(self.stiffness)))
-        if self.wrench is None:
-            return Motion(time, *commanded)
-        wrench = Wrench(*map(over_time, rows(self.wrench.profile)), frame=self.wrench.frame)
-        return Motion(time, *commanded, wrench=wrench)
+        signals = {POSITION: self.position, **{COMMANDED[key]: each for key, each in self.commanded.items()}}
+        arrays = {
+            name: over_time(row)
+            for signal, profile in signals.items()
+            for name, row in zip(signal.names, rows(profile), strict=True)
+        }
+        wrench = None
+        if self.wrench is not None:
+            wrench = Wrench(*map(over_time, rows(self.wrench.profile)), frame=self.wrench.frame)
+        return Motion.of(time, arrays, wrench)
 
     @property
     def fits(self) -> tuple[dict[str, Any], ...]:
@@ -255,11 +213,11 @@ class Trajectory:
         return tuple(summary for summary in summaries if summary is not None)
 
     def stretched(self, factor: float) -> Trajectory:
-        """Position, stiffness and wrench slower by a factor; steps at a uniform rate keep their rate."""
+        """All profiles slower by a factor; steps at a uniform rate keep their rate."""
         return Trajectory(
             self.times.stretched(factor),
             self.position.stretched(factor),
-            self.stiffness.stretched(factor),
+            {key: profile.stretched(factor) for key, profile in self.commanded.items()},
             wrench=None if self.wrench is None else self.wrench.stretched(factor),
             name=self.name,
             sources=self.sources,
@@ -290,9 +248,9 @@ class Trajectory:
         return time, np.minimum(time - left, right - time)
 
 
-def no_stiffness(joints: int, times: Times) -> Constant:
-    """The profile of a robot that has no antagonistic joint."""
-    return Constant(signal=STIFFNESS, span=times.span, value=(math.nan,) * joints)
+def _nothing(signal: Signal, joints: int, times: Times) -> Constant:
+    """The profile of a signal that is chosen for no joint."""
+    return Constant(signal=signal, span=times.span, value=(math.nan,) * joints)
 
 
 def _recorded(

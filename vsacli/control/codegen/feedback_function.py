@@ -103,7 +103,7 @@ class _Law:
         theta, dtheta = (
             drivetrain.of_motors(state[name])[..., drivetrain.sprung] for name in ("theta", "dtheta")
         )
-        command = Motion(np.zeros(1), **reference)
+        command = Motion.of(np.zeros(1), reference)
         torque = law.torque(state["q"], state["dq"], theta, dtheta, command, Integral(**integral))
         tau_motor = np.full_like(state["theta"], np.nan)
         tau_motor[drivetrain.present] = torque

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import POSITION
 from vsacli.control.codegen.interface import Function
 from vsacli.control.gains import STIFFNESS_ORDER
 from vsacli.dynamics.inverse import compute_block
-from vsacli.dynamics.link_torques import MOTION_NAMES
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
@@ -38,7 +37,7 @@ class Reference:
         self._rng = np.random.default_rng(1)
         command = self._command()
         self._inputs = {
-            "motion": {name: command[name] for name in MOTION_NAMES},
+            "motion": {name: command[name] for name in POSITION.names},
             "command": command,
             "state": self._state(command),
             "integral": {name: self._drawn(scale) for name, scale in (("q", 1e-3), ("stiffness", 1.0))},
@@ -86,8 +85,7 @@ class Reference:
         return {**drawn, "stiffness": stiffness}
 
     def _motion(self, arrays: Arrays, stiffness: FloatArray) -> Motion:
-        given: dict[str, Any] = {**arrays, "stiffness": stiffness}
-        return Motion(np.arange(float(CASES)), **given)
+        return Motion.of(np.arange(float(CASES)), {**arrays, "stiffness": stiffness})
 
     def _state(self, command: Arrays) -> Arrays:
         block = compute_block(self._robot, self._motion(command, command["stiffness"]))

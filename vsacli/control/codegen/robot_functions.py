@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from vsacli.base.signals import POSITION, orders_of_derivation
 from vsacli.base.variables import VARIABLES
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
-from vsacli.dynamics.inverse import STIFFNESS_NAMES, TORQUES, InverseDynamics
-from vsacli.dynamics.link_torques import MOTION_NAMES, LinkTorques
+from vsacli.dynamics.inverse import InverseDynamics
+from vsacli.dynamics.link_torques import TORQUES, LinkTorques
 from vsacli.robot.model import Robot
 
 DRIVE_NAMES = (
@@ -24,13 +25,13 @@ DRIVE_NAMES = (
 
 def motion_structure(robot: Robot) -> Structure:
     """Position and its derivatives."""
-    return Structure("motion", "Motion of the joints.", _arrays(robot, MOTION_NAMES))
+    return Structure("motion", "Motion of the joints.", _arrays(robot, POSITION.names))
 
 
 def command_structure(robot: Robot) -> Structure:
     """Motion and stiffness."""
     meaning = "Commanded motion and stiffness; only antagonistic joints read a stiffness."
-    return Structure("command", meaning, _arrays(robot, (*MOTION_NAMES, *STIFFNESS_NAMES)))
+    return Structure("command", meaning, _arrays(robot, tuple(orders_of_derivation())))
 
 
 def link_torques_function(robot: Robot) -> Function:
@@ -50,11 +51,8 @@ def inverse_dynamics_function(robot: Robot) -> Function:
     kernel = InverseDynamics(robot)
 
     def compute(rows: Rows) -> Rows:
-        computed = iter(kernel(rows))
-        by_name = {
-            name: [next(computed) for _ in range(_size(shape))] for name, shape in kernel.shapes.items()
-        }
-        return [row for name in DRIVE_NAMES for row in by_name[name]]
+        computed = kernel.results.unpack(kernel(rows))
+        return [row for name in DRIVE_NAMES for row in computed[name]]
 
     return Function(
         name="inverse_dynamics",
@@ -81,7 +79,3 @@ def variable_array(robot: Robot, name: str) -> Array:
     units = dict.fromkeys(variable.quantity.unit(joint_type) for joint_type in robot.joint_types)
     meaning = ", ".join([variable.long_name, *([] if name == "flags" else [" or ".join(units)])])
     return Array(name, (len(robot.joints), *motors), meaning, bits=name == "flags")
-
-
-def _size(shape: tuple[int, ...]) -> int:
-    return shape[0] * (shape[1] if len(shape) > 1 else 1)

@@ -86,5 +86,5 @@ class LinearizingFeedback:
             return Integral(np.zeros_like(phase.q), np.zeros_like(phase.q))
         reference, plant = self._reference(time), self._feedback.plant
         springs = plant.drivetrain.springs(plant.deflections(phase.q, phase.theta))
-        error = reference.stiffness - plant.drivetrain.joint_sum(springs.sigma)
+        error = reference.commanded["stiffness"] - plant.drivetrain.joint_sum(springs.sigma)
         return Integral(reference.q - phase.q, np.where(self._paired, error, 0.0))

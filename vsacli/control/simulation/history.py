@@ -55,8 +55,8 @@ class History:
 
 def history(robot: Robot, loop: ClosedLoop, course: Course) -> History:
     """Evaluate every variable along a course."""
-    reference = loop.reference(course.time)
-    commanded = {name: getattr(reference, name) for name in COMMANDED}
+    reference = loop.reference(course.time).of_joints
+    commanded = {name: reference[name] for name in COMMANDED}
     found = _actual(loop, course)
     paired = loop.plant.drivetrain.present.all(axis=1)
     for name in ("stiffness", "dstiffness"):  # elsewhere there is none to command

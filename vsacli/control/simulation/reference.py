@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import orders_of_derivation
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.control.simulation.tabulated import tabulate
-from vsacli.trajectory.curves import POSITION, STIFFNESS
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
-
-COMMANDS = (*POSITION.names, *STIFFNESS.names)
 
 
 class Reference:
@@ -28,35 +25,33 @@ class Reference:
 
     def __init__(self, trajectory: Trajectory) -> None:
         self.frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        self._commands = _tabulated(trajectory, lambda motion: motion, COMMANDS)
-        self._wrench = (
-            _tabulated(trajectory, lambda motion: motion.wrench, WRENCH_NAMES) if self.frame else None
-        )
+        self._commands = _tabulated(trajectory, tuple(orders_of_derivation()))
+        self._wrench = _tabulated(trajectory, WRENCH_NAMES) if self.frame else None
 
     def __call__(self, time: float | FloatArray) -> Motion:
         """Motion, stiffness and wrench."""
-        return Motion(np.asarray(time), *self._commands(time), wrench=self.wrench(time))
+        return Motion.of(np.asarray(time), self._commands(time), self.wrench(time))
 
     def wrench(self, time: float | FloatArray) -> Wrench | None:
         """The wrench alone."""
-        return None if self._wrench is None else Wrench(*self._wrench(time), frame=self.frame or "")
+        return None if self._wrench is None else Wrench(**self._wrench(time), frame=self.frame or "")
 
 
 def _tabulated(
-    trajectory: Trajectory, part: Callable[[Motion], Any], names: Sequence[str]
-) -> Callable[[float | FloatArray], Sequence[FloatArray]]:
-    """Arrays of these names of a part of the motion, as functions of time."""
+    trajectory: Trajectory, names: Sequence[str]
+) -> Callable[[float | FloatArray], dict[str, FloatArray]]:
+    """Variables of the motion by name, as functions of time."""
 
     def columns(time: FloatArray) -> FloatArray:
-        source = part(trajectory.at(time))
-        return np.concatenate([getattr(source, name) for name in names], axis=1)
+        variables = trajectory.at(time).variables()
+        return np.concatenate([variables[name] for name in names], axis=1)
 
     table = tabulate(columns, trajectory.breakpoints)
     width = table.c.shape[-1] // len(names)
     parts = [slice(start, start + width) for start in range(0, table.c.shape[-1], width)]
 
-    def arrays(time: float | FloatArray) -> Sequence[FloatArray]:
+    def arrays(time: float | FloatArray) -> dict[str, FloatArray]:
         values = table(time)
-        return [values[..., part] for part in parts]
+        return {name: values[..., part] for name, part in zip(names, parts, strict=True)}
 
     return arrays

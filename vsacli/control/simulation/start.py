@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,7 @@ from vsacli.base.flags import Flag, has
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
+from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -40,8 +41,9 @@ def start_state(robot: Robot, trajectory: Trajectory, error: InitialError) -> St
     motion = trajectory.at(np.array(trajectory.times.span[:1]))
     joints = len(robot.joints)
     offsets = {name: _per_joint(name, getattr(error, name), joints) for name in ("q", "stiffness")}
-    shifted = replace(motion, **{name: getattr(motion, name) + offset for name, offset in offsets.items()})
-    block = compute_block(robot, shifted)
+    arrays = motion.of_joints
+    shifted = {**arrays, **{name: arrays[name] + offset for name, offset in offsets.items()}}
+    block = compute_block(robot, Motion.of(motion.time, shifted, motion.wrench))
     failing = has(block.flags[0], Flag.INFEASIBLE | Flag.SINGULAR)
     if failing.any():
         names = ", ".join(name for name, fails in zip(robot.joint_names, failing, strict=True) if fails)

@@ -52,7 +52,7 @@ class Task:
         """Roots of (14) of some joints."""
         return np.stack(
             [
-                solve_deflections(actuator, command.tau_e, command.stiffness).deflections
+                solve_deflections(actuator, command.tau_e, command.commanded["stiffness"]).deflections
                 for actuator, command in self._commands(joints, time)
             ]
         )
@@ -61,7 +61,7 @@ class Task:
         """Rates of the deflections of some joints, (19)."""
         return np.stack(
             [
-                deflection_rates(actuator, of_joint, command.dtau_e, command.dstiffness)
+                deflection_rates(actuator, of_joint, command.dtau_e, command.commanded["dstiffness"])
                 for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
             ]
         )
@@ -85,8 +85,8 @@ class Task:
 
 def _hindrances(actuator: Antagonistic, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
     """Singular is, too, where det A has another sign than on the joint's branch: it was zero on the way."""
-    solution = solve_deflections(actuator, command.tau_e, command.stiffness)
-    flags = reach_flags(command.stiffness, solution)
+    solution = solve_deflections(actuator, command.tau_e, command.commanded["stiffness"])
+    flags = reach_flags(command.commanded["stiffness"], solution)
     here, on_branch = (
         np.sign(decoupling_determinant(actuator, each)) for each in (phi, solution.deflections)
     )

@@ -17,12 +17,11 @@ from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import open_stored
 from vsacli.robot.file import load_robot
-from vsacli.trajectory.curves import POSITION, STIFFNESS
+from vsacli.base.signals import orders_of_derivation
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
 BLOCK_SAMPLES = 8192
-SIGNALS = (*POSITION.names, *STIFFNESS.names)
 
 
 def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
@@ -76,7 +75,7 @@ def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> d
         "samples": trajectory.samples,
         "start": trajectory.times.span[0],
         "joints": [
-            {"name": joint, **{name: ranges.of(name, index) for name in SIGNALS}}
+            {"name": joint, **{name: ranges.of(name, index) for name in orders_of_derivation()}}
             for index, joint in enumerate(joint_names)
         ],
         "warnings": list(trajectory.warnings),

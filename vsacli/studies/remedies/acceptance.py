@@ -56,7 +56,8 @@ class Acceptance:
     def refused_commands(self, joint: Joint, command: Command) -> BoolArray:
         """The steps of one joint that are not accepted, (samples,)."""
         driven = drive(joint, command, self.near_singular)
-        return self._refused(driven.flags, command.stiffness, driven.stiffness_lower, driven.stiffness_upper)
+        asked = command.commanded["stiffness"]
+        return self._refused(driven.flags, asked, driven.stiffness_lower, driven.stiffness_upper)
 
     def reasons(self, motion: Motion) -> tuple[str, ...]:
         """For each joint that is not accepted throughout, the worst that is wrong with it."""
@@ -70,7 +71,7 @@ class Acceptance:
     def reason(self, joint: Joint, time: FloatArray, command: Command) -> str:
         """The worst that is wrong with the steps of one joint, in a clause; empty if they are accepted."""
         driven = drive(joint, command, self.near_singular)
-        computed = {**command._asdict(), **driven._asdict()}
+        computed = {**command.arrays(), **driven._asdict()}
         return self._reach_reason(joint, time, command, driven) or _limit_reason(joint, time, computed)
 
     def _refused(
@@ -81,7 +82,7 @@ class Acceptance:
         return refused
 
     def _reach_reason(self, joint: Joint, time: FloatArray, command: Command, driven: Drive) -> str:
-        gap = margin(command.stiffness, driven.stiffness_lower, driven.stiffness_upper)
+        gap = margin(command.commanded["stiffness"], driven.stiffness_lower, driven.stiffness_upper)
         gap[np.isnan(gap)] = np.inf
         gap[has(driven.flags, Flag.INFEASIBLE) & np.isnan(driven.stiffness_lower)] = -np.inf
         step = int(gap.argmin())
@@ -90,7 +91,7 @@ class Acceptance:
         return _corridor_reason(
             joint,
             time[step],
-            command.stiffness[step],
+            command.commanded["stiffness"][step],
             driven.stiffness_lower[step] / (1 - self.near_singular),
             driven.stiffness_upper[step] / (1 + self.near_singular),
         )

@@ -10,10 +10,10 @@ import numpy as np
 from vsacli.actuators.antagonistic import Antagonistic, solve_deflections
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, IndexArray
-from vsacli.dynamics.inverse import command_of, elastic_torques, usual_block
+from vsacli.base.signals import STIFFNESS
+from vsacli.dynamics.inverse import elastic_torques, usual_block
 from vsacli.robot.model import Joint, Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, path_reason
-from vsacli.trajectory.curves import STIFFNESS
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -35,13 +35,15 @@ class Load:
 
     def at(self, instants: IndexArray | slice) -> Load:
         """Some of the instants."""
-        return Load(self.time[instants], Command(*(row[instants] for row in self.command)))
+        rows = {name: row[instants] for name, row in self.command.arrays().items()}
+        return Load(self.time[instants], Command.of(rows))
 
     def changed(self, stiffness: FloatArray | float, *rates: FloatArray) -> Load:
         """The same with something added to the stiffness and, if given, to its rate and second derivative."""
-        changes = dict(zip(STIFFNESS.names, (stiffness, *rates), strict=False))
-        sums = {name: getattr(self.command, name) + change for name, change in changes.items()}
-        return replace(self, command=self.command._replace(**sums))
+        commanded = dict(self.command.commanded)
+        for name, change in zip(STIFFNESS.names, (stiffness, *rates), strict=False):
+            commanded[name] = commanded[name] + change
+        return replace(self, command=self.command._replace(commanded=commanded))
 
 
 def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int]) -> list[Load]:
@@ -50,14 +52,15 @@ def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int]) -> list
     Every second instant, from the first on, is a step.
     """
     instants = 2 * trajectory.samples - 1
-    time, rows = np.empty(instants), np.empty((len(joints), len(Command._fields), instants))
+    names = Command.names()
+    time, rows = np.empty(instants), np.empty((len(joints), len(names), instants))
     samples = usual_block(len(robot.joints))
     for start in range(0, trajectory.samples, samples):
         steps = trajectory.block(start, start + samples + 1)
         middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
         for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
             _fill(robot, motion, joints, time[first:], rows[:, :, first:])
-    return [Load(time, Command(*of_joint)) for of_joint in rows]
+    return [Load(time, Command.of(dict(zip(names, of_joint, strict=True)))) for of_joint in rows]
 
 
 def _fill(robot: Robot, motion: Motion, joints: list[int], time: FloatArray, rows: FloatArray) -> None:
@@ -68,7 +71,7 @@ def _fill(robot: Robot, motion: Motion, joints: list[int], time: FloatArray, row
     commanded = {**motion.variables(), **elastic_torques(robot, motion)}
     time[places] = motion.time
     for row, joint in zip(rows, joints, strict=True):
-        row[:, places] = np.stack(command_of(joint, commanded))
+        row[:, places] = np.stack([commanded[name][:, joint] for name in Command.names()])
 
 
 class Range(NamedTuple):
@@ -115,7 +118,7 @@ def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -
         near_singular: the margin m.
     """
     actuator = variable_stiffness_actuator(joint)
-    corridor = solve_deflections(actuator, command.tau_e, command.stiffness)
+    corridor = solve_deflections(actuator, command.tau_e, command.commanded["stiffness"])
     least, most = joint.limits.stiffness
     low = np.maximum(corridor.lower / (1 - near_singular), least)
     high = np.minimum(corridor.upper / (1 + near_singular), most)
@@ -134,8 +137,8 @@ def _deflection_ceiling(actuator: Antagonistic, command: Command, lower: FloatAr
     kept, broken = np.zeros_like(lower), np.ones_like(lower)
     for _ in range(BISECTIONS):
         share = (kept + broken) / 2
-        stiffness = lower + command.stiffness * share / (1 - share)
+        stiffness = lower + command.commanded["stiffness"] * share / (1 - share)
         solution = solve_deflections(actuator, command.tau_e, stiffness)
         within = np.all(np.abs([solution.phi_1, solution.phi_2]) <= limits, axis=0)
         kept, broken = np.where(within, share, kept), np.where(within, broken, share)
-    return lower + command.stiffness * kept / (1 - kept)
+    return lower + command.commanded["stiffness"] * kept / (1 - kept)

@@ -13,11 +13,13 @@ import numpy as np
 
 from vsacli.base.atomic_files import AtomicFile, check_target, reporting_storage_errors
 from vsacli.base.errors import InputError
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.wrench import wrench_columns
 from vsacli.dynamics.inverse import usual_block
-from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH, Constant, RestToRest, Signal
+from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.file import FORMAT
-from vsacli.trajectory.trajectory import Profile, Trajectory
+from vsacli.trajectory.profile import Profile
+from vsacli.trajectory.trajectory import Trajectory
 
 
 def fixed_paths(path: str | Path) -> tuple[Path, Path]:
@@ -75,7 +77,7 @@ def _document(trajectory: Trajectory, table: str) -> str:
         f"format: {FORMAT}",
         f"name: {json.dumps(trajectory.name)}",
         f"position: {{{_declaration(trajectory.position, table)}}}",
-        f"stiffness: {{{_declaration(trajectory.stiffness, table)}}}",
+        *(f"{key}: {{{_declaration(profile, table)}}}" for key, profile in trajectory.commanded.items()),
     ]
     if trajectory.wrench is not None:
         declaration = _declaration(trajectory.wrench.profile, table)
@@ -103,7 +105,7 @@ def _numbers(values: Sequence[float]) -> str:
 
 def _write_table(trajectory: Trajectory, joint_names: Sequence[str], stream: TextIO) -> None:
     names = [name for signal in _recorded(trajectory) for name in signal.names]
-    chosen = dict.fromkeys(STIFFNESS.names, trajectory.stiffened)
+    chosen = {name: trajectory.chosen(key) for key, signal in COMMANDED.items() for name in signal.names}
     headers = [np.array(_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *np.concatenate(headers).tolist()])
@@ -117,7 +119,8 @@ def _write_table(trajectory: Trajectory, joint_names: Sequence[str], stream: Tex
 
 def _recorded(trajectory: Trajectory) -> Iterator[Signal]:
     """The signals that are not declared as formulas."""
-    profiles = {POSITION: trajectory.position, STIFFNESS: trajectory.stiffness}
+    profiles = {POSITION: trajectory.position}
+    profiles |= {COMMANDED[key]: profile for key, profile in trajectory.commanded.items()}
     if trajectory.wrench is not None:
         profiles[WRENCH] = trajectory.wrench.profile
     for signal, profile in profiles.items():

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import replace
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, IndexArray, evenly
-from vsacli.base.wrench import Wrench
+from vsacli.base.arrays import IndexArray, evenly
+from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed
-from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -27,9 +24,6 @@ WATCHED_STEPS = 1000
 
 FIRST_STEPS = 20
 """How many of them are tried at many factors before the scan, and how many of those refused even at rest."""
-
-ORDERS = {name: order for signal in (POSITION, STIFFNESS) for order, name in enumerate(signal.names)}
-"""Order of derivation of each array of a motion."""
 
 FACTORS_AT_ONCE = 64
 """Factors that are tried at once."""
@@ -113,7 +107,7 @@ def _stride(number: int) -> int:
 
 def _slowed(motion: Motion, factor: float) -> Motion:
     """The same steps passed more slowly, at rest if the factor is infinite; their times are kept."""
-    return _mapped(motion, lambda array, order: array / factor**order)
+    return motion.mapped(motion.time, lambda array, order: array / factor**order)
 
 
 def _evenly_chosen(trajectory: Trajectory) -> Motion:
@@ -123,26 +117,13 @@ def _evenly_chosen(trajectory: Trajectory) -> Motion:
 
 
 def _select(motion: Motion, steps: IndexArray) -> Motion:
-    return replace(_mapped(motion, lambda array, _: array[steps]), time=motion.time[steps])
-
-
-def _mapped(motion: Motion, function: Callable[[FloatArray, int], FloatArray]) -> Motion:
-    """The motion with a function applied to each array but the times, and to its order of derivation."""
-    arrays: dict[str, Any] = {name: function(getattr(motion, name), order) for name, order in ORDERS.items()}
-    return replace(motion, **arrays, wrench=motion.wrench and motion.wrench.mapped(function))
+    return motion.mapped(motion.time[steps], lambda array, _: array[steps])
 
 
 def _joined(motions: Iterable[Motion]) -> Motion:
-    first, *others = motions
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in (first, *others)]) for name in ("time", *ORDERS)
-    }
-    return replace(first, **arrays, wrench=first.wrench and _joined_wrenches([first, *others]))
-
-
-def _joined_wrenches(motions: list[Motion]) -> Wrench:
-    first, *others = (motion.wrench for motion in motions if motion.wrench is not None)
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in (first, *others)]) for name in WRENCH.names
-    }
-    return replace(first, **arrays)
+    parts = list(motions)
+    variables = [part.variables() for part in parts]
+    arrays = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
+    last = parts[-1].wrench
+    wrench = last and Wrench(*(arrays[name] for name in WRENCH_NAMES), frame=last.frame)
+    return Motion.of(arrays["time"], arrays, wrench)

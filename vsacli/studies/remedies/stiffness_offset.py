@@ -53,7 +53,7 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
 def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, float]:
     """Smallest and largest offset that the corridor and the limits of stiffness and deflection admit."""
     admissible = checked_range(acceptance, joint, load)
-    asked = load.command.stiffness
+    asked = load.command.commanded["stiffness"]
     rise, fall = admissible.low - asked, admissible.high - asked
     first, last = int(rise.argmax()), int(fall.argmin())
     if rise[first] > fall[last]:
@@ -71,7 +71,7 @@ class Offsets:
 
     def __init__(self, acceptance: Acceptance, joint: Joint, load: Load, sign: int) -> None:
         self._acceptance, self._joint, self._load, self._sign = acceptance, joint, load, sign
-        self._softest = float(load.command.stiffness.min())
+        self._softest = float(load.command.commanded["stiffness"].min())
         self._exponent = math.floor(math.log10(self._softest)) - OFFSET_DIGITS
         self._watched = evenly(len(load.time), WATCHED_STEPS)
 

@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import STIFFNESS
 from vsacli.robot.model import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, stiffness_text
 from vsacli.studies.remedies.admissible_stiffness import (
@@ -19,7 +20,6 @@ from vsacli.studies.remedies.admissible_stiffness import (
     variable_stiffness_actuator,
 )
 from vsacli.studies.remedies.nearest_spline import DEGREE, Bounds, NoSplineError, nearest_spline
-from vsacli.trajectory.curves import STIFFNESS
 from vsacli.trajectory.fits import INTERPOLATE
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
@@ -107,7 +107,7 @@ def _change(
     if near_singular >= 1:
         return None
     admissible = admissible_stiffness(joint, load.command, near_singular)
-    asked = load.command.stiffness
+    asked = load.command.commanded["stiffness"]
     bounds = _clear(load.time, admissible.low - asked, admissible.high - asked)
     if np.any(bounds.low > bounds.high):
         return None
@@ -131,7 +131,7 @@ def _clear(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
 def _smoothing_time(joint: Joint, load: Load) -> float:
     """sqrt(B/sigma): the motors follow slower changes with little torque of inertia; at least three steps."""
     inertia = max(motor.at_joint.inertia for motor in variable_stiffness_actuator(joint).motor)
-    resonance = math.sqrt(inertia / float(load.command.stiffness.min()))
+    resonance = math.sqrt(inertia / float(load.command.commanded["stiffness"].min()))
     step = float(np.median(np.diff(load.time[::2])))
     return min(max(resonance, 3 * step), float(load.time[-1] - load.time[0]))
 
@@ -159,7 +159,7 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
             steps, (3, steps), N m/rad (N/m) per s^k.
     """
     time = trajectory.times.block(0, trajectory.samples)
-    rows = trajectory.stiffness.samples(0, trajectory.samples, time).copy()
+    rows = trajectory.commanded[STIFFNESS.key].samples(0, trajectory.samples, time).copy()
     for joint, change in changes.items():
         rows[:, joint] += change
     values, *derivatives = rows
@@ -167,8 +167,8 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
     record = Samples(
         signal=STIFFNESS, time=time, values=values, derivatives=tuple(derivatives), labels=labels
     )
-    stiffness = SampledProfile.of(record, INTERPOLATE)
+    commanded = {**trajectory.commanded, STIFFNESS.key: SampledProfile.of(record, INTERPOLATE)}
     name = f"{trajectory.name}-fixed"
     return Trajectory(
-        RecordedTimes(time), trajectory.position, stiffness, wrench=trajectory.wrench, name=name
+        RecordedTimes(time), trajectory.position, commanded, wrench=trajectory.wrench, name=name
     )

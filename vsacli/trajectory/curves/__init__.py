@@ -4,16 +4,11 @@ from vsacli.trajectory.curves.closed_form import ClosedForm
 from vsacli.trajectory.curves.constant import Constant
 from vsacli.trajectory.curves.curve_degrees import DEGREES, VIA_DEGREES
 from vsacli.trajectory.curves.rest_to_rest import RestToRest
-from vsacli.trajectory.curves.signals import POSITION, STIFFNESS, WRENCH, Signal
 
 __all__ = [
     "DEGREES",
-    "POSITION",
-    "STIFFNESS",
     "VIA_DEGREES",
-    "WRENCH",
     "ClosedForm",
     "Constant",
     "RestToRest",
-    "Signal",
 ]

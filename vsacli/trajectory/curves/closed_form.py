@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves.signals import Signal
+from vsacli.base.signals import Signal
 from vsacli.trajectory.times import stretch
 
 SHORTEST, LONGEST = 1e-30, 1e30

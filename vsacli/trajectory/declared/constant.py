@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vsacli.base import units
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.documents.fields import POSITIVE, PerJoint, check_fields, value, vector
-from vsacli.trajectory import curves as profiles
 from vsacli.trajectory.curves import Constant
 from vsacli.trajectory.declared.course import Course, Values, numbers
 from vsacli.trajectory.declared.framed import Framed
@@ -29,7 +29,7 @@ class Still(Course):
 class PositionConstant(Still):
     """The robot stands still."""
 
-    signal = profiles.POSITION
+    signal = POSITION
     value: tuple[float, ...] = value(PerJoint(units.POSITION), "position all the time")
 
 
@@ -37,7 +37,7 @@ class PositionConstant(Still):
 class StiffnessConstant(Still):
     """The same stiffness all the time."""
 
-    signal = profiles.STIFFNESS
+    signal = STIFFNESS
     value: Values = value(PerJoint(units.STIFFNESS), "stiffness all the time", check=POSITIVE)
 
 
@@ -45,5 +45,5 @@ class StiffnessConstant(Still):
 class WrenchConstant(Still, Framed):
     """The same wrench all the time."""
 
-    signal = profiles.WRENCH
+    signal = WRENCH
     value: tuple[float, ...] = vector(6, units.WRENCH, "wrench all the time, `[fx, fy, fz, mx, my, mz]`")

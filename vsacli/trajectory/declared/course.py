@@ -10,7 +10,8 @@ from typing import ClassVar, TypeAlias
 import numpy as np
 
 from vsacli.base.errors import FieldProblem, InputError
-from vsacli.trajectory.curves import ClosedForm, Signal
+from vsacli.base.signals import Signal
+from vsacli.trajectory.curves import ClosedForm
 
 SAME_TIME = 1e-9
 """Times whose difference is a smaller share than this are the same, but for rounding in a file."""

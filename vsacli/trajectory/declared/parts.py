@@ -11,8 +11,8 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
+from vsacli.base.signals import POSITION
 from vsacli.documents.fields import POSITIVE, PerJoint, check_fields, integer, number, value
-from vsacli.trajectory import curves as profiles
 from vsacli.trajectory.curves import ClosedForm, Constant, RestToRest
 from vsacli.trajectory.declared import degrees
 from vsacli.trajectory.declared.course import Course, same_time
@@ -71,7 +71,7 @@ class Dwell(_Timed):
 
     def placed(self, span: tuple[float, float], here: Position) -> Constant:
         """The profile over a span, in s, after a part that ends here."""
-        return Constant(signal=profiles.POSITION, span=span, value=here)
+        return Constant(signal=POSITION, span=span, value=here)
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class PolynomialPart(_Timed):
     def placed(self, span: tuple[float, float], here: Position) -> RestToRest:
         """The profile over a span, in s, after a part that ends here."""
         start = here if self.start is None else self.start
-        return RestToRest(signal=profiles.POSITION, span=span, degree=self.degree, start=start, end=self.end)
+        return RestToRest(signal=POSITION, span=span, degree=self.degree, start=start, end=self.end)
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vsacli.base import units
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.documents.fields import POSITIVE, PerJoint, check_fields, integer, value, vector
-from vsacli.trajectory import curves as profiles
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.declared import degrees
 from vsacli.trajectory.declared.course import Course, Values, numbers
@@ -33,7 +33,7 @@ class Polynomial(Course):
 class PositionPolynomial(Polynomial):
     """Rest to rest: all derivatives up to (degree-1)/2 vanish at both ends."""
 
-    signal = profiles.POSITION
+    signal = POSITION
     degree: int = integer(
         "degree of the polynomial; from 3 on if all joints are rigid", check=degrees.POSITION
     )
@@ -52,7 +52,7 @@ class RigidPositionPolynomial(PositionPolynomial):
 class StiffnessPolynomial(Polynomial):
     """From one stiffness to another: all derivatives up to (degree-1)/2 vanish at both ends."""
 
-    signal = profiles.STIFFNESS
+    signal = STIFFNESS
     degree: int = integer("degree of the polynomial, odd, 3 to 15", check=degrees.STIFFNESS)
     start: Values = value(PerJoint(units.STIFFNESS), "stiffness at the start", check=POSITIVE)
     end: Values = value(PerJoint(units.STIFFNESS), "stiffness at the end", check=POSITIVE)
@@ -62,7 +62,7 @@ class StiffnessPolynomial(Polynomial):
 class WrenchPolynomial(Polynomial, Framed):
     """From one wrench to another: all derivatives up to (degree-1)/2 vanish at both ends."""
 
-    signal = profiles.WRENCH
+    signal = WRENCH
     degree: int = integer("degree of the polynomial, odd, 3 to 15", check=degrees.WRENCH)
     start: tuple[float, ...] = vector(6, units.WRENCH, "wrench at the start, `[fx, fy, fz, mx, my, mz]`")
     end: tuple[float, ...] = vector(6, units.WRENCH, "wrench at the end")

@@ -11,8 +11,8 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InvalidRecordError
+from vsacli.base.signals import POSITION
 from vsacli.documents.fields import Items, OneOf, check_fields, value
-from vsacli.trajectory import curves as profiles
 from vsacli.trajectory.curves import ClosedForm
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.curves.piecewise import Chain, Jump
@@ -24,7 +24,7 @@ from vsacli.trajectory.declared.parts import PARTS, RIGID_PARTS, Dwell, Part
 class PositionSequence(Course):
     """Parts one after the other. Each begins as the one before ends, to the fourth derivative."""
 
-    signal = profiles.POSITION
+    signal = POSITION
     smoothness: ClassVar[int] = 4
     remedy: ClassVar[str] = (
         "the motion must be four times continuously differentiable, so that parts meet at rest:"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
+from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, check_fields, number, value
-from vsacli.trajectory import curves as profiles
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.declared.course import Course
 from vsacli.trajectory.times import MAX_STEPS
@@ -25,7 +25,7 @@ class PositionSinusoids(Course):
     Automation, 1997); t counts from the start. Without `ramp` it begins and ends in motion.
     """
 
-    signal = profiles.POSITION
+    signal = POSITION
     frequency: float = number(units.RATE, "frequency of the lowest harmonic, k = 1", check=POSITIVE)
     offset: tuple[float, ...] = value(PerJoint(units.POSITION), "position about which the joint moves")
     sine: tuple[tuple[float, ...], ...] = value(

@@ -9,6 +9,7 @@ from typing import Any
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
+from vsacli.base.signals import STIFFNESS, WRENCH
 from vsacli.documents.fields import (
     NON_NEGATIVE,
     POSITIVE,
@@ -21,7 +22,6 @@ from vsacli.documents.fields import (
     number,
     value,
 )
-from vsacli.trajectory import curves as profiles
 from vsacli.trajectory.curves.piecewise import Chain, stepwise
 from vsacli.trajectory.declared import degrees
 from vsacli.trajectory.declared.course import SAME_TIME, Course, Values, numbers
@@ -84,7 +84,7 @@ class Steps(Course):
 class StiffnessSteps(Steps):
     """Levels that are held, with rest-to-rest changes from each to the next."""
 
-    signal = profiles.STIFFNESS
+    signal = STIFFNESS
     degree: int = _degree()
     levels: tuple[Values, ...] = value(
         Items(PerJoint(units.STIFFNESS)), "stiffnesses, the first from the start on", check=POSITIVE
@@ -97,7 +97,7 @@ class StiffnessSteps(Steps):
 class WrenchSteps(Steps, Framed):
     """Levels that are held, with rest-to-rest changes from each to the next."""
 
-    signal = profiles.WRENCH
+    signal = WRENCH
     degree: int = _degree()
     levels: tuple[tuple[float, ...], ...] = value(
         Items(Vector(6, units.WRENCH)), "wrenches `[fx, fy, fz, mx, my, mz]`, the first from the start on"

@@ -11,6 +11,7 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.base.units import Quantity
 from vsacli.documents.fields import (
     NON_NEGATIVE,
@@ -22,7 +23,6 @@ from vsacli.documents.fields import (
     integer,
     value,
 )
-from vsacli.trajectory import curves as profiles
 from vsacli.trajectory.curves.via_points import ViaPoints, passing_shares
 from vsacli.trajectory.declared import degrees
 from vsacli.trajectory.declared.course import Course, Values, numbers
@@ -139,7 +139,7 @@ class PositionVia(Via):
     All derivatives up to (degree-1)/2 vanish at both ends, those up to degree-1 are continuous.
     """
 
-    signal = profiles.POSITION
+    signal = POSITION
     quantity = units.POSITION
     degree: int = integer(
         "degree of the spline; from 3 on if all joints are rigid", check=degrees.POSITION_VIA
@@ -166,7 +166,7 @@ class StiffnessVia(Via):
     All derivatives up to (degree-1)/2 vanish at both ends, those up to degree-1 are continuous.
     """
 
-    signal = profiles.STIFFNESS
+    signal = STIFFNESS
     quantity = units.STIFFNESS
     degree: int = integer("degree of the spline", check=degrees.STIFFNESS_VIA)
     points: tuple[Values, ...] = value(

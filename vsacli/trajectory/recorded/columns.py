@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, wrench_columns
-from vsacli.trajectory.curves import POSITION, STIFFNESS, WRENCH, Signal
 
 TIME = "time"
 JOINT_SIGNALS = (POSITION, STIFFNESS)

@@ -12,10 +12,10 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.signals import STIFFNESS, WRENCH, Signal
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
-from vsacli.trajectory.curves import WRENCH, Signal
 from vsacli.trajectory.recorded.columns import JOINT_SIGNALS, SIGNALS, Column, Layout, column_layout
 from vsacli.trajectory.recorded.samples import (
     SampledProfile,
@@ -165,7 +165,7 @@ def recorded_trajectory(
     return Trajectory(
         recording.times,
         position,
-        stiffness,
+        {STIFFNESS.key: stiffness},
         name=Path(path).stem,
         notes=recording.notes,
         sources=[recording.source],

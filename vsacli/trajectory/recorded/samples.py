@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from vsacli.base.arrays import BoolArray, FloatArray, by_joint
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves import Signal
+from vsacli.base.signals import Signal
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.fits import Fit, fit_samples, mismatches
 from vsacli.trajectory.fits.fit_text import describe, fit_sentences

@@ -1,0 +1,106 @@
+"""What is commanded over time: the motion, further signals of joints such as their stiffness, the wrench.
+
+Each signal is declared once; from that follow keys and columns of trajectory files, variables of results with
+their attributes, rows of kernels, and what commands carry. A further signal that joints can be commanded by
+is an entry of `COMMANDED`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from vsacli.base import units
+from vsacli.base.units import Quantity
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
+
+
+class Signal(NamedTuple):
+    """A function of time: a value, and the derivatives of it that are needed.
+
+    Attributes:
+        key: in trajectory files.
+        names: of the value and its derivatives, as in tables of samples and in results.
+        quantities: their units.
+        long_names: a few words on each.
+        meaning: what it is, for the documentation of trajectory files.
+        spline_degree: odd degree of the spline through recorded values.
+        positive: whether the value must be positive.
+        optional: whether a component may have no value, so that it is NaN all the time.
+        components: how many numbers a value has; None: one a joint.
+    """
+
+    key: str
+    names: tuple[str, ...]
+    quantities: tuple[Quantity, ...]
+    long_names: tuple[str, ...]
+    meaning: str
+    spline_degree: int
+    positive: bool = False
+    optional: bool = False
+    components: int | None = None
+
+    @property
+    def orders(self) -> int:
+        """Number of functions: the value and its derivatives."""
+        return len(self.names)
+
+
+POSITION = Signal(
+    key="position",
+    names=("q", "dq", "ddq", "d3q", "d4q"),
+    quantities=(units.POSITION, units.VELOCITY, units.JOINT_ACCELERATION, units.JERK, units.SNAP),
+    long_names=(
+        "commanded joint position",
+        "commanded joint velocity",
+        "commanded joint acceleration",
+        "commanded joint jerk",
+        "commanded joint snap",
+    ),
+    meaning="motion of the joints",
+    spline_degree=7,
+)
+
+STIFFNESS = Signal(
+    key="stiffness",
+    names=("stiffness", "dstiffness", "ddstiffness"),
+    quantities=(units.STIFFNESS, units.STIFFNESS_RATE, units.STIFFNESS_ACCELERATION),
+    long_names=(
+        "commanded joint stiffness",
+        "rate of the commanded stiffness",
+        "second derivative of the commanded stiffness",
+    ),
+    meaning="stiffness of the antagonistic joints",
+    spline_degree=5,
+    positive=True,
+    optional=True,
+)
+
+WRENCH = Signal(
+    key="wrench",
+    names=WRENCH_NAMES,
+    quantities=(units.WRENCH, units.WRENCH_RATE, units.WRENCH_ACCELERATION),
+    long_names=(
+        "wrench exerted on the end effector",
+        "rate of the wrench",
+        "second derivative of the wrench",
+    ),
+    meaning=(
+        "what the environment exerts on the end effector: force, and moment about the tool frame's origin"
+    ),
+    spline_degree=5,
+    components=len(WRENCH_AXES),
+)
+
+COMMANDED: dict[str, Signal] = {signal.key: signal for signal in (STIFFNESS,)}
+"""What joints can be commanded by besides their position, by key; its value bears the name of the key."""
+
+
+def commanded_names() -> tuple[str, ...]:
+    """Names of all commanded signals and their derivatives."""
+    return tuple(name for signal in COMMANDED.values() for name in signal.names)
+
+
+def orders_of_derivation() -> dict[str, int]:
+    """For each variable of the joints that is commanded, which derivative of its signal it is."""
+    signals = (POSITION, *COMMANDED.values())
+    return {name: order for signal in signals for order, name in enumerate(signal.names)}

@@ -1,0 +1,42 @@
+"""Rows of numbers by the name of the array that they belong to, instead of by their place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate, pairwise
+from typing import TypeVar
+
+from vsacli.base.arrays import AnyArray
+
+_Row = TypeVar("_Row")
+
+
+class Layout:
+    """Arrays whose entries lie one after the other, a row each, as a kernel takes and gives them.
+
+    Attributes:
+        shapes: of each array at one instant, by name, in the order of the rows.
+        size: number of rows.
+    """
+
+    def __init__(self, shapes: Mapping[str, tuple[int, ...]]) -> None:
+        self.shapes = dict(shapes)
+        ends = list(accumulate(map(math.prod, self.shapes.values()), initial=0))
+        self.size = ends[-1]
+        self._places = dict(zip(self.shapes, (slice(*place) for place in pairwise(ends)), strict=True))
+
+    def unpack(self, rows: Sequence[_Row]) -> dict[str, Sequence[_Row]]:
+        """The rows of each array; what lies beyond the last one is passed over."""
+        return {name: rows[place] for name, place in self._places.items()}
+
+    def arrays(self, rows: AnyArray) -> dict[str, AnyArray]:
+        """Each array in its shape, followed by what axes a row has."""
+        return {
+            name: rows[place].reshape(*self.shapes[name], *rows.shape[1:])
+            for name, place in self._places.items()
+        }
+
+    def pack(self, rows: Mapping[str, Iterable[_Row]]) -> list[_Row]:
+        """The rows of all arrays."""
+        return [row for name in self.shapes for row in rows[name]]

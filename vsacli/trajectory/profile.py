@@ -1,0 +1,65 @@
+"""A signal over time: what every kind of profile has, and the wrench in its frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.wrench import WRENCH_AXES, check_frame
+
+
+class Profile(Protocol):
+    """A function of time with one component a joint or axis, and its first derivatives."""
+
+    @property
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why the values, or some of them, may not be what was meant."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How they were understood, where that is not obvious."""
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """Ascending times between which the function is analytic; the first and last are its span."""
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+
+    def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
+        """The same at the steps start..stop-1, whose times are `time`; given columns pass through."""
+
+    def stretched(self, factor: float) -> Profile:
+        """The same course, slower by a factor, from the same first time on."""
+
+    def summary(self) -> dict[str, Any] | None:
+        """The spline that values at the steps come from, in JSON values; None if they come from none."""
+
+
+@dataclass(frozen=True)
+class WrenchProfile:
+    """What the environment exerts on the end effector, over time.
+
+    Attributes:
+        profile: force and moment about the origin of the tool frame, `WRENCH_AXES`, N and N m.
+        frame: along whose axes these are, "end_effector" or "base".
+    """
+
+    profile: Profile
+    frame: str = "end_effector"
+
+    def __post_init__(self) -> None:
+        check_frame(self.frame)
+        if self.profile.components != len(WRENCH_AXES):
+            expected = f"{len(WRENCH_AXES)} ({', '.join(WRENCH_AXES)})"
+            raise InputError.one(f"the wrench has {self.profile.components} components, not {expected}")
+
+    def stretched(self, factor: float) -> WrenchProfile:
+        """The same course, slower by a factor, from the same first time on."""
+        return replace(self, profile=self.profile.stretched(factor))
