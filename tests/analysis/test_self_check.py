@@ -100,7 +100,11 @@ def test_hardly_feasible_motions_pass(seed: int):
     trajectory = Trajectory(
         UniformTimes(span[1], 20 / span[1]),
         RestToRest(signal=POSITION, span=span, degree=9, start=tuple(start), end=tuple(end)),
-        RestToRest(signal=STIFFNESS, span=span, degree=5, start=(2000.0,) * 3, end=(9000.0,) * 3),
+        {
+            "stiffness": RestToRest(
+                signal=STIFFNESS, span=span, degree=5, start=(2000.0,) * 3, end=(9000.0,) * 3
+            )
+        },
         name="hasty",
     )
     assert_sound(inverse_dynamics(random_robot("RPR", seed), trajectory).report)
@@ -112,7 +116,7 @@ def test_standing_still_passes(duration: float):
     hold = Trajectory(
         UniformTimes(duration, 20 / duration),
         Constant(signal=POSITION, span=span, value=(0.3, 0.2, 0.1)),
-        Constant(signal=STIFFNESS, span=span, value=(850.0,) * 3),
+        {"stiffness": Constant(signal=STIFFNESS, span=span, value=(850.0,) * 3)},
         name="hold",
     )
     assert_sound(inverse_dynamics(vsa_3r(), hold).report)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from samples.signals import by_name
 from samples.springs import SPRINGS
 from subjects import motion, seven_joints
 from timing import medians
@@ -77,7 +78,7 @@ def _drive(joint: Joint, command: Command) -> None:
     """In passes, as the engine takes them."""
     for start in range(0, len(command.tau_e), SAMPLES_PER_PASS):
         part = slice(start, start + SAMPLES_PER_PASS)
-        drive(joint, Command(*(values[part] for values in command)))
+        drive(joint, Command.of({name: values[part] for name, values in command.arrays().items()}))
 
 
 def _command(actuator: Antagonistic, samples: int, share: float) -> Command:
@@ -88,7 +89,7 @@ def _command(actuator: Antagonistic, samples: int, share: float) -> Command:
     level = np.rint((len(levels) - 1) * _swinging(time, STIFFNESS_SWINGS)).astype(int)
     load = 2 * _swinging(time, LOAD_SWINGS) - 1
     tau_e = share * _largest_load(actuator, levels)[level] * load
-    return Command(still, still, still, levels[level], still, still, tau_e, still, still)
+    return Command(still, still, still, tau_e, still, still, by_name(levels[level], still, still))
 
 
 def _swinging(time: FloatArray, swings: int) -> FloatArray:

@@ -38,7 +38,7 @@ def trajectory_of(samples: int) -> Trajectory:
     """The motion of the arm at so many samples."""
     shipped = load_trajectory(SEVEN_JOINTS[1], seven_joints())
     times = UniformTimes(shipped.duration, (samples - 1) / shipped.duration)
-    return Trajectory(times, shipped.position, shipped.stiffness, name=shipped.name)
+    return Trajectory(times, shipped.position, shipped.commanded, name=shipped.name)
 
 
 def split(samples: int, repeats: int, engine: str) -> Stages:

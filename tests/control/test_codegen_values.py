@@ -15,6 +15,7 @@ from samples.springs import SPRINGS
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
+from vsacli.base.signals import POSITION
 from vsacli.base.variables import Block
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
@@ -23,7 +24,7 @@ from vsacli.control.gains import Gains
 from vsacli.control.linear_control import Integral
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import TORQUES, compute_block
-from vsacli.dynamics.link_torques import MOTION_NAMES, link_torques
+from vsacli.dynamics.link_torques import link_torques
 from vsacli.robot.model import Robot
 
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
@@ -99,7 +100,7 @@ def test_link_torques(types: str, tmp_path: Path) -> None:
     robot = random_robot(types, seed=3)
     function = link_torques_function(robot)
     command = commands(robot, 40, seed=1)
-    motion = {name: command[name] for name in MOTION_NAMES}
+    motion = {name: command[name] for name in POSITION.names}
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "double")(function, motion)
     for name, expected in zip(TORQUES, link_torques(robot, **motion), strict=True):
         np.testing.assert_allclose(found[name], expected, rtol=0, atol=CLOSE * np.abs(expected).max())

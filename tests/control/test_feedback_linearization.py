@@ -12,6 +12,7 @@ from oracles import pinocchio
 from samples.drives import motion
 from samples.plants import all_rigid, elastic, random_state, rigid, with_actuators
 from samples.robots import random_robot, vsa_3r
+from samples.signals import by_name
 
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.quadratic import Quadratic
@@ -36,7 +37,7 @@ def random_reference(robot: Robot, samples: int, seed: int, wrench: Wrench | Non
     shape = (samples, len(robot.joints))
     arrays = [rng.uniform(-1, 1, shape) * size for size in (2, 3, 9, 30, 90, 300, 500, 900)]
     arrays[5] += 1200
-    return Motion(np.arange(samples), *arrays, wrench=wrench)
+    return Motion(np.arange(samples), *arrays[:5], by_name(*arrays[5:]), wrench=wrench)
 
 
 def random_wrench(samples: int, frame: str) -> Wrench:
@@ -45,6 +46,8 @@ def random_wrench(samples: int, frame: str) -> Wrench:
 
 def at(record, index):
     """One sample of a record of arrays."""
+    if isinstance(record, Motion):
+        return record.mapped(record.time[index], lambda array, _: array[index])
     return dataclasses.replace(
         record, **{name: array[index] for name, array in vars(record).items() if array is not None}
     )
@@ -85,8 +88,8 @@ def test_the_decoupled_derivatives_are_the_linear_control(frame, mixed):
             # M^-1, and terms that cancel in these sums, cost four digits of sixteen, and some spare ones
             assert found == pytest.approx(torque[:, index], rel=1e-10, abs=1e-10 * np.abs(torque).max())
         if isinstance(joint.actuator, Antagonistic):
-            goals = reference.stiffness[:, index], reference.dstiffness[:, index]
-            v_sigma = reference.ddstiffness[:, index] + sum(
+            goals = reference.commanded["stiffness"][:, index], reference.commanded["dstiffness"][:, index]
+            v_sigma = reference.commanded["ddstiffness"][:, index] + sum(
                 map(weighted_error, GAINS.stiffness[0], goals, (stiffness, rate))
             )
             assert acceleration == pytest.approx(v_sigma, rel=1e-10, abs=1e-10 * np.abs(v_sigma).max())
@@ -147,7 +150,10 @@ def test_the_integral_enters_the_linear_control():
     shifted = dataclasses.replace(
         reference,
         d4q=reference.d4q + gains.position_integral * 0.02,
-        ddstiffness=reference.ddstiffness + gains.stiffness_integral * 3.0,
+        commanded={
+            **reference.commanded,
+            "ddstiffness": reference.commanded["ddstiffness"] + gains.stiffness_integral * 3.0,
+        },
     )
     integral = Integral(np.full((3, 2), 0.02), np.full((3, 2), 3.0))
     found = feedback_linearization(robot, state, reference, gains, integral)
@@ -164,9 +170,9 @@ def test_equal_quadratic_pairs_at_constant_stiffness_are_an_elastic_joint():
     double = with_actuators(single, {0: pair, 1: pair})
     state = random_state(single, 4, seed=4)
     reference = dataclasses.replace(
-        random_reference(single, 4, seed=2), stiffness=np.full((4, 2), 800.0),
-        dstiffness=np.zeros((4, 2)), ddstiffness=np.zeros((4, 2)),
-    )  # fmt: skip
+        random_reference(single, 4, seed=2),
+        commanded=by_name(np.full((4, 2), 800.0), np.zeros((4, 2)), np.zeros((4, 2))),
+    )
     apart = np.array([1, -1]) * 800 / (4 * 1500)  # (phi_1 - phi_2)/2 = sigma/(4 k)
     twins = dataclasses.replace(
         state, theta=state.theta[..., :1] + apart, dtheta=np.repeat(state.dtheta[..., :1], 2, axis=-1)
@@ -181,7 +187,7 @@ def test_stiff_elastic_joints_come_down_to_the_rigid_linearization_of_their_link
     soft = random_robot("RP", seed=7)
     rng = np.random.default_rng(0)
     q, dq, ddq, d3q, d4q = rng.uniform(-1, 1, (5, 3, 2))
-    command = Motion(np.arange(3), q, dq, ddq, d3q, d4q, *[np.full((3, 2), np.nan)] * 3)
+    command = Motion(np.arange(3), q, dq, ddq, d3q, d4q, by_name(*[np.full((3, 2), np.nan)] * 3))
     tau_e, dtau_e, _ = link_torques(soft, q, dq, ddq, d3q, d4q)
     stiff = with_actuators(soft, {0: rigid(2.0, 0.3), 1: rigid(2.0, 0.3)})
     empty = np.zeros((3, 2, 2))

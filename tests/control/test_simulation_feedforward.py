@@ -27,7 +27,7 @@ def test_feedforward_reproduces_the_tests_of_the_paper(name):
     robot = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")
     shipped = load_trajectory(REPOSITORY / "trajectories" / f"{name}.yaml", robot)
     times = UniformTimes(shipped.duration, 50)  # fewer samples; the integration is the same
-    trajectory = Trajectory(times, shipped.position, shipped.stiffness, name=name)
+    trajectory = Trajectory(times, shipped.position, shipped.commanded, name=name)
     simulation = simulate(robot, trajectory)
     past = simulation.history
     assert simulation.report.complete

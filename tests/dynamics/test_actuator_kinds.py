@@ -10,6 +10,7 @@ import pytest
 from oracles.pinocchio import build
 from samples.plants import all_rigid, elastic, rigid, with_actuators
 from samples.robots import MotionArrays, random_motion, random_robot, robot_of_ones
+from samples.signals import by_name
 
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
@@ -34,7 +35,7 @@ def computed(robot: Robot, motion: MotionArrays, stiffness: float = NAN) -> Bloc
     """A block of unrelated steps at a constant stiffness."""
     sigma = np.full_like(motion[0], stiffness)
     rates = np.zeros_like(sigma)
-    return compute_block(robot, Motion(np.arange(float(len(sigma))), *motion, sigma, rates, rates))
+    return compute_block(robot, Motion(np.arange(float(len(sigma))), *motion, by_name(sigma, rates, rates)))
 
 
 def gentle(robot: Robot, samples: int, seed: int) -> MotionArrays:
@@ -125,7 +126,7 @@ def test_a_pair_of_quadratic_springs_is_an_elastic_joint() -> None:
     rows = rng.uniform(-1, 1, (6, 200)) * np.array([[2], [3], [20], [100], [900], [9000]])
     q, dq, ddq, tau_e, dtau_e, ddtau_e = rows  # |tau_e| up to sigma^2/(4 k) = 136 N m can be carried
     still = np.zeros_like(q)
-    command = Command(q, dq, ddq, still + sigma, still, still, tau_e, dtau_e, ddtau_e)
+    command = Command(q, dq, ddq, tau_e, dtau_e, ddtau_e, by_name(still + sigma, still, still))
     two, one = (drive(dataclasses.replace(joint, actuator=actuator), command) for actuator in (pair, spring))
     assert not two.flags.any()
     # 1e-11: the accelerations of the two sides are larger than their mean
@@ -191,8 +192,8 @@ def limited(actuator: object, **limits: object) -> int:
     joint = dataclasses.replace(
         random_robot("R", seed=1).joints[0], actuator=actuator, limits=Limits(**limits)
     )
-    values = np.array([[0.1], [0.5], [0.0], [NAN], [NAN], [NAN], [30.0], [0.0], [0.0]])
-    return int(drive(joint, Command(*values)).flags[0])
+    values = np.array([[0.1], [0.5], [0.0], [30.0], [0.0], [0.0], [NAN], [NAN], [NAN]])
+    return int(drive(joint, Command(*values[:6], by_name(*values[6:]))).flags[0])
 
 
 @pytest.mark.parametrize("kind", [elastic(stiffness=900.0), rigid()], ids=["elastic", "rigid"])

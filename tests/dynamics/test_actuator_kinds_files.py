@@ -59,7 +59,7 @@ def trajectory(of: Robot, stiffness: str, position: str = POSITION) -> Trajector
 
 def commanded(of: Robot, stiffness: str) -> list[float | None]:
     """The stiffness in the middle, None where there is none."""
-    found = trajectory(of, stiffness).at(np.array([0.5])).stiffness[0]
+    found = trajectory(of, stiffness).at(np.array([0.5])).commanded["stiffness"][0]
     return [None if np.isnan(value) else value for value in found.tolist()]
 
 
@@ -200,15 +200,15 @@ def test_a_table_has_stiffness_columns_of_antagonistic_joints_alone(pattern: str
     q = [pattern.format(name="q", joint=joint, number=number) for number, joint in enumerate("abc", 1)]
     write_csv(*q, pattern.format(name="stiffness", joint="c", number=3))
     found = load_trajectory("move.csv", of)
-    assert found.stiffened.tolist() == [False, False, True]
-    np.testing.assert_allclose(found.block(0, 1).stiffness[0], [np.nan, np.nan, 903])
+    assert found.chosen("stiffness").tolist() == [False, False, True]
+    np.testing.assert_allclose(found.block(0, 1).commanded["stiffness"][0], [np.nan, np.nan, 903])
     assert inverse_dynamics(of, found).report.self_check.passed
 
 
 def test_columns_of_joints_that_take_no_stiffness_are_named_and_left() -> None:
     write_csv("a.q", "b.q", "c.q", "a.stiffness", "b.stiffness", "c.stiffness", "b.dstiffness")
     found = load_trajectory("move.csv", robot(RIGID, ELASTIC, ANTAGONISTIC))
-    assert found.stiffened.tolist() == [False, False, True]
+    assert found.chosen("stiffness").tolist() == [False, False, True]
     unused = "a.stiffness, b.stiffness, b.dstiffness; only antagonistic joints take a stiffness"
     assert found.notes == (f"move.csv: not used: {unused}",)
     assert found.warnings == (

@@ -221,7 +221,7 @@ def test_nothing_depends_on_the_blocks():
     regular = short_motion(3, rate=100, stiffness=(1900, 2100))
     whole = regular.block(0, regular.samples)
     time = whole.time + 0.003 * np.sin(7 * whole.time)  # unequal steps
-    trajectory = Trajectory.from_samples(time, whole.q, whole.stiffness)
+    trajectory = Trajectory.from_samples(time, whole.q, whole.commanded["stiffness"])
     expected = inverse_dynamics(robot, trajectory)
     for block_samples in (1, 2, 7, len(time) - 1):
         run = Run(robot, trajectory, block_samples=block_samples)

@@ -54,7 +54,7 @@ def recorded(samples: int, noise: float = 0.0) -> Trajectory:
     time = np.linspace(0, 2, samples)
     smooth = motion(end=(1275.0, 1275.0)).at(time)
     rough = noise * np.random.default_rng(5).standard_normal(smooth.q.shape)
-    return Trajectory.from_samples(time, smooth.q + rough, smooth.stiffness, fit="interpolate")
+    return Trajectory.from_samples(time, smooth.q + rough, smooth.commanded["stiffness"], fit="interpolate")
 
 
 @pytest.mark.parametrize(

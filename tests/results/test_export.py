@@ -11,6 +11,7 @@ import pytest
 from samples.results import python, random_block, write_result
 
 from vsacli.base.errors import InputError, StorageError
+from vsacli.base.variables import Block
 from vsacli.results import csv_export as export
 from vsacli.results.csv_export import UndefinedSamplesError, export_csv, export_csv_file
 from vsacli.results.store.reader import open_result
@@ -49,7 +50,7 @@ def without(block, name, *where):
     values = getattr(block, name).copy()
     for place in where:
         values[place] = np.nan
-    return dataclasses.replace(block, **{name: values})
+    return Block(**{**block.arrays(), name: values})
 
 
 def test_motor_torques_are_the_default(stored, block):
@@ -66,7 +67,7 @@ def test_floats_come_back_bit_for_bit(stored, block):
 
 def test_extreme_floats_come_back_bit_for_bit(stored, block):
     odd = np.tile([5e-324, -0.0, 1.7976931348623157e308, 0.1, np.inf, 1 / 3], SAMPLES)[: 2 * SAMPLES]
-    block = dataclasses.replace(block, tau_e=odd.reshape(SAMPLES, 2))
+    block = Block(**{**block.arrays(), "tau_e": odd.reshape(SAMPLES, 2)})
     text = np.array(rows(stored(block), ["tau_e"])[1:])[:, 1:]
     assert text.astype(float).tobytes() == block.tau_e.tobytes()
     assert text[1, 1] == "0.1"
@@ -119,12 +120,12 @@ def test_rates_that_are_not_possible(stored, block, rate, match):
 
 
 def test_times_with_six_decimals_have_a_rate(stored, block):
-    block = dataclasses.replace(block, time=np.round(np.arange(SAMPLES) / 300, 6))
+    block = Block(**{**block.arrays(), "time": np.round(np.arange(SAMPLES) / 300, 6)})
     assert len(rows(stored(block), rate=150)) == 1 + SAMPLES // 2 + 1
 
 
 def test_unequal_steps_have_no_rate(stored, block):
-    block = dataclasses.replace(block, time=block.time**2 + block.time)
+    block = Block(**{**block.arrays(), "time": block.time**2 + block.time})
     result = stored(block)
     assert len(rows(result)) == 1 + SAMPLES
     with pytest.raises(InputError, match=r"not equally spaced \(near t = 0\.1\d* s\); export without --rate"):

@@ -63,7 +63,7 @@ def commands(robot: Robot, samples: int, seed: int) -> dict[str, FloatArray]:
 
 
 def motion_of(arrays: dict[str, FloatArray]) -> Motion:
-    return Motion(time=np.zeros(len(arrays["q"])), **arrays)
+    return Motion.of(np.zeros(len(arrays["q"])), arrays)
 
 
 def clear(margin: FloatArray, shape: tuple[int, ...]) -> FloatArray:

@@ -41,9 +41,9 @@ def motion(
     whole = arm_motion((*start, 1.0), (*(end or start), 1.0), rate=rate)
     position, stiffness = (
         dataclasses.replace(profile, start=profile.start[:2], end=profile.end[:2])
-        for profile in (whole.position, whole.stiffness)
+        for profile in (whole.position, whole.commanded["stiffness"])
     )
-    return Trajectory(whole.times, position, stiffness, name="rest-to-rest")
+    return Trajectory(whole.times, position, {"stiffness": stiffness}, name="rest-to-rest")
 
 
 def integrated(robot: Robot, trajectory: Trajectory, tolerance: float = 1e-12) -> Result:
@@ -91,7 +91,7 @@ def dipping(floor: float) -> Trajectory:
     """The arm keeps still; joint 1, which carries nothing, reaches 2K = 800 N m/rad and up."""
     plain = motion()
     still = dataclasses.replace(plain.position, end=plain.position.start)
-    return Trajectory(plain.times, still, Dip(floor), name="dip")
+    return Trajectory(plain.times, still, {"stiffness": Dip(floor)}, name="dip")
 
 
 def softening() -> Trajectory:

@@ -73,9 +73,11 @@ def lower_by_preload(joint: Joint, tau_e: FloatArray) -> dict[str, FloatArray]:
 
 def command(**given: FloatArray | float) -> Command:
     """Steps that rest under no load at 850 N m/rad, except for what is given."""
-    rest = {**dict.fromkeys(Command._fields, 0.0), "stiffness": 850.0}
-    values = (np.atleast_1d(np.asarray({**rest, **given}[name], dtype=float)) for name in Command._fields)
-    return Command(*np.broadcast_arrays(*values))
+    values = {**dict.fromkeys(Command.names(), 0.0), "stiffness": 850.0, **given}
+    arrays = np.broadcast_arrays(
+        *(np.atleast_1d(np.asarray(value, dtype=float)) for value in values.values())
+    )
+    return Command.of(dict(zip(values, arrays, strict=True)))
 
 
 def motion(
@@ -91,6 +93,10 @@ def motion(
         RestToRest(
             signal=POSITION, span=span, degree=7, start=(0,) * 3, end=(math.pi / 2, math.pi / 4, -math.pi / 3)
         ),
-        RestToRest(signal=STIFFNESS, span=span, degree=3, start=stiffness, end=end_stiffness or stiffness),
+        {
+            "stiffness": RestToRest(
+                signal=STIFFNESS, span=span, degree=3, start=stiffness, end=end_stiffness or stiffness
+            )
+        },
         name="rest-to-rest",
     )

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from samples.robots import random_motion
+from samples.signals import by_name
 from vsacli.base.flags import Flag
 from vsacli.base.variables import Block
 from vsacli.base.wrench import Wrench
@@ -33,11 +34,13 @@ def demands(robot: Robot, samples: int, seed: int = 1, wrench: Wrench | None = N
     motion = MOTION_SCALE * np.array(random_motion(robot, samples, seed))
     rates = rng.uniform(-500, 500, (2, *motion[0].shape))
     time = np.arange(float(samples))
-    reach = compute_block(robot, Motion(time, *motion, np.ones_like(motion[0]), *rates, wrench=wrench))
+    reach = compute_block(
+        robot, Motion(time, *motion, by_name(np.ones_like(motion[0]), *rates), wrench=wrench)
+    )
     lower = np.nan_to_num(reach.stiffness_lower, nan=1.0)
     upper = np.minimum(np.nan_to_num(reach.stiffness_upper, nan=2.0), 5 * lower)
     share = rng.choice([0.2, 0.5, 0.9, 0.0, -0.1, 1e-6], lower.shape, p=[0.3, 0.3, 0.1, 0.1, 0.1, 0.1])
-    return Motion(time, *motion, lower + share * (upper - lower), *rates, wrench=wrench)
+    return Motion(time, *motion, by_name(lower + share * (upper - lower), *rates), wrench=wrench)
 
 
 def random_wrench(samples: int, frame: str) -> Wrench:

@@ -46,7 +46,7 @@ def rest_to_rest(
     return Trajectory(
         times,
         RestToRest(signal=POSITION, span=times.span, degree=7, start=start, end=end),
-        Constant(signal=STIFFNESS, span=times.span, value=values),
+        {"stiffness": Constant(signal=STIFFNESS, span=times.span, value=values)},
         name="test",
     )
 
@@ -124,7 +124,7 @@ def pushed(trajectory: Trajectory, frame: str = "base") -> Trajectory:
     return Trajectory(
         trajectory.times,
         trajectory.position,
-        trajectory.stiffness,
+        trajectory.commanded,
         wrench=WrenchProfile(push, frame),
         name="pushed",
     )

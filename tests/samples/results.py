@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,13 +78,11 @@ def random_block(samples: int, joints: int, rate: float = 1000.0) -> Block:
         return np.moveaxis(generator.standard_normal(shape), -1, 0)
 
     time = np.arange(samples) / rate
-    return Block(
-        time=time, **{field.name: values(field.name) for field in fields(Block) if field.name != "time"}
-    )
+    return Block(time=time, **{name: values(name) for name in VARIABLES if name != "time"})
 
 
 def part(block: Block, start: int, stop: int) -> Block:
-    return Block(**{field.name: getattr(block, field.name)[start:stop] for field in fields(Block)})
+    return Block(**{name: array[start:stop] for name, array in block.arrays().items()})
 
 
 def write_result(

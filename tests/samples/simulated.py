@@ -49,7 +49,7 @@ def short_motion(
     return Trajectory(
         UniformTimes(duration, rate),
         position,
-        RestToRest(signal=STIFFNESS, span=span, degree=3, start=low, end=high),
+        {"stiffness": RestToRest(signal=STIFFNESS, span=span, degree=3, start=low, end=high)},
         wrench=None if wrench is None else WrenchProfile(force, wrench),
         name="short",
     )
@@ -68,8 +68,9 @@ def mixed_3r() -> tuple[Robot, Robot]:
 def start_of(robot: Robot, paired: Robot, trajectory: Trajectory, error: InitialError) -> State:
     """State at the start, from that of the robot with pairs of springs everywhere: tau_e is the same."""
     command = trajectory.at(np.array([0.0]))
+    stiffness = command.commanded["stiffness"] + error.stiffness
     command = dataclasses.replace(
-        command, q=command.q + error.q, stiffness=command.stiffness + error.stiffness
+        command, q=command.q + error.q, commanded={**command.commanded, "stiffness": stiffness}
     )
     block = compute_block(paired, command)
     theta, dtheta = block.theta[0].copy(), block.dtheta[0].copy()

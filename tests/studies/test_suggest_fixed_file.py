@@ -23,15 +23,15 @@ from vsacli.trajectory.trajectory import Trajectory
 def still_and_soft():
     trajectory = rest_to_rest(1.0, 790.0, end=(0.0, 0.0, 0.0), rate=200)
     position = Constant(signal=POSITION, span=trajectory.times.span, value=(0.1, 1e-5, -2.0))
-    return Trajectory(trajectory.times, position, trajectory.stiffness, name="still: & 'soft'")
+    return Trajectory(trajectory.times, position, trajectory.commanded, name="still: & 'soft'")
 
 
 def samples_of(trajectory, *given):
     motion = trajectory.block(0, trajectory.samples)
-    columns = {name: getattr(motion, name) for name in given}
+    columns = {name: motion.of_joints[name] for name in given}
     if motion.wrench is not None:
         columns |= {"wrench": motion.wrench.wrench, "wrench_frame": motion.wrench.frame}
-    return Trajectory.from_samples(motion.time + 3.0, motion.q, motion.stiffness, **columns)
+    return Trajectory.from_samples(motion.time + 3.0, motion.q, motion.commanded["stiffness"], **columns)
 
 
 def through_points(trajectory):
@@ -41,7 +41,7 @@ def through_points(trajectory):
     position = ViaPoints(signal=POSITION, span=span, degree=9, shares=(0.0, 0.6, 1.0), points=points)
     push = stepwise(WRENCH, span, 5, [nothing, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)], [(0.1, 0.4)])
     return Trajectory(
-        trajectory.times, position, trajectory.stiffness, wrench=WrenchProfile(push, "base"), name="via"
+        trajectory.times, position, trajectory.commanded, wrench=WrenchProfile(push, "base"), name="via"
     )
 
 
@@ -95,7 +95,9 @@ def test_many_steps_are_written_block_by_block(tmp_path):
     path, _ = write_fixed(trajectory, robot.joint_names, tmp_path / "long.yaml")
     again = load_trajectory(path, robot)
     assert again.samples == 20_001
-    np.testing.assert_array_equal(again.block(0, 20_001).stiffness, [[850.0, 851.0, 850.0]] * 20_001)
+    np.testing.assert_array_equal(
+        again.block(0, 20_001).commanded["stiffness"], [[850.0, 851.0, 850.0]] * 20_001
+    )
 
 
 @pytest.mark.parametrize("existing", ["fixed.yaml", "fixed.csv"])

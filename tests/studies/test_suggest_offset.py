@@ -117,13 +117,13 @@ def test_motor_limit_takes_the_way_that_is_shorter(motor, duration):
 def test_steps_between_the_watched_ones_count():
     """Motor torque peaks where a given ddstiffness does, for one step of 8001."""
     motion = rest_to_rest(4.0, rate=2000).block(0, 8001)
-    columns = {name: getattr(motion, name).copy() for name in GIVEN}
+    columns = {name: motion.of_joints[name].copy() for name in GIVEN}
     columns["ddstiffness"][4003, BASE] = 40_000.0
-    trajectory = Trajectory.from_samples(motion.time, motion.q, motion.stiffness, **columns)
+    trajectory = Trajectory.from_samples(motion.time, motion.q, motion.commanded["stiffness"], **columns)
     robot = changed(BASE, motor={"max_torque": 100.0})
     found = offsets(robot, trajectory)["base"]
     stiffer = Trajectory.from_samples(
-        motion.time, motion.q, motion.stiffness + np.array([found, 0, 0]), **columns
+        motion.time, motion.q, motion.commanded["stiffness"] + np.array([found, 0, 0]), **columns
     )
     assert accepted(robot, stiffer, MARGIN)
     assert not accepted(robot, trajectory, MARGIN)

@@ -50,7 +50,10 @@ def stiffness_needed(robot, motion):
 
 def change(found, trajectory):
     steps = trajectory.samples
-    return found.trajectory.block(0, steps).stiffness - trajectory.block(0, steps).stiffness
+    return (
+        found.trajectory.block(0, steps).commanded["stiffness"]
+        - trajectory.block(0, steps).commanded["stiffness"]
+    )
 
 
 def bump(time, height, at, width):
@@ -123,7 +126,7 @@ def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, st
         assert 0 < joint.rms <= constants[joint.joint]
     moved = change(found, trajectory)
     motion = trajectory.block(0, trajectory.samples)
-    least = np.maximum(stiffness_needed(robot, motion) - motion.stiffness, 0)
+    least = np.maximum(stiffness_needed(robot, motion) - motion.commanded["stiffness"], 0)
     # where nothing is needed nothing is gained, and the excess is small: a few percent of the largest change
     assert np.mean(moved - least) < 0.15 * moved.max()
     assert moved.min() > -0.1 * moved.max()
@@ -141,7 +144,7 @@ def test_profile_and_its_derivatives_belong_together():
     motion = profile(vsa_3r(), trajectory).trajectory.block(0, trajectory.samples)
     step = 1e-3
     for values, rates in (("stiffness", "dstiffness"), ("dstiffness", "ddstiffness")):
-        value, rate = getattr(motion, values), getattr(motion, rates)
+        value, rate = motion.of_joints[values], motion.of_joints[rates]
         difference = (value[2:] - value[:-2]) / (2 * step)
         # second order in the step over pieces of 0.02 s, at whose ends the third derivative jumps
         np.testing.assert_allclose(difference, rate[1:-1], atol=0.03 * np.abs(rate).max())
@@ -151,7 +154,7 @@ def test_profile_holds_between_the_steps():
     robot, trajectory = vsa_3r(), rest_to_rest(0.5, rate=100)
     fixed = profile(robot, trajectory).trajectory
     motion = fixed.at(np.linspace(0, 0.5, 101))  # steps and the instants half-way
-    gap = motion.stiffness - stiffness_needed(robot, motion)
+    gap = motion.commanded["stiffness"] - stiffness_needed(robot, motion)
     # half-way the file is read as a spline through its steps, off by step^4/384 of the fourth derivative
     assert gap.min() > -0.02
 

@@ -124,13 +124,13 @@ def test_steps_between_the_watched_ones_count():
     duration, at = 0.5, 8123
     smooth = rest_to_rest(duration, 880.0, rate=40_000)
     motion = smooth.block(0, smooth.samples)
-    dip = np.zeros_like(motion.stiffness)
+    dip = np.zeros_like(motion.commanded["stiffness"])
     dip[at - 1 : at + 2, BASE] = -60.0
     trajectory = Trajectory.from_samples(
         motion.time,
         motion.q,
-        motion.stiffness + dip,
-        **{name: getattr(motion, name) for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")},
+        motion.commanded["stiffness"] + dip,
+        **{name: motion.of_joints[name] for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")},
     )
     robot = vsa_3r()
     assert slow_down(robot, smooth) < slow_down(robot, trajectory)
@@ -139,7 +139,7 @@ def test_steps_between_the_watched_ones_count():
 
 def test_recorded_steps_are_stretched():
     motion = rest_to_rest(0.5, rate=400).block(0, 201)
-    trajectory = Trajectory.from_samples(motion.time + 2.0, motion.q, motion.stiffness)
+    trajectory = Trajectory.from_samples(motion.time + 2.0, motion.q, motion.commanded["stiffness"])
     factor = slow_down(vsa_3r(), trajectory)
     slower = trajectory.stretched(factor)
     assert slower.times.span == (2.0, pytest.approx(2.0 + 0.5 * factor))
@@ -159,12 +159,18 @@ def test_wrench_between_the_watched_steps_counts():
     """A push one step long, in 8001 steps of which a thousand are watched at first."""
     motion = rest_to_rest(0.5, 870.0, rate=16_000).block(0, 8001)
     columns = {
-        name: getattr(motion, name) for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")
+        name: motion.of_joints[name] for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")
     }
     wrench, none = np.zeros((8001, 6)), np.zeros((8001, 6))
     wrench[2203, 3:] = -20.0
     trajectory = Trajectory.from_samples(
-        motion.time, motion.q, motion.stiffness, **columns, wrench=wrench, dwrench=none, ddwrench=none
+        motion.time,
+        motion.q,
+        motion.commanded["stiffness"],
+        **columns,
+        wrench=wrench,
+        dwrench=none,
+        ddwrench=none,
     )
     factor = slow_down(vsa_3r(), trajectory)
     assert factor > slow_down(vsa_3r(), rest_to_rest(0.5, 870.0, rate=16_000))

@@ -20,15 +20,19 @@ def polynomial(times):
     return Trajectory(
         times,
         RestToRest(signal=POSITION, span=(first, last), degree=7, start=(0.0, 1.0), end=(1.0, -1.0)),
-        RestToRest(signal=STIFFNESS, span=(first, last), degree=3, start=(850.0,) * 2, end=(900.0, 800.0)),
+        {
+            "stiffness": RestToRest(
+                signal=STIFFNESS, span=(first, last), degree=3, start=(850.0,) * 2, end=(900.0, 800.0)
+            )
+        },
         name="test",
     )
 
 
 def recorded(*given):
     motion = polynomial(RecordedTimes(2.0 + np.linspace(0, 1, 101) ** 1.1)).block(0, 101)
-    columns = {name: getattr(motion, name) for name in given}
-    return Trajectory.from_samples(motion.time, motion.q, motion.stiffness, **columns)
+    columns = {name: motion.of_joints[name] for name in given}
+    return Trajectory.from_samples(motion.time, motion.q, motion.commanded["stiffness"], **columns)
 
 
 @pytest.mark.parametrize(
@@ -48,9 +52,11 @@ def test_same_values_at_stretched_times_and_smaller_derivatives(trajectory):
     time = np.linspace(*trajectory.times.span, 57)[1:-1]
     before, after = trajectory.at(time), slower.at(first + FACTOR * (time - first))
     for name, order in ORDERS.items():
-        expected = getattr(before, name) / FACTOR**order
+        expected = before.of_joints[name] / FACTOR**order
         # rounding of time, amplified by the derivatives: 1e-16 times 1e8 for the spline's d4q
-        np.testing.assert_allclose(getattr(after, name), expected, atol=1e-7 * np.abs(expected).max() + 1e-12)
+        np.testing.assert_allclose(
+            after.of_joints[name], expected, atol=1e-7 * np.abs(expected).max() + 1e-12
+        )
 
 
 def test_uniform_steps_keep_their_rate():
@@ -67,7 +73,7 @@ def test_given_derivatives_are_scaled_at_the_steps():
     trajectory = recorded(*(name for name in NAMES if ORDERS[name]))
     before, after = trajectory.block(20, 40), trajectory.stretched(FACTOR).block(20, 40)
     for name, order in ORDERS.items():
-        np.testing.assert_array_equal(getattr(after, name), getattr(before, name) / FACTOR**order)
+        np.testing.assert_array_equal(after.of_joints[name], before.of_joints[name] / FACTOR**order)
 
 
 def test_factor_one_changes_nothing():

@@ -54,7 +54,7 @@ def test_times_that_are_not_given_are_derived_and_reported():
     assert "position: passes its via points at t = 0, 2, 4 s" in trajectory.notes
     assert "stiffness: passes its via points at t = 0, 2, 4 s" in trajectory.notes
     assert trajectory.warnings == ()
-    np.testing.assert_array_equal(trajectory.at(np.array([2.0])).stiffness, [[900, 8000]])
+    np.testing.assert_array_equal(trajectory.at(np.array([2.0])).commanded["stiffness"], [[900, 8000]])
 
 
 def test_of_many_derived_times_the_first_and_last_are_reported():
@@ -126,7 +126,9 @@ def test_stiffness_and_wrench_step_independently_of_the_motion():
     push = PUSH + "  times: [0.5]\n  transition: 0.25\n"
     trajectory = load(LASTING + VIA + STEPS + "  times: [1, 3]\n  transition: 1\n" + push)
     at = trajectory.at(np.array([0.0, 1.5, 2.5, 4.0]))
-    np.testing.assert_array_equal(at.stiffness, [[9000, 9000], [4950, 8500], [900, 8000], [9500, 9500]])
+    np.testing.assert_array_equal(
+        at.commanded["stiffness"], [[9000, 9000], [4950, 8500], [900, 8000], [9500, 9500]]
+    )
     np.testing.assert_array_equal(at.wrench.wrench, [[0] * 6, *[[1, 2, 3, 4, 5, 6]] * 3])
 
 
@@ -136,7 +138,7 @@ def test_joints_without_stiffness_have_none():
         Path("move.yaml").write_text(
             LASTING + STANDING + f"stiffness: {{type: via, degree: 5, times: [0, 1, 4], points: {points}}}\n"
         )
-        middle = load_trajectory("move.yaml", robot).at(np.array([1.0])).stiffness[0]
+        middle = load_trajectory("move.yaml", robot).at(np.array([1.0])).commanded["stiffness"][0]
         np.testing.assert_array_equal(middle, [np.nan, np.nan, 1000])
 
 
@@ -179,7 +181,7 @@ def test_the_recorded_motion_sets_the_duration_of_the_others():
     Path("motion.csv").write_text(f"time,arm.q,slide.q\n{rows}\n")
     position = "position: {type: csv, file: motion.csv}\n"
     trajectory = load(HEAD + position + STEPS + "  times: [0.5, 1.2]\n  transition: 0.5\n")
-    np.testing.assert_array_equal(trajectory.at(np.array([2.1])).stiffness, [[900, 8000]])
+    np.testing.assert_array_equal(trajectory.at(np.array([2.1])).commanded["stiffness"], [[900, 8000]])
     late = STEPS + "  times: [0.5, 1.8]\n  transition: 0.5\n"
     expected = "move.yaml: stiffness.times: the last change ends at 2.3 s, the trajectory at 2 s"
     assert problems(HEAD + position + late) == [expected]

@@ -55,7 +55,7 @@ def test_columns_are_read_bit_for_bit(csv, naming):
     np.testing.assert_array_equal(motion.time, TIME)
     for name in NAMES:
         expected = np.transpose([content[column] for column in naming(name)])
-        np.testing.assert_array_equal(getattr(motion, name), expected)
+        np.testing.assert_array_equal(motion.of_joints[name], expected)
 
 
 def test_order_of_columns_is_free(csv):

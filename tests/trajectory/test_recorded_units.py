@@ -65,7 +65,7 @@ def test_units_in_brackets_are_converted(separator):
     np.testing.assert_array_equal(found.time, TIME)  # 3 ms are 0.003 s, to the last bit
     np.testing.assert_allclose(found.q, motion(), rtol=1e-15)
     np.testing.assert_allclose(found.dq, motion(1), rtol=1e-15)
-    np.testing.assert_allclose(found.stiffness, stiffness(), rtol=1e-15)
+    np.testing.assert_allclose(found.commanded["stiffness"], stiffness(), rtol=1e-15)
 
 
 def test_units_of_a_wrench_are_forces_then_moments(robot):
@@ -135,11 +135,11 @@ def test_round_trip_of_an_analytic_motion(derivatives):
     trajectory = recorded_trajectory(write("m.csv", ["time", *names], TIME, *columns), JOINTS)
     found, inside = trajectory.block(0, 2001), slice(10, -10)
     np.testing.assert_array_equal(found.q, motion())
-    np.testing.assert_array_equal(found.stiffness, stiffness())
+    np.testing.assert_array_equal(found.commanded["stiffness"], stiffness())
     for order, name in enumerate(POSITION.names):
         # eps |q| times the gain of interpolation, some five standard deviations
         atol = 0.0 if derivatives else 5 * 37 * 3e-17 * 1000**order
-        np.testing.assert_allclose(getattr(found, name)[inside], motion(order)[inside], rtol=0, atol=atol)
+        np.testing.assert_allclose(found.of_joints[name][inside], motion(order)[inside], rtol=0, atol=atol)
     assert trajectory.warnings == () if derivatives else len(trajectory.warnings) == 2
 
 
@@ -221,7 +221,7 @@ def test_fit_in_the_file(robot):
     Path("m.yaml").write_text(text.replace("FIT", "interpolate"))
     trajectory = load_trajectory("m.yaml", robot)
     assert not trajectory.position.fit.exact.any()
-    assert trajectory.stiffness.fit.exact.all()
+    assert trajectory.commanded["stiffness"].fit.exact.all()
     Path("m.yaml").write_text(text.replace("FIT", "spline"))
     with pytest.raises(InputError, match=r"^m.yaml:4: fit: unknown word 'spline'; valid: lsq, interpolate"):
         load_trajectory("m.yaml", robot)

@@ -28,13 +28,13 @@ def polynomial(duration=2.0, rate=50.0, **options):
     times = UniformTimes(duration, rate)
     position = rest_to_rest(POSITION, 7, times.span, -0.5, 1.0)
     stiffness = rest_to_rest(STIFFNESS, 3, times.span, 850.0, 1200.0)
-    return Trajectory(times, position, stiffness, **{"name": "test", **options})
+    return Trajectory(times, position, {"stiffness": stiffness}, **{"name": "test", **options})
 
 
 def sampled(original, *given):
     motion = original.block(0, original.samples)
-    columns = {name: getattr(motion, name) for name in given}
-    return Trajectory.from_samples(motion.time, motion.q, motion.stiffness, **columns)
+    columns = {name: motion.of_joints[name] for name in given}
+    return Trajectory.from_samples(motion.time, motion.q, motion.commanded["stiffness"], **columns)
 
 
 def random_samples(count, joints=1):
@@ -52,8 +52,8 @@ def test_shapes_are_samples_joints_with_contiguous_samples():
     ):
         assert motion.time.shape == (5,)
         for name in NAMES:
-            assert getattr(motion, name).shape == (5, JOINTS)
-            assert getattr(motion, name).T.flags.c_contiguous
+            assert motion.of_joints[name].shape == (5, JOINTS)
+            assert motion.of_joints[name].T.flags.c_contiguous
 
 
 def test_block_is_the_function_at_the_steps():
@@ -63,10 +63,10 @@ def test_block_is_the_function_at_the_steps():
     np.testing.assert_array_equal(block.time, trajectory.times.block(90, 101))
     again = trajectory.at(block.time)
     for name in NAMES:
-        np.testing.assert_array_equal(getattr(block, name), getattr(again, name))
+        np.testing.assert_array_equal(block.of_joints[name], again.of_joints[name])
     assert block.time[-1] == 2.0
     np.testing.assert_array_equal(block.q[-1], [1.0, 2.0])
-    np.testing.assert_array_equal(block.stiffness[-1], [1200.0, 2400.0])
+    np.testing.assert_array_equal(block.commanded["stiffness"][-1], [1200.0, 2400.0])
 
 
 def test_warnings_and_notes_of_all_parts_and_sources_are_collected():
@@ -75,7 +75,7 @@ def test_warnings_and_notes_of_all_parts_and_sources_are_collected():
     firm = Constant(signal=STIFFNESS, span=times.span, value=(850.0,))
     source = Source("a.yaml", "0" * 64, "")
     trajectory = Trajectory(
-        times, still, firm, name="hold", warnings=["odd"], notes=["first"], sources=[source]
+        times, still, {"stiffness": firm}, name="hold", warnings=["odd"], notes=["first"], sources=[source]
     )
     assert trajectory.warnings == ("odd",)
     assert trajectory.notes == ("first", *times.notes)
@@ -89,7 +89,7 @@ def test_parts_have_the_same_joints():
     still = Constant(signal=POSITION, span=times.span, value=(0.0, 0.0, 0.0))
     firm = Constant(signal=STIFFNESS, span=times.span, value=(850.0,))
     with pytest.raises(InputError, match="the position has 3 joints, the stiffness 1"):
-        Trajectory(times, still, firm, name="test")
+        Trajectory(times, still, {"stiffness": firm}, name="test")
 
 
 @pytest.mark.parametrize("part", ["position", "stiffness"])
@@ -99,7 +99,7 @@ def test_parts_have_the_span_of_the_steps(part):
     still = Constant(signal=POSITION, span=spans["position"], value=(0.0,))
     firm = Constant(signal=STIFFNESS, span=spans["stiffness"], value=(850.0,))
     with pytest.raises(InputError, match=f"the {part} spans 0 to 2 s, the steps 0 to 1 s"):
-        Trajectory(times, still, firm, name="test")
+        Trajectory(times, still, {"stiffness": firm}, name="test")
 
 
 def test_samples_that_are_given_come_back_as_they_are():
@@ -109,7 +109,7 @@ def test_samples_that_are_given_come_back_as_they_are():
     for start, stop in [(0, 40), (40, 101)]:
         ours, theirs = copy.block(start, stop), original.block(start, stop)
         for name in ("time", *NAMES):
-            np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
+            np.testing.assert_array_equal(ours.variables()[name], theirs.variables()[name])
 
 
 def test_missing_derivatives_approach_the_true_ones():
@@ -124,11 +124,11 @@ def test_missing_derivatives_approach_the_true_ones():
     ours, theirs = copy.block(0, 401), original.block(0, 401)
     # a cubic stiffness is its own spline up to rounding, amplified by 1 / step^2
     for order, name in enumerate(STIFFNESS.names):
-        error = np.abs(getattr(ours, name) - getattr(theirs, name)).max()
+        error = np.abs(ours.of_joints[name] - theirs.of_joints[name]).max()
         assert error < 100 * EPS * 2400 * 200**order
     # so is a position of degree 7; rounding is amplified 850 times at the ends, inside 37 times
     for order, name in enumerate(POSITION.names):
-        error = np.abs(getattr(ours, name) - getattr(theirs, name))
+        error = np.abs(ours.of_joints[name] - theirs.of_joints[name])
         assert error.max() < 1000 * EPS * 3 * 200**order
         assert error[10:-10].max() < 100 * EPS * 3 * 200**order
 
@@ -137,14 +137,18 @@ def test_missing_derivatives_approach_the_true_ones():
 def test_recorded_and_closed_form_parts_mix(recorded):
     original = polynomial()
     whole = original.block(0, 101)
-    parts = {"position": original.position, "stiffness": original.stiffness}
-    signal, values = {"position": (POSITION, whole.q), "stiffness": (STIFFNESS, whole.stiffness)}[recorded]
+    parts = {"position": original.position, "stiffness": original.commanded["stiffness"]}
+    signal, values = {
+        "position": (POSITION, whole.q),
+        "stiffness": (STIFFNESS, whole.commanded["stiffness"]),
+    }[recorded]
     record = Samples.from_arrays(signal, whole.time, values, *[None] * (signal.orders - 1))
     parts[recorded] = SampledProfile.of(record)
-    mixed = Trajectory(RecordedTimes(whole.time), **parts, name="mixed")
+    position, stiffness = parts.values()
+    mixed = Trajectory(RecordedTimes(whole.time), position, {"stiffness": stiffness}, name="mixed")
     block = mixed.block(30, 60)
     for name in ("q", "stiffness"):
-        np.testing.assert_array_equal(getattr(block, name), getattr(whole, name)[30:60])
+        np.testing.assert_array_equal(block.of_joints[name], whole.of_joints[name][30:60])
     assert len(mixed.warnings) == 1
 
 
@@ -173,7 +177,7 @@ def test_check_points_keep_within_one_analytic_piece(samples, count):
     assert time.shape == reach.shape == (count,)
     assert np.all(np.diff(time) > 0) or samples < count
     assert np.all(reach > 0)
-    knots = np.concatenate([trajectory.position.breakpoints, trajectory.stiffness.breakpoints])
+    knots = np.concatenate([trajectory.position.breakpoints, trajectory.commanded["stiffness"].breakpoints])
     nearest = np.abs(knots[:, None] - time).min(axis=0)
     np.testing.assert_allclose(reach, nearest, rtol=1e-12)  # differences of times up to 45
     # no point is lost in a corner of its piece: it has at least half an even share
@@ -190,12 +194,12 @@ def test_differences_within_reach_confirm_the_derivatives():
         for name, derivative in pairwise(names):
             weights = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
             difference = (
-                sum(w * getattr(m, name) for w, m in zip(weights, stencil, strict=True)) / step[:, None]
+                sum(w * m.of_joints[name] for w, m in zip(weights, stencil, strict=True)) / step[:, None]
             )
-            peak = np.abs(getattr(stencil[4], name)).max()
+            peak = np.abs(stencil[4].of_joints[name]).max()
             # the formula is exact for degree 7: rounding of the values and of the times (up to 200) is left
-            bound = 20 * EPS * (peak + 200 * np.abs(getattr(stencil[4], derivative)).max()) / step.min()
-            np.testing.assert_allclose(difference, getattr(stencil[4], derivative), rtol=0, atol=bound)
+            bound = 20 * EPS * (peak + 200 * np.abs(stencil[4].of_joints[derivative]).max()) / step.min()
+            np.testing.assert_allclose(difference, stencil[4].of_joints[derivative], rtol=0, atol=bound)
 
 
 def test_from_samples_names_everything_that_does_not_fit():
@@ -243,10 +247,10 @@ import numpy as np
 from vsacli.trajectory.curves import Constant
 from vsacli.base.signals import POSITION
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory, no_stiffness
+from vsacli.trajectory.trajectory import Trajectory
 times = UniformTimes(7.0, 1.0)
 still = Constant(signal=POSITION, span=times.span, value=(0.0,))
-closed = Trajectory(times, still, no_stiffness(1, times), name="still")
+closed = Trajectory(times, still, {}, name="still")
 closed.block(0, 8), closed.check_points(3), closed.at(np.arange(8.0))
 assert "scipy" not in sys.modules
 Trajectory.from_samples(np.arange(8.0), np.zeros((8, 1)))

@@ -73,11 +73,11 @@ def test_polynomials(load):
     whole = trajectory.block(0, 201)
     assert whole.time[[0, -1]].tolist() == [0.0, 2.0]
     assert whole.q[[0, -1]].tolist() == [[0, 0], [math.radians(60), 0.2]]
-    assert whole.stiffness[[0, -1]].tolist() == [[900, 9000], [9500, 9500]]
-    for derivative in (whole.dq, whole.ddq, whole.d3q, whole.dstiffness):
+    assert whole.commanded["stiffness"][[0, -1]].tolist() == [[900, 9000], [9500, 9500]]
+    for derivative in (whole.dq, whole.ddq, whole.d3q, whole.commanded["dstiffness"]):
         assert not derivative[[0, -1]].any()
     assert whole.d4q[[0, -1]].all()  # degree 7 leaves the fourth derivative free
-    assert whole.ddstiffness[[0, -1]].all()  # and degree 3 the second
+    assert whole.commanded["ddstiffness"][[0, -1]].all()  # and degree 3 the second
 
 
 def test_constants(load):
@@ -86,7 +86,7 @@ def test_constants(load):
         0, 1001
     )
     assert (block.q == [math.pi / 2, 0.1]).all()
-    assert (block.stiffness == 9000).all()
+    assert (block.commanded["stiffness"] == 9000).all()
     assert not block.dq.any()
 
 
@@ -110,7 +110,7 @@ def test_both_recorded_in_one_file(load):
     block = trajectory.block(0, 8)
     assert block.time.tolist() == [0.0, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0]
     assert (block.q == values[:, 0]).all()
-    assert (block.stiffness == values[:, 1]).all()
+    assert (block.commanded["stiffness"] == values[:, 1]).all()
     assert [source.path for source in trajectory.sources] == ["move.yaml", "motion.csv"]
     assert any("dq, ddq, d3q, d4q come from a C6 spline through q" in w for w in trajectory.warnings)
 
@@ -129,7 +129,7 @@ def test_recorded_in_two_files_with_equal_times(load):
     position, stiffness = write_csv("motion.csv", "q"), write_csv("stiffness.csv", "stiffness", "q")
     trajectory = load(HEAD + RECORDED_POSITION + RECORDED_STIFFNESS.replace("motion", "stiffness"))
     assert (trajectory.block(0, 8).q == position[:, 0]).all()
-    assert (trajectory.block(0, 8).stiffness == stiffness[:, 0]).all()
+    assert (trajectory.block(0, 8).commanded["stiffness"] == stiffness[:, 0]).all()
     assert [source.path for source in trajectory.sources] == ["move.yaml", "motion.csv", "stiffness.csv"]
     assert "stiffness.csv: its columns of q are not used" in trajectory.notes
 
@@ -144,8 +144,8 @@ def test_recorded_in_two_files_with_other_times(load):
 def test_recorded_position_with_a_stiffness_polynomial_over_its_times(load):
     write_csv("motion.csv", "q", times=(1.0, 1.5, 1.75, 2.0, 2.5, 3.0, 3.5, 4.0))
     block = load(HEAD + RECORDED_POSITION + STIFFNESS).block(0, 8)
-    assert block.stiffness[[0, -1]].tolist() == [[900, 9000], [9500, 9500]]
-    assert block.stiffness[4].tolist() == [5200, 9250]  # 2.5 s is half-way
+    assert block.commanded["stiffness"][[0, -1]].tolist() == [[900, 9000], [9500, 9500]]
+    assert block.commanded["stiffness"][4].tolist() == [5200, 9250]  # 2.5 s is half-way
 
 
 def test_recorded_stiffness_with_a_position_polynomial_over_its_times(load):
@@ -162,7 +162,7 @@ def test_a_bare_table(robot):
     trajectory = load_trajectory("motion.CSV", robot)
     assert trajectory.name == "motion"
     assert (trajectory.block(0, 8).q == values[:, 0]).all()
-    assert (trajectory.block(0, 8).stiffness == values[:, 1]).all()
+    assert (trajectory.block(0, 8).commanded["stiffness"] == values[:, 1]).all()
 
 
 def test_a_bare_table_without_stiffness(robot):
@@ -274,7 +274,7 @@ def test_the_motion_of_the_paper_as_we_choose_it():
         last = trajectory.block(4000, 4001)
         assert last.time.tolist() == [4.0]
         assert last.q.tolist() == [[math.radians(90), math.radians(45), math.radians(-60)]]
-        ends[name] = (trajectory.block(0, 1).stiffness[0, 0], last.stiffness[0, 0])
+        ends[name] = (trajectory.block(0, 1).commanded["stiffness"][0, 0], last.commanded["stiffness"][0, 0])
     assert ends == {
         "rest_to_rest": (850, 1275),
         "rest_to_rest_soft": (850, 850),

@@ -25,7 +25,9 @@ def trajectory(wrench: WrenchProfile | None) -> Trajectory:
     """The 3R arm reaches out and stiffens within 2 s."""
     position = RestToRest(signal=POSITION, span=SPAN, degree=7, start=(0, 0, 0), end=(1.5, 0.7, -1))
     stiffness = RestToRest(signal=STIFFNESS, span=SPAN, degree=3, start=(850,) * 3, end=(1275,) * 3)
-    return Trajectory(UniformTimes(2.0, 100.0), position, stiffness, wrench=wrench, name="reach")
+    return Trajectory(
+        UniformTimes(2.0, 100.0), position, {"stiffness": stiffness}, wrench=wrench, name="reach"
+    )
 
 
 def pushed(frame: str) -> Trajectory:

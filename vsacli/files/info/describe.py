@@ -9,6 +9,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.signals import orders_of_derivation
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.files.file_kinds import FileKind, recognise
@@ -17,7 +18,6 @@ from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import open_stored
 from vsacli.robot.file import load_robot
-from vsacli.base.signals import orders_of_derivation
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
