@@ -96,6 +96,14 @@ def test_a_tendon_that_goes_slack_ends_the_run():
     assert np.abs(phi * [1, -1]).min() == pytest.approx(0, abs=1e-9)  # the event's root in deflection
 
 
+def test_feedforward_that_only_has_torques_at_the_start_ends_there():
+    simulation = simulate(vsa_3r(), motion((850.0,) * 3, (1275.0,) * 3, duration=0.1))
+    assert simulation.report.verdict == "infeasible"
+    assert "cannot be executed, so there are no torques to apply" in simulation.report.ending
+    assert simulation.history.time.tolist() == [0]
+    assert np.isfinite(simulation.history.tau_motor).all()
+
+
 @pytest.mark.slow
 def test_measured_positions_cost_accuracy_and_the_report_says_how_much():
     conditions = {"gains": GAINS, "initial_error": InitialError(0.01, 5)}

@@ -89,7 +89,8 @@ class Integrator:
                 atol=self._tolerances.atol,
             )
         self.evaluations += solution.nfev
-        reached, states = solution.t, solution.y.T
+        # Over no time at all, and where the first step fails, `solve_ivp` returns no states.
+        reached, states = (solution.t, solution.y.T) if len(solution.t) else (times[:1], start[None])
         if solution.status < 0:
             reason = "the motion became too fast to integrate"
             return reached, states, Ending(float(reached[-1]), reason)
