@@ -9,7 +9,7 @@ import pytest
 from samples.springs import residuals
 from scipy.optimize import brentq
 
-from vsacli.actuators.laws.cubic import AlikeCubics, Cubic
+from vsacli.actuators.laws.cubic import Cubic, CubicTwins
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.pairs.solver import IteratedPair
 from vsacli.base.arrays import FloatArray
@@ -97,16 +97,16 @@ def test_constants_must_be_positive(k: float, k_c: float):
 
 
 def test_closed_form_is_chosen_for_twins_only():
-    assert isinstance(make_pair(SPRING, Cubic(k=400, k_c=2000)), AlikeCubics)
+    assert isinstance(make_pair(SPRING, Cubic(k=400, k_c=2000)), CubicTwins)
     # The limit plays no part in (14).
-    assert isinstance(make_pair(SPRING, Cubic(k=400, k_c=2000, max_deflection=0.3)), AlikeCubics)
+    assert isinstance(make_pair(SPRING, Cubic(k=400, k_c=2000, max_deflection=0.3)), CubicTwins)
     assert isinstance(make_pair(SPRING, Cubic(k=400, k_c=2001)), IteratedPair)
     assert isinstance(make_pair(SPRING, Cubic(k=401, k_c=2000)), IteratedPair)
 
 
 def test_closed_form_is_what_iteration_finds():
     tau_e, stiffness = loads_and_demands(20_000, least_margin=1e-3)
-    closed = AlikeCubics(SPRING).solve(tau_e, stiffness)
+    closed = CubicTwins(SPRING).solve(tau_e, stiffness)
     iterated = IteratedPair(SPRING, SPRING).solve(tau_e, stiffness)
     for name in ("phi_1", "phi_2"):
         # Good to eps/margin = 2e-13 rad; deflections go up to 3 rad.
@@ -117,7 +117,7 @@ def test_closed_form_is_what_iteration_finds():
 
 
 @pytest.mark.parametrize(
-    "kind", [AlikeCubics, lambda spring: IteratedPair(spring, spring)], ids=["closed", "iterated"]
+    "kind", [CubicTwins, lambda spring: IteratedPair(spring, spring)], ids=["closed", "iterated"]
 )
 def test_solution_satisfies_14_down_to_the_smallest_margin(kind):
     tau_e, stiffness = loads_and_demands(20_000, least_margin=1e-9)
@@ -128,7 +128,7 @@ def test_solution_satisfies_14_down_to_the_smallest_margin(kind):
 
 def test_closed_form_lies_on_the_branch():
     tau_e, stiffness = loads_and_demands(100_000, least_margin=1e-9)
-    found = AlikeCubics(SPRING).solve(tau_e, stiffness)
+    found = CubicTwins(SPRING).solve(tau_e, stiffness)
     assert np.all(found.phi_1 >= found.phi_2)
     # More preload from there on never meets a critical point: the sign of det A is that of far out.
     product = found.phi_1 * found.phi_2
@@ -137,7 +137,7 @@ def test_closed_form_lies_on_the_branch():
 
 def test_corridor_is_that_of_both_families_of_folds():
     tau_e = np.concatenate([-np.geomspace(1e-300, 1e6, 300), [0], np.linspace(270, 280, 101)])
-    found = AlikeCubics(SPRING).solve(tau_e, np.full_like(tau_e, 850))
+    found = CubicTwins(SPRING).solve(tau_e, np.full_like(tau_e, 850))
     # A cube root and a square of the load in either way; brentq's rtol is 4 eps.
     np.testing.assert_allclose(found.lower, lowest_stiffness(tau_e), rtol=30 * EPS)
     assert np.all(np.isinf(found.upper))
@@ -148,7 +148,7 @@ def test_corridor_is_that_of_both_families_of_folds():
 def test_families_of_folds_meet_at_the_fold_load():
     assert pytest.approx(275.4, abs=0.05) == FOLD_LOAD
     tau_e = FOLD_LOAD * np.array([1 - 1e-9, 1, 1 + 1e-9])
-    lower = AlikeCubics(SPRING).solve(tau_e, np.full(3, 2000.0)).lower
+    lower = CubicTwins(SPRING).solve(tau_e, np.full(3, 2000.0)).lower
     # 4K; its slope over the relative load is of its own size.
     np.testing.assert_allclose(lower, 1600, rtol=2e-9)
     assert np.all(np.diff(lower) > 0)
@@ -161,14 +161,14 @@ def test_largest_load_is_that_of_the_stiffness(stiffness: float):
         largest = math.sqrt(2) * 400 * half_spread * (1 + (stiffness - 800) / 2400)
     else:
         largest = stiffness**1.5 / (3 * math.sqrt(6000))
-    found = AlikeCubics(SPRING).solve(np.array([largest, -largest]), np.full(2, stiffness))
+    found = CubicTwins(SPRING).solve(np.array([largest, -largest]), np.full(2, stiffness))
     # Relative to the stiffness; the formulas take a dozen roundings.
     np.testing.assert_allclose(found.lower, stiffness, rtol=30 * EPS)
 
 
 def test_folds_are_where_the_decoupling_matrix_is_singular():
     tau_e = np.array([0.0, 50, 200, 300, 1000, 5000])
-    found = AlikeCubics(SPRING).solve(tau_e, np.ones_like(tau_e))
+    found = CubicTwins(SPRING).solve(tau_e, np.ones_like(tau_e))
     first, second = found.phi_1, found.phi_2
     det_a = SPRING.stiffness(first) * SPRING.slope(second) - SPRING.stiffness(second) * SPRING.slope(first)
     scale = SPRING.stiffness(first) * SPRING.slope(np.abs(first) + np.abs(second))
@@ -178,6 +178,6 @@ def test_folds_are_where_the_decoupling_matrix_is_singular():
 
 def test_load_of_the_other_sign_swaps_and_turns_the_deflections():
     tau_e, stiffness = loads_and_demands(1000, least_margin=1e-6)
-    found, turned = (AlikeCubics(SPRING).solve(sign * tau_e, stiffness) for sign in (1, -1))
+    found, turned = (CubicTwins(SPRING).solve(sign * tau_e, stiffness) for sign in (1, -1))
     np.testing.assert_array_equal(found.phi_1, -turned.phi_2)
     np.testing.assert_array_equal(found.lower, turned.lower)

@@ -22,8 +22,8 @@ class Cubic(SpringLaw):
     k_c: float = number(units.CUBIC_STIFFNESS, "cubic coefficient Kc", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Closed for a twin, on the branch of equations (28)-(31)."""
-        return AlikeCubics(self) if other == self else None
+        """The closed pair of twins, on the branch of equations (28)-(31)."""
+        return CubicTwins(self) if other == self else None
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Equation (24)."""
@@ -53,7 +53,7 @@ class Cubic(SpringLaw):
 
 
 @dataclass(frozen=True)
-class AlikeCubics(Pair):
+class CubicTwins(Pair):
     """Two equal cubic springs, (28)-(31) without the angle: u = phi_1 + phi_2 solves a cubic equation."""
 
     spring: Cubic
@@ -67,15 +67,7 @@ class AlikeCubics(Pair):
         u = 2 * np.sqrt(demand / (3 * k_c)) * np.sin(np.arcsin(load) / 3)
         spread_squared = 2 * (demand - 2 * k) / (3 * k_c) - u * u
         spread = np.sqrt(np.maximum(spread_squared, 0))
-        return PairSolution(
-            lower=lower,
-            upper=np.full_like(tau_e, np.inf),
-            lower_critical=np.ones_like(tau_e, dtype=bool),
-            upper_critical=np.zeros_like(tau_e, dtype=bool),
-            slack_below=np.zeros_like(tau_e, dtype=bool),
-            phi_1=(u + spread) / 2,
-            phi_2=(u - spread) / 2,
-        )
+        return PairSolution.unbounded(lower, (u + spread) / 2, (u - spread) / 2, lower_critical=True)
 
     def _lowest_stiffness(self, load: FloatArray) -> FloatArray:
         """Outermost critical point: phi_1 = phi_2, or phi_1 phi_2 = K/(3 Kc) beyond its load."""

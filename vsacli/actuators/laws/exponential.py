@@ -22,13 +22,13 @@ class Exponential(Tendon):
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Closed with a tendon of the same a on side 2."""
+        """The closed pair with a tendon of the same a on side 2."""
         if isinstance(other, Mirrored) and isinstance(other.law, Exponential) and other.law.a == self.a:
             return ExponentialPair(self, other.law)
         return None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Each a times the one before, from the stiffness on."""
+        """Torque and stiffness, and the others each a times the one before."""
         torque = self.torque(phi)
         stiffness = self.a * (torque + self.c)
         return (torque, stiffness, self.a * stiffness, self.a**2 * stiffness)[: order + 1]

@@ -38,7 +38,7 @@ class FourBar(SpringLaw):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """Up to the stretched linkage, all but a millionth."""
+        """Deflections up to the stretched linkage, all but a millionth."""
         end = 2 * math.asin((1 - STRETCH_MARGIN) / self.ratio)
         return (-end, end)
 
@@ -126,7 +126,7 @@ class FourBar(SpringLaw):
 
 
 def _derivatives(k: float, beta: list[FloatArray]) -> tuple[FloatArray, ...]:
-    """Of k beta^2/2, from beta and its derivatives: as many as there are of these."""
+    """Derivatives of k beta^2/2 from beta and its derivatives: as many as there are of these."""
     k_beta, k_rate = k * beta[0], k * beta[1]
     derivatives = [k_beta * beta[1]]
     if len(beta) > 2:

@@ -31,7 +31,7 @@ REST_STIFFNESS_SHARE = 1e-3
 """Share of its mean stiffness that a spring which pushes and pulls has at rest, since sigma > 0 is needed."""
 
 LEAST_SHAPE_SIZE = float(np.finfo(float).tiny)
-"""Instead of the size of a shape between two measured deflections, which is zero at both."""
+"""Stands for the size of a shape that lies between two measured deflections and is zero at both."""
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,21 @@ class PairSolution(NamedTuple):
     phi_1: FloatArray
     phi_2: FloatArray
 
+    @classmethod
+    def unbounded(
+        cls, lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray, *, lower_critical: bool
+    ) -> PairSolution:
+        """A solution without upper end; the lower end is a critical point, or where a tendon goes slack."""
+        return cls(
+            lower=lower,
+            upper=np.full_like(lower, np.inf),
+            lower_critical=np.full_like(lower, lower_critical, dtype=bool),
+            upper_critical=np.zeros_like(lower, dtype=bool),
+            slack_below=np.full_like(lower, not lower_critical, dtype=bool),
+            phi_1=phi_1,
+            phi_2=phi_2,
+        )
+
     @property
     def deflections(self) -> FloatArray:
         """phi_1 and phi_2, (2, samples)."""
@@ -60,16 +75,8 @@ class Pair(ABC):
 
 
 def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> PairSolution:
-    """Solution of two tendons: slack below, unbounded above, singular nowhere.
+    """Solution of two tendons, which is singular nowhere.
 
     Deflections that rounding has made those of a tendon that pushes are zero.
     """
-    return PairSolution(
-        lower=lower,
-        upper=np.full_like(lower, np.inf),
-        lower_critical=np.zeros_like(lower, dtype=bool),
-        upper_critical=np.zeros_like(lower, dtype=bool),
-        slack_below=np.ones_like(lower, dtype=bool),
-        phi_1=np.maximum(phi_1, 0),
-        phi_2=np.minimum(phi_2, 0),
-    )
+    return PairSolution.unbounded(lower, np.maximum(phi_1, 0), np.minimum(phi_2, 0), lower_critical=False)

@@ -29,7 +29,7 @@ class Polynomial(SpringLaw):
 
     @cached_property
     def _coefficients(self) -> tuple[float, ...]:
-        """Of phi, phi^3, ... up to the last that is not zero."""
+        """Coefficients of phi, phi^3, ... up to the last that is not zero."""
         coefficients = (self.c1, self.c3, self.c5, self.c7, self.c9)
         return coefficients[: max(index for index, each in enumerate(coefficients, start=1) if each)]
 
@@ -39,7 +39,7 @@ class Polynomial(SpringLaw):
         return len(self._coefficients) == 1
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Even power series, and odd ones in turn, which share the square."""
+        """Derivatives as power series, odd and even in turn, which share the square."""
         squared = phi * phi
         even = [self._derivative(each, squared) for each in range(order + 1)]
         return tuple(value if each % 2 else phi * value for each, value in enumerate(even))
@@ -86,7 +86,7 @@ class Polynomial(SpringLaw):
 
     @cached_property
     def _factors(self) -> list[list[float]]:
-        """Coefficients of each derivative."""
+        """Coefficients of the torque and of each derivative."""
         return [
             [math.perm(2 * n + 1, order) * each for n, each in enumerate(self._coefficients)][order // 2 :]
             for order in range(4)

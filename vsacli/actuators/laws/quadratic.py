@@ -21,11 +21,11 @@ class Quadratic(Tendon):
     k: float = number(units.QUADRATIC_STIFFNESS, "quadratic coefficient k", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Closed for twins."""
+        """The closed pair of twins."""
         return QuadraticTwins(self) if other == self.as_second() else None
 
     def hardening(self, phi: FloatArray) -> FloatArray:
-        """Hardening 1/phi, infinite where it goes slack."""
+        """Hardening 1/phi, infinite where the tendon goes slack."""
         with np.errstate(divide="ignore"):
             return 1 / np.abs(phi)
 
@@ -42,7 +42,7 @@ class Quadratic(Tendon):
         return np.where(np.isnan(phi), np.nan, 2 * self.k)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
-        """No curvature."""
+        """Curvature zero."""
         return np.zeros_like(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:

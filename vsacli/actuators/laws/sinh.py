@@ -22,11 +22,11 @@ class Sinh(SpringLaw):
     a: float = number(units.INVERSE_POSITION, "inverse deflection scale a", check=POSITIVE)
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
-        """Closed where both sides have the same a."""
+        """The closed pair of two springs of the same a."""
         return SinhPair(self, other) if isinstance(other, Sinh) and other.a == self.a else None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Of the torque and the stiffness in turn, from one exponential function."""
+        """Torque and stiffness from one exponential function, and a^2 times either."""
         grown = np.expm1(np.abs(self.a * phi))
         shrunk = 1 / (1 + grown)
         half = self.k / 2 * grown
@@ -86,12 +86,4 @@ class SinhPair(Pair):
             phi_1 = self.first.deflection(tau_e - self.second.torque(phi_2))
         elif k_2 < k_1:
             phi_2 = self.second.deflection(tau_e - self.first.torque(phi_1))
-        return PairSolution(
-            lower=lower,
-            upper=np.full_like(tau_e, np.inf),
-            lower_critical=np.ones_like(tau_e, dtype=bool),
-            upper_critical=np.zeros_like(tau_e, dtype=bool),
-            slack_below=np.zeros_like(tau_e, dtype=bool),
-            phi_1=phi_1,
-            phi_2=phi_2,
-        )
+        return PairSolution.unbounded(lower, phi_1, phi_2, lower_critical=True)

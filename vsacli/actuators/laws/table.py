@@ -88,11 +88,11 @@ class MeasuredSpring(SpringLaw):
         return np.where(slack, np.inf, slope / np.where(slack, 1.0, stiffness))
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
-        """Of the fitted curve, looked up once."""
+        """Derivatives of the fitted curve, whose piece is looked up once."""
         return self._curve(phi, 1, order + 1)
 
     def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Of the fitted curve, looked up once."""
+        """Energy and state of the fitted curve, whose piece is looked up once."""
         energy, *derivatives = self._curve(phi, 0, 4)
         return energy, SpringState(*derivatives)
 

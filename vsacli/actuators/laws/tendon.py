@@ -16,12 +16,12 @@ class Tendon(SpringLaw):
 
     @property
     def domain(self) -> tuple[float, float]:
-        """From slack upward."""
+        """Deflections from slack upward."""
         return (0.0, math.inf)
 
     @property
     def torque_range(self) -> tuple[float, float]:
-        """From slack upward."""
+        """Torques from slack upward."""
         return (0.0, math.inf)
 
     @property
