@@ -172,7 +172,7 @@ def _robot_row(example: Example) -> tuple[str, ...]:
         f"[{example.name}](../robots/{example.path.name})",
         "".join("R" if joint.is_revolute else "P" for joint in joints),
         ", ".join(f"{count} {kind}" for kind, count in kinds.items()),
-        ", ".join(f"[{motion.name}](../trajectories/{motion.path.name})" for motion in example.motions),
+        ", ".join(f"[{each.name}](../trajectories/{each.path.name})" for each in example.trajectories),
     )
 
 

@@ -15,29 +15,29 @@ from samples.marks import slow
 from vsacli import inverse_dynamics, load_trajectory
 from vsacli.base.errors import InputError, StorageError
 from vsacli.files import examples as module
-from vsacli.files.examples import Example, Motion, copy_examples, examples
+from vsacli.files.examples import Example, ExampleTrajectory, copy_examples, examples
 
 EXAMPLES = examples()
-RUNS = [(example, motion) for example in EXAMPLES for motion in example.motions]
-RUN_NAMES = [f"{example.name} {motion.name}" for example, motion in RUNS]
+RUNS = [(example, trajectory) for example in EXAMPLES for trajectory in example.trajectories]
+RUN_NAMES = [f"{example.name} {trajectory.name}" for example, trajectory in RUNS]
 QUICK = ("mixed_3r", "tendon_1r")
 """Examples that every command takes soon; together they have joints of each kind."""
 
 TRAJECTORIES = Path(RUNS[0][1].path).parent
 
 in_every_example = pytest.mark.parametrize("example", EXAMPLES, ids=[each.name for each in EXAMPLES])
-in_every_run = pytest.mark.parametrize(("example", "motion"), RUNS, ids=RUN_NAMES)
+in_every_run = pytest.mark.parametrize(("example", "trajectory"), RUNS, ids=RUN_NAMES)
 
 
 def test_every_robot_has_a_trajectory_and_every_trajectory_a_robot():
-    assert all(example.motions for example in EXAMPLES)
-    assert {motion.path for _, motion in RUNS} == set(TRAJECTORIES.glob("*.yaml"))
-    assert {name for _, motion in RUNS for name in motion.robots} == {each.name for each in EXAMPLES}
+    assert all(example.trajectories for example in EXAMPLES)
+    assert {trajectory.path for _, trajectory in RUNS} == set(TRAJECTORIES.glob("*.yaml"))
+    assert {name for _, trajectory in RUNS for name in trajectory.robots} == {each.name for each in EXAMPLES}
 
 
 @in_every_run
-def test_example_can_be_done_with_a_margin(example: Example, motion: Motion):
-    report = inverse_dynamics(example.robot, load_trajectory(motion.path, example.robot)).report
+def test_example_can_be_done_with_a_margin(example: Example, trajectory: ExampleTrajectory):
+    report = inverse_dynamics(example.robot, load_trajectory(trajectory.path, example.robot)).report
     assert report.verdict == "ok"
     # The paper's own runs keep 3.5 %; a shipped example is no edge case.
     assert all(joint.margin > 0.03 for joint in report.joints if joint.actuator == "antagonistic")
@@ -51,23 +51,23 @@ def test_example_says_where_its_numbers_come_from(example: Example):
 
 
 @pytest.mark.parametrize(
-    ("example", "motion"),
+    ("example", "trajectory"),
     [run if run[0].name in QUICK else slow(*run) for run in RUNS],
     ids=RUN_NAMES,
 )
-def test_every_command_takes_it(example: Example, motion: Motion, vsacli: Callable[..., Any]):
+def test_every_command_takes_it(example: Example, trajectory: ExampleTrajectory, vsacli: Callable[..., Any]):
     copy_examples([example.name], ".")
-    robot, trajectory = Path("robots", example.path.name), Path("trajectories", motion.path.name)
-    trajectory.write_text(re.sub(r"rate: \d+", "rate: 100", trajectory.read_text()))
-    assert vsacli("invdyn", robot, trajectory, "-o", "result.h5").code == 0
-    assert vsacli("check-feasibility", robot, trajectory).code == 0
+    robot, motion = Path("robots", example.path.name), Path("trajectories", trajectory.path.name)
+    motion.write_text(re.sub(r"rate: \d+", "rate: 100", motion.read_text()))
+    assert vsacli("invdyn", robot, motion, "-o", "result.h5").code == 0
+    assert vsacli("check-feasibility", robot, motion).code == 0
     assert vsacli("plot", "result.h5", "-o", "figures").code == 0
     assert vsacli("export", "result.h5", "-o", "torques.csv").code == 0
     with Path("torques.csv").open() as file:
         header, *rows = csv.reader(file)
     assert {name.partition(".")[0] for name in header[1:]} == set(example.robot.joint_names)
     assert all(all(row) for row in rows)
-    assert vsacli("simulate", robot, trajectory, "-o", "simulation.h5").code == 0
+    assert vsacli("simulate", robot, motion, "-o", "simulation.h5").code == 0
 
 
 def test_the_list_names_every_robot_with_its_trajectories(vsacli: Callable[..., Any]):
@@ -138,4 +138,4 @@ def test_a_trajectory_that_names_no_robot_belongs_to_none(tmp_path: Path, monkey
     second.write_text("name: b\n# For robots/arm.yaml: it falls.\n")
     monkeypatch.setattr(module, "_root", lambda: tmp_path)
     [example] = examples()
-    assert example.motions == (Motion(first, ("arm",), "it rises"),)
+    assert example.trajectories == (ExampleTrajectory(first, ("arm",), "it rises"),)

@@ -89,8 +89,8 @@ def linearized_run(
     loop = ClosedLoop(robot, LinearizingFeedback(robot, reference, gains), reference)
     start = loop.packing.pack(*loop.plant.unpacked(start_of(robot, paired, trajectory, error)))
     integrator = Integrator(list(boundaries(loop, start)), Tolerances(), lambda _: None)
-    course = continuous(loop, integrator, trajectory.times.block(0, trajectory.samples), start)
-    past = history(robot, loop, course)
+    integrated = continuous(loop, integrator, trajectory.times.block(0, trajectory.samples), start)
+    past = history(robot, loop, integrated)
     return past, State(past.q_actual, past.dq_actual, past.theta_actual, past.dtheta_actual)
 
 

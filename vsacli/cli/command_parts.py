@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from vsacli.base.errors import InputError
-from vsacli.cli.console import OF_VERDICT, Exit, Talk
+from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -136,7 +136,7 @@ def run_stem(robot_path: str, trajectory_path: str) -> str:
     return f"{Path(robot_path).stem}-{Path(trajectory_path).stem}"
 
 
-def described(result: StoredResult) -> str:
+def result_line(result: StoredResult) -> str:
     """A result file in one line, for `--verbose`."""
     names = f"{result.robot_name}, {result.trajectory_name}"
     return f"{result.path}: {names}, {result.samples} steps, {result.verdict}"
@@ -150,4 +150,4 @@ def show_report(report: Report, as_json: bool, suggestions: Suggestions | None =
     else:
         extra_lines = [] if suggestions is None else suggestions.lines()
         click.echo("\n".join([str(report), *extra_lines]))
-    return OF_VERDICT[report.verdict]
+    return EXIT_OF_VERDICT[report.verdict]

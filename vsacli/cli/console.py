@@ -39,7 +39,7 @@ class Exit(enum.IntEnum):
         return member
 
 
-OF_VERDICT = {
+EXIT_OF_VERDICT = {
     "ok": Exit.OK,
     "over_limit": Exit.VERDICT,
     "singular": Exit.VERDICT,
@@ -120,7 +120,7 @@ def reporting_stdout_errors() -> Iterator[None]:
         with redirect_stdout(cast("TextIO", _CheckedOutput(stream))):
             yield
     except OutputError:
-        _lead_nowhere(stream)
+        _discard_buffer(stream)
         raise
 
 
@@ -152,8 +152,8 @@ def _raising_output_errors() -> Iterator[None]:
         raise OutputError("standard output", f"cannot be written: {error.strerror}") from error
 
 
-def _lead_nowhere(stream: TextIO) -> None:
-    """What is still buffered would otherwise fail once more when the interpreter ends."""
+def _discard_buffer(stream: TextIO) -> None:
+    """Lead a stream nowhere: what is still buffered would fail once more when the interpreter ends."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)

@@ -44,5 +44,5 @@ def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: 
 def _lines(shown: Example) -> Iterator[str]:
     letters = "".join("R" if joint.is_revolute else "P" for joint in shown.robot.joints)
     yield f"{shown.name} ({letters}): {shown.robot.description}"
-    for motion in shown.motions:
-        yield f"    {motion.name}: {motion.description}"
+    for trajectory in shown.trajectories:
+        yield f"    {trajectory.name}: {trajectory.description}"

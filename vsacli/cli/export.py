@@ -10,10 +10,10 @@ import click
 
 from vsacli.base.errors import StorageError
 from vsacli.cli.command_parts import (
-    described,
     example,
     overwrite_option,
     refuse_input_as_output,
+    result_line,
     variables_option,
 )
 from vsacli.cli.console import Exit, Talk, talk_options, tell
@@ -67,7 +67,7 @@ def export(
     options: dict[str, Any] = {"rate": rate, "allow_nan": allow_nan, "side": side}
     try:
         with open_stored(file) as stored:
-            talk.detail(described(stored))
+            talk.detail(result_line(stored))
             if output is None:
                 export_csv(stored, _stdout(), variables, **options)
                 sys.stdout.flush()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from vsacli.cli.command_parts import described, example, overwrite_option
+from vsacli.cli.command_parts import example, overwrite_option, result_line
 from vsacli.cli.console import Talk, talk_options
 
 
@@ -57,7 +57,7 @@ def draw_file(path: Path, folder: Path, file_format: str, overwrite: bool, talk:
     from vsacli.results.store.simulation import open_stored
 
     with open_stored(path) as stored:
-        talk.detail(described(stored))
+        talk.detail(result_line(stored))
         drawings = drawings_of(stored)
         drawn = drawable_figures(drawings, stored.variables, path)
         check_figures(drawn, folder, path.stem, file_format, overwrite=overwrite)
@@ -77,7 +77,7 @@ def _draw_comparison(paths: list[Path], folder: Path, file_format: str, overwrit
     with ExitStack() as stack:
         files = [stack.enter_context(open_stored(path)) for path in paths]
         for file in files:
-            talk.detail(described(file))
+            talk.detail(result_line(file))
         figure = compare_files(files)
     for saved in save_figures({COMPARISON: figure}, folder, stem, file_format, overwrite=overwrite):
         talk.note(f"wrote {saved}")

@@ -19,7 +19,7 @@ from vsacli.trajectory.file import load_trajectory
 
 
 @dataclass(frozen=True)
-class Motion:
+class ExampleTrajectory:
     """A trajectory that is shipped.
 
     Attributes:
@@ -43,7 +43,7 @@ class Example:
     """A robot that is shipped, with the trajectories made for it."""
 
     path: Path
-    motions: tuple[Motion, ...]
+    trajectories: tuple[ExampleTrajectory, ...]
 
     @property
     def name(self) -> str:
@@ -56,10 +56,10 @@ class Example:
         return load_robot(self.path)
 
     def files(self) -> Iterator[Path]:
-        """Every file it takes, tables of its springs and motions included."""
+        """Every file it takes, tables of its springs and trajectories included."""
         yield from (Path(source.path) for source in self.robot.sources)
-        for motion in self.motions:
-            yield from (Path(source.path) for source in load_trajectory(motion.path, self.robot).sources)
+        for trajectory in self.trajectories:
+            yield from (Path(source.path) for source in load_trajectory(trajectory.path, self.robot).sources)
 
 
 def examples(names: Iterable[str] = ()) -> list[Example]:
@@ -68,9 +68,9 @@ def examples(names: Iterable[str] = ()) -> list[Example]:
     Raises:
         InputError: for each name that is no robot's, the nearest one that is.
     """
-    motions = [_motion(path) for path in sorted((_root() / "trajectories").glob("*.yaml"))]
+    trajectories = [_trajectory(path) for path in sorted((_root() / "trajectories").glob("*.yaml"))]
     found = {
-        path.stem: Example(path, tuple(motion for motion in motions if path.stem in motion.robots))
+        path.stem: Example(path, tuple(each for each in trajectories if path.stem in each.robots))
         for path in sorted((_root() / "robots").glob("*.yaml"))
     }
     wanted = set(names)
@@ -136,11 +136,11 @@ def _root() -> Path:
     return package if (package / "robots").is_dir() else package.parent
 
 
-def _motion(path: Path) -> Motion:
+def _trajectory(path: Path) -> ExampleTrajectory:
     """Read the comment with which a trajectory begins, as in "For robots/a.yaml: the arm rises. More words".
 
     It names all the robots before the first colon.
     """
     made_for, _, text = opening_comment(path).partition(": ")
     robots = tuple(re.findall(r"robots/(\w+)\.yaml", made_for))
-    return Motion(path, robots, text.partition(". ")[0].removesuffix("."))
+    return ExampleTrajectory(path, robots, text.partition(". ")[0].removesuffix("."))

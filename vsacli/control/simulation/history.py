@@ -11,7 +11,7 @@ from vsacli.base.arrays import FlagArray, FloatArray, of_joint
 from vsacli.base.simulation_variables import COMMANDED, ERRORS, actual, error
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
-from vsacli.control.simulation.integrator import Course
+from vsacli.control.simulation.integrator import StateTrajectory
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot
 
@@ -53,29 +53,29 @@ class History:
     flags: FlagArray
 
 
-def history(robot: Robot, loop: ClosedLoop, course: Course) -> History:
-    """Evaluate every variable along a course."""
-    reference = loop.reference(course.time).of_joints
+def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory) -> History:
+    """Evaluate every variable along a state trajectory."""
+    reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in COMMANDED}
-    found = _actual(loop, course)
+    found = _actual(loop, integrated)
     paired = loop.plant.drivetrain.present.all(axis=1)
     for name in ("stiffness", "dstiffness"):  # elsewhere there is none to command
         commanded[name] = np.where(paired, commanded[name], found[name])
-    demand = loop.plant.drivetrain.of_joints(course.demand)
+    demand = loop.plant.drivetrain.of_joints(integrated.demand)
     return History(
-        time=course.time,
+        time=integrated.time,
         **commanded,
         tau_motor=demand,
         **{actual(name): values for name, values in found.items()},
         **{error(name): found[name] - commanded[name] for name in ERRORS},
-        flags=_flags(robot, {**found, "tau_motor": demand}, course.ending),
+        flags=_flags(robot, {**found, "tau_motor": demand}, integrated.ending),
     )
 
 
-def _actual(loop: ClosedLoop, course: Course) -> dict[str, FloatArray]:
+def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArray]:
     plant, drivetrain = loop.plant, loop.plant.drivetrain
-    phase, torque = loop.packing.unpack(course.states), loop.applied(course.demand)
-    ddq, _ = loop.accelerations(course.time, phase, course.demand)
+    phase, torque = loop.packing.unpack(integrated.states), loop.applied(integrated.demand)
+    ddq, _ = loop.accelerations(integrated.time, phase, integrated.demand)
     phi, dphi = plant.deflections(phase.q, phase.theta), plant.deflections(phase.dq, phase.dtheta)
     springs = drivetrain.springs(phi)
     tau_e = plant.link_torque(phase.dq, ddq, springs.tau, torque)
@@ -97,7 +97,7 @@ def _actual(loop: ClosedLoop, course: Course) -> dict[str, FloatArray]:
         "tau_motor": tau_motor,
         "elastic_energy": drivetrain.energy(phi),
         "motor_power": tau_motor * dtheta,
-        "motor_energy": _work(theta, tau_motor, held=course.held),
+        "motor_energy": _work(theta, tau_motor, held=integrated.held),
         "det_A": _by_joint(drivetrain, drivetrain.decoupling_determinant(springs)),
     }
 

@@ -43,7 +43,7 @@ class Tolerances:
             )
 
 
-class Course(NamedTuple):
+class StateTrajectory(NamedTuple):
     """How a run went: times (samples,), states (samples, entries), torques asked for (samples, motors).
 
     `held` says whether the torques stay the same from step to step.
@@ -108,14 +108,18 @@ class Integrator:
         return 1.0
 
 
-def continuous(loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray) -> Course:
+def continuous(
+    loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
+) -> StateTrajectory:
     """The controller acts at every instant, on the true state."""
     time, states, ending = integrator.over(loop.derivative, times, start)
     demand = loop.controller.torque(time, loop.packing.unpack(states))
-    return Course(time, states, demand, ending, integrator.evaluations)
+    return StateTrajectory(time, states, demand, ending, integrator.evaluations)
 
 
-def sampled(loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray) -> Course:
+def sampled(
+    loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
+) -> StateTrajectory:
     """The controller acts at the times, on measured positions, and its torques are held in between."""
     measurement = RateFilter(loop.packing.unpack(start))
     reached, states, ending = [times[:1]], [start[None]], None
@@ -129,5 +133,5 @@ def sampled(loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: 
         demands.append(loop.controller.torque(float(time[-1]), measurement.phase))
         if ending is not None:
             break
-    course = (np.concatenate(reached), np.concatenate(states), np.array(demands)[: sum(map(len, reached))])
-    return Course(*course, ending, integrator.evaluations, held=True)
+    rows = (np.concatenate(reached), np.concatenate(states), np.array(demands)[: sum(map(len, reached))])
+    return StateTrajectory(*rows, ending, integrator.evaluations, held=True)

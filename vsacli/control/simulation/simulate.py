@@ -13,7 +13,14 @@ from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.controllers import Feedforward, LinearizingFeedback
 from vsacli.control.simulation.history import History, history
-from vsacli.control.simulation.integrator import Course, Integrator, Progress, Tolerances, continuous, sampled
+from vsacli.control.simulation.integrator import (
+    Integrator,
+    Progress,
+    StateTrajectory,
+    Tolerances,
+    continuous,
+    sampled,
+)
 from vsacli.control.simulation.joint_tracking import Deviation, joint_trackings
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
@@ -69,8 +76,8 @@ def simulate(
     loop = _closed_loop(robot, trajectory, model or robot, gains)
     start = start_state(robot, trajectory, initial_error)
     integrate = continuous if measured == "state" else sampled
-    course = _course(loop, trajectory, start, integrate, tolerances, progress)
-    past = history(robot, loop, course)
+    integrated = _integrate(loop, trajectory, start, integrate, tolerances, progress)
+    past = history(robot, loop, integrated)
     ideal: tuple[Deviation, ...] = ()
     if measured == "positions":
         with_full_state = simulate(
@@ -83,9 +90,9 @@ def simulate(
         controller="feedforward" if gains is None else "feedback-linearization",
         samples=len(past.time),
         duration=trajectory.duration,
-        verdict=verdict_on(past, complete=course.ending is None),
-        ending=None if course.ending is None else course.ending.described(robot.joint_names),
-        evaluations=course.evaluations,
+        verdict=verdict_on(past, complete=integrated.ending is None),
+        ending=None if integrated.ending is None else integrated.ending.described(robot.joint_names),
+        evaluations=integrated.evaluations,
         warnings=(*robot.warnings, *trajectory.warnings),
         notes=trajectory.notes,
         joints=joint_trackings(robot, past),
@@ -113,14 +120,14 @@ def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gain
     return ClosedLoop(robot, LinearizingFeedback(model, reference, gains), reference)
 
 
-def _course(
+def _integrate(
     loop: ClosedLoop,
     trajectory: Trajectory,
     start: State,
-    integrate: Callable[[ClosedLoop, Integrator, FloatArray, FloatArray], Course],
+    integrate: Callable[[ClosedLoop, Integrator, FloatArray, FloatArray], StateTrajectory],
     tolerances: Tolerances,
     progress: Progress,
-) -> Course:
+) -> StateTrajectory:
     """Integrate as far as the controller has torques and the springs obey their laws."""
     last = loop.controller.ending
     times = trajectory.times.block(0, trajectory.samples)
@@ -128,5 +135,5 @@ def _course(
         raise InputError.one("the controller's model cannot execute the start of the trajectory")
     vector = loop.packing.pack(*loop.plant.unpacked(start))
     integrator = Integrator(list(boundaries(loop, vector)), tolerances, progress)
-    course = integrate(loop, integrator, times if last is None else times[times <= last.time], vector)
-    return course if course.ending is not None else course._replace(ending=last)
+    integrated = integrate(loop, integrator, times if last is None else times[times <= last.time], vector)
+    return integrated if integrated.ending is not None else integrated._replace(ending=last)

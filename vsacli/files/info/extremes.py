@@ -1,7 +1,7 @@
 """The largest size of a function of the configuration, over all configurations.
 
 Reach and gravity torques have, in each single joint variable with the others held, a form whose extremes are
-known: a + b cos q + c sin q of an angle, and of a length linear or convex, so largest at an end. Maximizing
+known: a + b cos q + c sin q of an angle, and of a length linear or convex, so largest at an end. Maximising
 joint after joint therefore never falls and needs no step size; it starts from several random configurations,
 because it may end at a maximum that is only local.
 """
@@ -62,8 +62,8 @@ def unlimited(joint: Joint) -> bool:
     return not joint.is_revolute and not all(map(math.isfinite, joint.limits.position))
 
 
-def largest(objective: Objective, goals: int, robot: Robot) -> Extremes:
-    """Maximize the size of each of several goals by itself; NaN if its numbers overflow."""
+def largest_sizes(objective: Objective, goals: int, robot: Robot) -> Extremes:
+    """Maximise the size of each of several goals by itself; NaN if its numbers overflow."""
     with np.errstate(all="ignore"):
         q = _searched(objective, _random(goals, robot), robot)
         sizes = np.abs(_own_values(objective, q))

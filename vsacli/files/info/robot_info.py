@@ -9,7 +9,7 @@ import numpy as np
 
 from vsacli.actuators.antagonistic import Antagonistic, solve_deflections
 from vsacli.base.arrays import FloatArray
-from vsacli.files.info.extremes import Extremes, free_range, largest, unlimited
+from vsacli.files.info.extremes import Extremes, free_range, largest_sizes, unlimited
 from vsacli.files.info.record import plain
 from vsacli.robot.kinematics import base_gravity, frames, tip_position
 from vsacli.robot.model import Joint, Robot
@@ -101,7 +101,7 @@ def reach(robot: Robot) -> Extremes:
         position = tip_position(robot, q)
         return np.asarray(np.sum(position * position, axis=1, keepdims=True))
 
-    found = largest(squared, 1, robot)
+    found = largest_sizes(squared, 1, robot)
     return found._replace(values=np.sqrt(found.values))
 
 
@@ -120,7 +120,7 @@ def _length(joint: Joint) -> float:
 
 def static_load(robot: Robot) -> Extremes:
     """The largest |torque| that gravity alone demands of each joint, N m (N), as far as was found."""
-    return largest(lambda q: gravity_torques(robot, q), len(robot.joints), robot)
+    return largest_sizes(lambda q: gravity_torques(robot, q), len(robot.joints), robot)
 
 
 def held_at_zero(robot: Robot) -> list[str]:

@@ -34,12 +34,12 @@ class Load:
     command: Command
 
     def at(self, instants: IndexArray | slice) -> Load:
-        """Some of the instants."""
+        """The load at some of the instants."""
         rows = {name: row[instants] for name, row in self.command.arrays().items()}
         return Load(self.time[instants], Command.of(rows))
 
     def changed(self, stiffness: FloatArray | float, *rates: FloatArray) -> Load:
-        """The same with something added to the stiffness and, if given, to its rate and second derivative."""
+        """The load with something added to the stiffness and, if given, to its rate and second derivative."""
         commanded = dict(self.command.commanded)
         for name, change in zip(STIFFNESS.names, (stiffness, *rates), strict=False):
             commanded[name] = commanded[name] + change

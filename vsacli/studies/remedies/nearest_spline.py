@@ -77,7 +77,7 @@ def nearest_spline(bounds: Bounds, smoothing: float) -> BSpline[np.float64]:
     size = float(np.max(bounds.missed_by(np.zeros_like(bounds.time))))
     scaled = Bounds(bounds.time, bounds.low / size, bounds.high / size)
     coefficients = np.zeros(len(free))
-    coefficients[free] = _least(scaled, knots, free, smoothing)
+    coefficients[free] = _least_coefficients(scaled, knots, free, smoothing)
     return BSpline(knots, size * coefficients, DEGREE)
 
 
@@ -88,7 +88,7 @@ def _knots(bounds: Bounds, smoothing: float) -> tuple[FloatArray, BoolArray, flo
         pieces = int(np.ceil(PIECES_PER_SMOOTHING * (last - first) / smoothing))
         ends = np.linspace(first, last, pieces + 1)
         knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
-        near = _near(ends, bounds.time[bounds.excluding_zero], DECAY_SMOOTHING_TIMES * smoothing)
+        near = _pieces_near(ends, bounds.time[bounds.excluding_zero], DECAY_SMOOTHING_TIMES * smoothing)
         # coefficient i belongs to the pieces i-3..i
         free = np.convolve(near, np.ones(DEGREE + 1)) > 0
         if np.count_nonzero(free) <= MOST_COEFFICIENTS:
@@ -96,14 +96,14 @@ def _knots(bounds: Bounds, smoothing: float) -> tuple[FloatArray, BoolArray, flo
         smoothing *= 1.5
 
 
-def _near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
+def _pieces_near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
     """The pieces with one of these ascending times in reach."""
     next_time = np.append(times, np.inf)[np.searchsorted(times, ends[:-1] - reach)]
     near: BoolArray = next_time <= ends[1:] + reach
     return near
 
 
-def _least(bounds: Bounds, knots: FloatArray, free: BoolArray, smoothing: float) -> FloatArray:
+def _least_coefficients(bounds: Bounds, knots: FloatArray, free: BoolArray, smoothing: float) -> FloatArray:
     """The free coefficients, with as many of the bounds as matter."""
     from scipy.interpolate import BSpline
 

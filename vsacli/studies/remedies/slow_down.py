@@ -46,9 +46,9 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     at_rest = _slowed(steps, math.inf)
     refused = np.flatnonzero(np.any(acceptance.refused(at_rest), axis=1))
     few = np.union1d(evenly(len(steps.time), FIRST_STEPS), refused[evenly(len(refused), FIRST_STEPS)])
-    number = _first_hope(acceptance, _select(steps, few))
+    number = _scan_start(acceptance, _select(steps, few))
     if number is not None:
-        candidates = SlowDowns(acceptance, trajectory, steps)
+        candidates = SlowDownCandidates(acceptance, trajectory, steps)
         number = smallest_confirmed(candidates, number, LARGEST_FACTOR * FACTOR_DENOMINATOR)
     if number is not None:
         return number / FACTOR_DENOMINATOR
@@ -58,7 +58,7 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     raise ImpossibleError(f"not even one by a factor {LARGEST_FACTOR} does")
 
 
-def _first_hope(acceptance: Acceptance, few: Motion) -> int | None:
+def _scan_start(acceptance: Acceptance, few: Motion) -> int | None:
     """A number up to which the scan would find one of a few steps refused; None if it always would.
 
     It tries many factors at once, which costs hardly more than one of them.
@@ -75,7 +75,7 @@ def _first_hope(acceptance: Acceptance, few: Motion) -> int | None:
     return None
 
 
-class SlowDowns:
+class SlowDownCandidates:
     """Stretching by number / FACTOR_DENOMINATOR, judged at watched steps; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: Motion) -> None:

@@ -45,7 +45,7 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
         near_singular: the margin min(sigma - lower, upper - sigma)/sigma that every step shall have.
 
     Raises:
-        InputError: the margin is none.
+        InputError: `near_singular` is no possible margin.
     """
     check_near_singular(near_singular)
     acceptance = Acceptance(robot, near_singular)

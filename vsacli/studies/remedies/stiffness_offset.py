@@ -39,8 +39,8 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
         ImpossibleError: with the reason.
     """
     low, high = _bounds(acceptance, joint, load)
-    raised = Offsets(acceptance, joint, load, sign=1).smallest(low, high)
-    lowered = Offsets(acceptance, joint, load, sign=-1).smallest(-high, -low)
+    raised = OffsetCandidates(acceptance, joint, load, sign=1).smallest(low, high)
+    lowered = OffsetCandidates(acceptance, joint, load, sign=-1).smallest(-high, -low)
     found = [offset for offset in (raised, lowered) if offset is not None]
     if found:
         return min(found, key=abs)
@@ -66,7 +66,7 @@ def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, fl
     return float(rise[first]), float(fall[last])
 
 
-class Offsets:
+class OffsetCandidates:
     """Constants of one sign on a decimal grid, judged at watched steps; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, joint: Joint, load: Load, sign: int) -> None:

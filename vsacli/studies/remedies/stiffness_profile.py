@@ -49,7 +49,7 @@ class Change:
 
     @classmethod
     def constant(cls, time: FloatArray, value: float) -> Change:
-        """The same all the time."""
+        """A change that is the same at every instant."""
         rows = np.zeros((3, len(time)))
         rows[0] = value
         return cls(time, rows)
@@ -108,7 +108,7 @@ def _change(
         return None
     admissible = admissible_stiffness(joint, load.command, near_singular)
     asked = load.command.commanded["stiffness"]
-    bounds = _clear(load.time, admissible.low - asked, admissible.high - asked)
+    bounds = _narrowed(load.time, admissible.low - asked, admissible.high - asked)
     if np.any(bounds.low > bounds.high):
         return None
     if not bounds.excluding_zero.any():
@@ -120,7 +120,7 @@ def _change(
     return Change(load.time, np.stack([spline(load.time, nu=order) for order in range(DEGREE)]))
 
 
-def _clear(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
+def _narrowed(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
     """Bounds a little narrower, unless that would leave nothing between them."""
     clearance = CLEARANCE * max(low.max(), -high.min(), 0.0)
     middle = (low + high) / 2
@@ -164,10 +164,10 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
         rows[:, joint] += change
     values, *derivatives = rows
     labels = tuple(f"column {joint}" for joint in range(len(values)))
-    record = Samples(
+    samples = Samples(
         signal=STIFFNESS, time=time, values=values, derivatives=tuple(derivatives), labels=labels
     )
-    commanded = {**trajectory.commanded, STIFFNESS.key: SampledProfile.of(record, INTERPOLATE)}
+    commanded = {**trajectory.commanded, STIFFNESS.key: SampledProfile.of(samples, INTERPOLATE)}
     name = f"{trajectory.name}-fixed"
     return Trajectory(
         RecordedTimes(time), trajectory.position, commanded, wrench=trajectory.wrench, name=name

@@ -1,4 +1,4 @@
-"""What is suggested, as plain data, JSON and sentences."""
+"""What is suggested: data, JSON and sentences."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SlowDown(Published):
 
     @property
     def sentence(self) -> str:
-        """What to do."""
+        """What to do, without a full stop."""
         return f"slow down by a factor {self.factor:.10g} ({self.duration:.10g} s -> {self.slower:.10g} s)"
 
     @property
@@ -74,7 +74,7 @@ class StiffnessOffset(Published):
 
     @property
     def sentence(self) -> str:
-        """What to do."""
+        """What to do, without a full stop."""
         raised = ", ".join(str(offset) for offset in self.offsets if offset.value > 0)
         lowered = ", ".join(str(offset) for offset in self.offsets if offset.value < 0)
         clauses = {"raise": raised, "lower": lowered}
@@ -119,7 +119,7 @@ class StiffnessProfile(Published):
 
     @property
     def sentence(self) -> str:
-        """What to do."""
+        """What to do, without a full stop."""
         return f"reshape the stiffness of {', '.join(map(str, self.changes))}"
 
 
