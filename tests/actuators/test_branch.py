@@ -9,8 +9,7 @@ from samples.drives import Stopped
 from samples.marks import slow
 from samples.springs import residuals, stiffness_under
 
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.laws import Cubic, PairSolution
 from vsacli.actuators.pairs import make_pair
 from vsacli.base.arrays import FloatArray
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from samples.springs import residuals
 
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.exponential import Exponential, ExponentialPair
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.laws.quadratic import Quadratic, QuadraticTwins
-from vsacli.actuators.laws.sinh import Sinh, SinhPair
+from vsacli.actuators.laws import Exponential, PairSolution, Quadratic, Sinh, SpringLaw
+from vsacli.actuators.laws.exponential import ExponentialPair
+from vsacli.actuators.laws.quadratic import QuadraticTwins
+from vsacli.actuators.laws.sinh import SinhPair
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.pairs.solver import IteratedPair
 from vsacli.base.arrays import FloatArray

@@ -8,10 +8,7 @@ import numpy as np
 import pytest
 from samples.springs import SPRINGS, measured, on_side_2, stiffness_under
 
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.four_bar import FourBar
-from vsacli.actuators.laws.polynomial import Polynomial
+from vsacli.actuators.laws import Cubic, FourBar, Polynomial, SpringLaw
 from vsacli.actuators.laws.tendon import Mirrored
 from vsacli.actuators.pairs.critical_curves import sample_hardening
 from vsacli.actuators.pairs.folds import map_folds

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 from oracles import spring_scan as scan
 
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.exponential import Exponential
-from vsacli.actuators.laws.four_bar import FourBar
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.laws.quadratic import Quadratic
-from vsacli.actuators.laws.sinh import Sinh
+from vsacli.actuators.laws import (
+    Cubic,
+    Exponential,
+    FourBar,
+    PairSolution,
+    Polynomial,
+    Quadratic,
+    Sinh,
+    SpringLaw,
+)
 from vsacli.actuators.laws.table import MeasuredSpring
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.source import Source
