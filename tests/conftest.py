@@ -6,22 +6,12 @@ import contextlib
 import io
 import signal
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from samples.command_line import ROBOT, rest_to_rest
+from samples.command_line import ROBOT, Outcome, rest_to_rest
 
 from vsacli.cli.main import run
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Exit code of a command line, and what it printed."""
-
-    code: int
-    out: str
-    err: str
 
 
 @pytest.fixture(scope="session", autouse=True)

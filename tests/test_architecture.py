@@ -241,6 +241,6 @@ def test_test_files_share_what_lies_in_samples() -> None:
         f"{source}:{line}: {name}"
         for source in sorted(TESTS.rglob("*.py"))
         for name, line in imports(source)
-        if name.startswith("test_")
+        if name.startswith(("test_", "conftest"))
     ]
     assert strays == []

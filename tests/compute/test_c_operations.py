@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from samples.generated_code import COMPILERS, Compiled, compile_c
-from samples.marks import slow
+from samples.generated_code import Compiled, compile_c
+from samples.marks import COMPILERS, needs_compiler, slow
 from samples.traced_functions import CONTROL_FLOW, ELEMENTWISE, operands
 
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -21,7 +21,7 @@ from vsacli.compute.engine.lanes import batch_source
 from vsacli.control.codegen.interface import Array, Function, Structure
 from vsacli.control.codegen.scalar import source_text
 
-pytestmark = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+pytestmark = needs_compiler
 
 UNITS = 4
 """In the last place: what libm, its vector functions and NumPy's vector functions promise."""

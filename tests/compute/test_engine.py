@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.drives import ALIKE, joint_with, springs
-from samples.engines import assert_agree, demands, kinds_of_steps, needs_compiler, random_wrench
-from samples.marks import slow, slow_but
+from samples.engines import assert_agree, demands, kinds_of_steps, random_wrench
+from samples.marks import needs_compiler, slow, slow_but
 from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
 
 from vsacli import load_robot

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.command_line import ROBOT
-from samples.engines import needs_compiler
+from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 
 from vsacli.base.errors import InputError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from samples.codegen import commands, motion_of, shipped
 from samples.drives import joint_with, springs, with_joint
-from samples.generated_code import COMPILERS
+from samples.marks import needs_compiler
 
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.law import SpringLaw
@@ -48,7 +48,7 @@ def test_no_c_code_is_made(robot: Robot) -> None:
         generate(robot)
 
 
-@pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+@needs_compiler
 def test_the_engine_c_is_refused(robot: Robot) -> None:
     with pytest.raises(InputError, match=f"this cannot be compiled: {REASON}; take the engine numpy"):
         choose("c", InverseDynamics(robot), 1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
@@ -11,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.codegen import clear, commands, motion_of, shipped, with_springs
-from samples.generated_code import COMPILERS, STRICT, compile_c, compiled_robot, write_files
-from samples.marks import slow, slow_but
+from samples.generated_code import STRICT, compile_c, compiled_robot, write_files
+from samples.marks import COMPILERS, needs, needs_compiler, slow, slow_but
 from samples.robots import random_robot
 from samples.springs import SPRINGS
 
@@ -22,8 +21,6 @@ from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
-
-needs_compiler = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
 
 ROBOTS: dict[str, Robot] = {
     "one joint": random_robot("R", seed=1),
@@ -59,12 +56,12 @@ def self_test(name: str, folder: Path, *flags: str, compiler: str, precision: st
 
 
 @pytest.mark.parametrize("name", slow_but({"3R", "mixed", "sinh"}, ROBOTS))
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize(
+    "compiler", [pytest.param(name, marks=needs(name, name)) for name in ("gcc", "clang")]
+)
 def test_it_compiles_without_a_warning_and_passes_its_own_test(
     compiler: str, name: str, tmp_path: Path
 ) -> None:
-    if compiler not in COMPILERS:
-        pytest.skip(f"no {compiler} here")
     assert self_test(name, tmp_path, compiler=compiler) == "all values agree\n"
 
 
@@ -100,7 +97,7 @@ def test_the_self_test_notices_a_wrong_number(tmp_path: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.skipif(not shutil.which("make"), reason="no make")
+@needs("make", "make")
 def test_the_makefile(tmp_path: Path) -> None:
     write_files(project("prismatic"), tmp_path)
     before = {path.name for path in tmp_path.iterdir()}
@@ -114,7 +111,7 @@ def test_the_makefile(tmp_path: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.skipif(not shutil.which("nm"), reason="no nm")
+@needs("nm", "binutils")
 @pytest.mark.parametrize("name", [slow("3R"), "mixed", slow("sinh")])
 def test_the_code_keeps_nothing_and_calls_nothing_but_the_math_library(name: str, tmp_path: Path) -> None:
     write_files(project(name), tmp_path)
@@ -139,20 +136,23 @@ def test_every_loop_is_bounded_by_a_constant(name: str) -> None:
 
 
 @needs_compiler
-def test_the_header_is_also_one_of_cpp(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "compiler",
+    [
+        pytest.param("g++", marks=needs("g++", "g++")),
+        pytest.param("clang++", marks=needs("clang++", "clang")),
+    ],
+)
+def test_the_header_is_also_one_of_cpp(compiler: str, tmp_path: Path) -> None:
     write_files(project("3R"), tmp_path)
     (tmp_path / "main.cpp").write_text(
         '#include "vsa_3r.h"\n#include "vsa_3r.h"\n'
         "int main() { vsa_3r_motion motion = {}; vsa_3r_torques torques;\n"
         "  vsa_3r_link_torques(&motion, &torques); return torques.tau_e[0] != torques.tau_e[0]; }\n"
     )
-    plus = {"gcc": "g++", "clang": "clang++"}[COMPILERS[0]]
-    if not shutil.which(plus):
-        pytest.skip(f"no {plus} here")
     compile_c(tmp_path, *STRICT, "-c", "vsa_3r.c", "-o", "robot.o")
-    compile_c(
-        tmp_path, "-Wall", "-Wextra", "-pedantic", "-Werror", "main.cpp", "robot.o", "-lm", compiler=plus
-    )
+    warnings = ("-Wall", "-Wextra", "-pedantic", "-Werror")
+    compile_c(tmp_path, *warnings, "main.cpp", "robot.o", "-lm", compiler=compiler)
 
 
 def test_the_header_says_what_it_is_about() -> None:

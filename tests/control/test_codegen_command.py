@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import Outcome
-from samples.command_line import REPOSITORY, ROBOT, contents, edited
-from samples.generated_code import COMPILERS, STRICT, compile_c
+from samples.command_line import REPOSITORY, ROBOT, Outcome, contents, edited
+from samples.generated_code import STRICT, compile_c
+from samples.marks import needs_compiler
 
 from vsacli.cli.console import Exit
 from vsacli.control.codegen.project import prefix_of
@@ -37,7 +37,7 @@ def test_quiet_and_single_precision(vsacli: Run, tmp_path: Path) -> None:
     assert "double" not in (tmp_path / "arm" / "vsa_3r.c").read_text().replace("double.", "")
 
 
-@pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+@needs_compiler
 def test_the_written_files_compile(vsacli: Run, tmp_path: Path) -> None:
     vsacli("codegen", REPOSITORY / "robots" / "tendon_1r.yaml", "-o", "arm", "-q")
     compile_c(tmp_path / "arm", *STRICT, "tendon_1r.c", "tendon_1r_test.c", "-o", "test", "-lm")

@@ -12,14 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
-from samples.generated_code import COMPILERS, STRICT, compile_c, write_files
+from samples.generated_code import STRICT, compile_c, write_files
+from samples.marks import needs_compiler
 from samples.plants import random_state
 
 from vsacli import load_robot
 from vsacli.control.codegen.project import generate
 from vsacli.dynamics.forward import state_derivative
 
-pytestmark = pytest.mark.skipif(not shutil.which("cc") or not COMPILERS, reason="no C compiler")
+pytestmark = needs_compiler
 
 PAGE = REPOSITORY / "docs" / "codegen.md"
 SOURCE = REPOSITORY / "docs" / "examples" / "closed_loop.c"

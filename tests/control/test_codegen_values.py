@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.codegen import CLOSE, clear, commands, motion_of, shipped, with_springs
-from samples.generated_code import COMPILERS, compiled_robot
-from samples.marks import slow, slow_but
+from samples.generated_code import compiled_robot
+from samples.marks import needs_compiler, slow, slow_but
 from samples.plants import all_rigid, elastic, random_state, with_actuators
 from samples.robots import random_robot
 from samples.springs import SPRINGS
@@ -27,7 +27,7 @@ from vsacli.dynamics.inverse import TORQUES, compute_block
 from vsacli.dynamics.link_torques import link_torques
 from vsacli.robot.model import Robot
 
-pytestmark = pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+pytestmark = needs_compiler
 
 SAMPLES = 150
 

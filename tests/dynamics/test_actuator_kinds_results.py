@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from conftest import Outcome
+from samples.command_line import Outcome
 from samples.figures import Result, rest_to_rest
 from samples.plants import elastic, rigid, with_actuators
 from samples.robots import vsa_3r

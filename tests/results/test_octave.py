@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 from pathlib import Path
 
 import h5py
 import numpy as np
-import pytest
+from samples.marks import needs
 
 SCRIPT = """
 result = load("-hdf5", "{path}", "time", "tau_motor");
@@ -17,7 +16,7 @@ printf("%.17g ", result.time(end), result.tau_motor(2, 3, 5));
 """
 
 
-@pytest.mark.skipif(shutil.which("octave-cli") is None, reason="no octave here")
+@needs("octave-cli", "octave")
 def test_octave_reads_named_variables(feasible_result: Path) -> None:
     command = ["octave-cli", "--norc", "--quiet", "--eval", SCRIPT.format(path=feasible_result)]
     outcome = subprocess.run(command, capture_output=True, text=True, check=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sysconfig
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,15 @@ SEVEN_JOINTS_MOTION = REPOSITORY / "trajectories" / "lwr_7r.yaml"
 
 COMMAND = Path(sysconfig.get_path("scripts")) / "vsacli"
 """The installed command."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Exit code of a command line, and what it printed."""
+
+    code: int
+    out: str
+    err: str
 
 
 def edited(source: Path, target: Path, *changes: tuple[str, str]) -> Path:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Mapping
 
 import numpy as np
-import pytest
 
 from samples.robots import random_motion
 from samples.signals import by_name
@@ -16,8 +14,6 @@ from vsacli.base.wrench import Wrench
 from vsacli.dynamics.inverse import COMPUTED, compute_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
-
-needs_compiler = pytest.mark.skipif(not shutil.which("cc"), reason="there is no C compiler here")
 
 AGREEMENT = 1e-12
 """Relative to a variable's peak, where the margin exceeds `CLEAR`: rounding of 1e-16 over that margin."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -11,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from samples.marks import COMPILERS
 from vsacli.base.arrays import FloatArray
 from vsacli.control.codegen.interface import Array, Function, Structure
 from vsacli.control.codegen.project import Project, prefix_of
 from vsacli.control.codegen.scalar import source_text
 from vsacli.robot.model import Robot
 
-COMPILERS = tuple(name for name in ("gcc", "clang") if shutil.which(name))
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 """Every warning is an error."""
 
