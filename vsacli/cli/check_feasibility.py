@@ -99,12 +99,12 @@ def check_feasibility(
     if fixed is not None:
         check_fixed_target(fixed, overwrite=overwrite)
         for path in fixed_paths(fixed):
-            refuse_input_as_output(path, (source.path for part in inputs for source in part.sources))
+            refuse_input_as_output(path, inputs.files)
     stem = run_stem(robot, trajectory)
     if plot_folder is not None:
         from vsacli.results.plots import FEASIBILITY, check_drawable, check_figures
 
-        check_drawable([joint.actuator_type for joint in inputs[0].joints])
+        check_drawable([joint.actuator_type for joint in inputs.robot.joints])
         check_figures([FEASIBILITY], plot_folder, stem, overwrite=overwrite)
     run = Run(
         *inputs,
@@ -117,7 +117,7 @@ def check_feasibility(
     report, figures = (compute(run, talk), None) if plot_folder is None else _compute_and_draw(run, talk)
     suggestions = suggest(*inputs, margin) if advise or fixed is not None else None
     if suggestions is not None and fixed is not None:
-        _write_fixed(suggestions, inputs[0], fixed, overwrite, talk)
+        _write_fixed(suggestions, inputs.robot, fixed, overwrite, talk)
     code = show_report(report, as_json, suggestions)
     if plot_folder is not None and figures is not None:
         _save(figures, plot_folder, stem, overwrite, talk)

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -87,7 +87,19 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return engine(threads(command))
 
 
-def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> tuple[Robot, Trajectory]:
+class Inputs(NamedTuple):
+    """What a command computes with."""
+
+    robot: Robot
+    trajectory: Trajectory
+
+    @property
+    def files(self) -> list[str]:
+        """Paths of all files that were read."""
+        return [source.path for source in (*self.robot.sources, *self.trajectory.sources)]
+
+
+def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> Inputs:
     """Read and check both files.
 
     Raises:
@@ -102,7 +114,7 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> tuple[Robo
         f"{robot.name}: {len(robot.joints)} joints; {trajectory.name}: {trajectory.samples} steps over "
         f"{trajectory.duration:g} s"
     )
-    return robot, trajectory
+    return Inputs(robot, trajectory)
 
 
 def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:

@@ -73,7 +73,7 @@ def invdyn(
     """
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
-    refuse_input_as_output(path, (source.path for part in inputs for source in part.sources))
+    refuse_input_as_output(path, inputs.files)
     from vsacli.analysis.run import Run
     from vsacli.base.atomic_files import check_target
     from vsacli.base.variables import VARIABLES

@@ -15,6 +15,7 @@ import click
 
 from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import (
+    Inputs,
     example,
     hdf5_name,
     json_option,
@@ -127,18 +128,19 @@ def simulate(
     path = Path(f"{run_stem(robot, trajectory)}-simulation.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
     simulation, sources = _prepared(inputs, **choices)
-    recorded = replace(inputs[0], sources=(*inputs[0].sources, *sources))
-    refuse_input_as_output(path, (source.path for source in (*recorded.sources, *inputs[1].sources)))
+    arm = replace(inputs.robot, sources=(*inputs.robot.sources, *sources))
+    inputs = inputs._replace(robot=arm)
+    refuse_input_as_output(path, inputs.files)
     from vsacli.results.store.simulation_writer import SimulationWriter
 
     if plot_folder is not None:
         from vsacli.results.plots import check_figures, simulation_drawings
 
-        drawn = simulation_drawings(joint.actuator_type for joint in inputs[0].joints)
+        drawn = simulation_drawings(joint.actuator_type for joint in inputs.robot.joints)
         check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)
     command_line = shlex.join(["vsacli", *sys.argv[1:]])
-    writer = SimulationWriter(path, recorded, inputs[1], overwrite=overwrite, command_line=command_line)
-    report = _run(simulation, inputs[1], writer, talk)
+    writer = SimulationWriter(path, *inputs, overwrite=overwrite, command_line=command_line)
+    report = _run(simulation, inputs.trajectory, writer, talk)
     code = _show(report, as_json)
     talk.note(f"wrote {path}")
     if plot_folder is not None:
@@ -149,7 +151,7 @@ def simulate(
 
 
 def _prepared(
-    inputs: tuple[Robot, Trajectory],
+    inputs: Inputs,
     *,
     controller: str,
     poles: str | None,
@@ -169,7 +171,7 @@ def _prepared(
     gains: Gains | None = None
     sources: list[Source] = []
     if controller == FEEDBACK:
-        gains, sources = _gains(inputs[0], poles, stiffness_poles, integral)
+        gains, sources = _gains(inputs.robot, poles, stiffness_poles, integral)
     elif poles is not None or stiffness_poles is not None or integral:
         raise InputError.one(f"poles and integral action need --controller {FEEDBACK}")
     check_measured(measured, gains)
@@ -177,7 +179,7 @@ def _prepared(
         simulate,
         *inputs,
         gains=gains,
-        model=perturbed(inputs[0], perturb, seed),
+        model=perturbed(inputs.robot, perturb, seed),
         initial_error=InitialError(initial_error, initial_stiffness_error),
         measured=measured,
         tolerances=Tolerances(rtol, atol),
