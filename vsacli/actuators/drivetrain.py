@@ -136,7 +136,7 @@ class Drivetrain:
 
     def decoupling_determinant(self, springs: SpringState) -> FloatArray:
         """Det A (67) of the joints that have two springs, (..., pairs)."""
-        return determinant(springs.of(self.first), springs.of(self.second))
+        return determinant(springs.take(self.first), springs.take(self.second))
 
     def _each(self, phi: FloatArray, value: Callable[[SpringLaw, FloatArray], FloatArray]) -> FloatArray:
         result = np.empty_like(phi)

@@ -107,7 +107,7 @@ class Decoupling:
         drivetrain = self._plant.drivetrain
         first, second, single = drivetrain.first, drivetrain.second, drivetrain.single
         of_pair, of_single = drivetrain.spring_joint[first], drivetrain.spring_joint[single]
-        one, two, alone = springs.of(first), springs.of(second), springs.of(single)
+        one, two, alone = springs.take(first), springs.take(second), springs.take(single)
 
         det_a = determinant(one, two)  # (67)
         divisor = np.where(det_a == 0, np.nan, det_a)

@@ -22,7 +22,7 @@ class SpringState(NamedTuple):
     zeta: FloatArray
     eta: FloatArray
 
-    def of(self, members: IndexArray) -> SpringState:
+    def take(self, members: IndexArray) -> SpringState:
         """The state of some of the springs, which are on the last axis."""
         return SpringState(*(values[..., members] for values in self))
 

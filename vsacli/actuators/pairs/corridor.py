@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.pairs.balance import Balance, PairState
-from vsacli.actuators.pairs.folds import Folds, outermost_fold
+from vsacli.actuators.pairs.folds import FoldMap, outermost_fold
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, where_needed
 
@@ -54,7 +54,7 @@ class Corridor(NamedTuple):
     state: PairState
 
 
-def corridor(balance: Balance, folds: Folds, tau_e: FloatArray) -> Corridor:
+def corridor(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Corridor:
     """The piece of the joint stiffness that reaches the largest preload, for each tau_e (samples,)."""
     least, largest = balance.preload_range(tau_e)
     carried = least <= largest

@@ -94,7 +94,7 @@ class CriticalCurve(NamedTuple):
         """Preload torque."""
         return (self.tau_1 - self.tau_2) / 2
 
-    def at(self, chosen: slice | IndexArray) -> CriticalCurve:
+    def take(self, chosen: slice | IndexArray) -> CriticalCurve:
         """Some of the points."""
         return CriticalCurve(*(values[chosen] for values in self))
 
@@ -160,13 +160,13 @@ def critical_curves(first: SpringLaw, second: SpringLaw) -> Iterator[CriticalCur
         return
     brackets = [_cusp_brackets(curve.tau_e) for curve in curves]
     low, high = (
-        CriticalCurve(*_joined(curve.at(ends[side]) for curve, ends in zip(curves, brackets, strict=True)))
+        CriticalCurve(*_joined(curve.take(ends[side]) for curve, ends in zip(curves, brackets, strict=True)))
         for side in (0, 1)
     )
     cusps = _cusps(first, second, low, high)
     counts = np.cumsum([0, *(len(low) for low, _ in brackets)])
     for curve, ends, before, after in zip(curves, brackets, counts[:-1], counts[1:], strict=True):
-        yield from _split(curve, *ends, cusps.at(slice(before, after)))
+        yield from _split(curve, *ends, cusps.take(slice(before, after)))
 
 
 def _curves(one: Hardening, two: Hardening) -> Iterator[CriticalCurve]:
@@ -187,7 +187,7 @@ def _curves(one: Hardening, two: Hardening) -> Iterator[CriticalCurve]:
     bounds = np.searchsorted(piece[order], range(len(pieces) + 1))
     for first, last in pairwise(bounds.tolist()):
         if last - first > 1:
-            yield points.at(order[first:last])
+            yield points.take(order[first:last])
 
 
 def _joined(parts: Iterable[tuple[FloatArray, ...]]) -> Iterator[FloatArray]:
@@ -252,7 +252,7 @@ def _split(
     """A curve split at its cusps, each between two of its points, in parts of ascending tau_e."""
     starts, ends = [0, *high.tolist()], [*low.tolist(), len(curve.phi_1) - 1]
     for index, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        around = cusps.at(slice(max(index - 1, 0), index)), cusps.at(slice(index, index + 1))
-        part = CriticalCurve(*_joined((around[0], curve.at(slice(start, end + 1)), around[1])))
+        around = cusps.take(slice(max(index - 1, 0), index)), cusps.take(slice(index, index + 1))
+        part = CriticalCurve(*_joined((around[0], curve.take(slice(start, end + 1)), around[1])))
         tau_e = part.tau_e
-        yield part if tau_e[-1] > tau_e[0] else part.at(slice(None, None, -1))
+        yield part if tau_e[-1] > tau_e[0] else part.take(slice(None, None, -1))

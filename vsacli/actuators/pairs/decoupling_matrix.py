@@ -18,12 +18,15 @@ def determinant(one: SpringState, two: SpringState) -> FloatArray:
 
 
 def solve(
-    one: SpringState, two: SpringState, divisor: FloatArray, upper: FloatArray, lower: FloatArray
+    one: SpringState, two: SpringState, divisor: FloatArray, torque_row: FloatArray, stiffness_row: FloatArray
 ) -> Sides:
-    """A^-1 (upper, lower), as (68) and (72) need; the divisor is det A, or NaN where there is no solution."""
+    """A^-1 times a right-hand side, as (68) and (72) need.
+
+    The divisor is det A, or NaN where there is no solution.
+    """
     return (
-        (two.zeta * upper - two.sigma * lower) / divisor,
-        (one.sigma * lower - one.zeta * upper) / divisor,
+        (two.zeta * torque_row - two.sigma * stiffness_row) / divisor,
+        (one.sigma * stiffness_row - one.zeta * torque_row) / divisor,
     )
 
 

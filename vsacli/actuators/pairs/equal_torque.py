@@ -45,7 +45,7 @@ class StiffnessParabola(NamedTuple):
     curvature: FloatArray
 
     @classmethod
-    def at(cls, state: PairState) -> StiffnessParabola:
+    def of(cls, state: PairState) -> StiffnessParabola:
         """The parabola that touches the stiffness at deflections."""
         one, two = state.one, state.two
         stiffness = state.stiffness
@@ -82,7 +82,7 @@ def first_guess(inner: PairState, inner_stiffness: FloatArray, demand: FloatArra
     inner = inner.regularized()
     scale = np.maximum(inner_stiffness, MIN_SCALE_SHARE * demand)
     excess = scale * _quadratic_part(sign * (demand - inner_stiffness) / scale)
-    parabola = StiffnessParabola.at(inner)
+    parabola = StiffnessParabola.of(inner)
     spread = np.where(excess > 0, 2 * sign * excess / parabola.slope_sum(sign * excess, sign), 0.0)
     step_1, step_2 = parabola.share_1 * spread, -parabola.share_2 * spread
     correction = _correction(inner, step_1, step_2, spread, demand)
@@ -105,7 +105,7 @@ def third_order_step(
     state: PairState, tau_e: FloatArray, demand: FloatArray, sign: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Steps of phi_1 and phi_2 to tau_e and to the demand, and the relative error that they leave."""
-    parabola = StiffnessParabola.at(state)
+    parabola = StiffnessParabola.of(state)
     missing, unbalanced = demand - parabola.stiffness, tau_e - state.torque
     shift, growth = unbalanced / parabola.stiffness, missing - parabola.shift_slope * unbalanced
     slope_sum = parabola.slope_sum(growth, sign)

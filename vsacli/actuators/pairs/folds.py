@@ -38,7 +38,7 @@ NEWTON_RTOL = 1e-9
 """Relative size of a step after which the next would be rounding."""
 
 
-class Folds(NamedTuple):
+class FoldMap(NamedTuple):
     """Cells of tau_e, in each of which the outermost fold moves from one corner of a box to the other.
 
     Attributes:
@@ -64,13 +64,13 @@ class Folds(NamedTuple):
         return cell
 
 
-def map_folds(first: SpringLaw, second: SpringLaw) -> Folds:
+def map_folds(first: SpringLaw, second: SpringLaw) -> FoldMap:
     """The outermost folds of a pair over all elastic torques."""
     above = _positive_folds(first, second)
     below = _positive_folds(Mirrored(law=second), Mirrored(law=first))
     edges = np.concatenate((-below[0][:0:-1], above[0]))
     tau_e, phi_1, phi_2 = np.concatenate((-below[1][(0, 2, 1), ::-1, ::-1], above[1]), axis=-1)
-    return Folds(edges, tau_e, phi_1, phi_2, *_cubics(first, second, tau_e, phi_1, phi_2))
+    return FoldMap(edges, tau_e, phi_1, phi_2, *_cubics(first, second, tau_e, phi_1, phi_2))
 
 
 def _positive_folds(first: SpringLaw, second: SpringLaw) -> tuple[FloatArray, FloatArray]:
@@ -122,7 +122,7 @@ def _along_critical_curve(state: PairState, rho: Sides) -> tuple[FloatArray, Flo
     return slope_2 / divisor, slope_1 / divisor, divisor
 
 
-def outermost_fold(balance: Balance, folds: Folds, tau_e: FloatArray) -> tuple[BoolArray, PairState]:
+def outermost_fold(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> tuple[BoolArray, PairState]:
     """Whether there is a fold, and the state of the springs at the outermost; arrays (samples,)."""
     if np.isnan(folds.tau_e).all():
         nowhere = np.full_like(tau_e, np.nan)
@@ -167,7 +167,7 @@ def _is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
     return short
 
 
-def _safeguarded(balance: Balance, folds: Folds, tau_e: FloatArray) -> Values:
+def _safeguarded(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Values:
     """The fold within the box of its cell: by Newton's method from its middle, else by bracketing."""
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:

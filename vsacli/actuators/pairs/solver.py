@@ -14,7 +14,7 @@ from vsacli.actuators.pairs.balance import Balance
 from vsacli.actuators.pairs.bracketing import bracketed_root
 from vsacli.actuators.pairs.corridor import Corridor, corridor
 from vsacli.actuators.pairs.equal_torque import first_guess, third_order_step
-from vsacli.actuators.pairs.folds import Folds, map_folds
+from vsacli.actuators.pairs.folds import FoldMap, map_folds
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat, where_needed
 
@@ -40,7 +40,7 @@ class IteratedPair(Pair):
         return Balance(self.first, self.second)
 
     @cached_property
-    def _folds(self) -> Folds:
+    def _folds(self) -> FoldMap:
         return map_folds(self.first, self.second)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
