@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
+from samples.marks import slow
 
 from vsacli.base.errors import InputError
 from vsacli.dynamics.link_torques import link_torques
@@ -26,6 +27,9 @@ FILES = [
     if file.suffix == ".urdf"
 ]
 BY_NAME = {file.name: file for file in FILES}
+
+MANY_LIMBS = re.compile("alex|baxter|centauro|g1|icub|pr2|romeo|talos|tiago")
+"""Robots with many chains, two arms or hands with fingers."""
 
 ARM = re.compile(r"^\| `(\S+\.urdf)` \| `(\S+)` \| `(\S+)` \| ([RP]+) \|", re.MULTILINE)
 REFUSED = re.compile(r"^\| `(\S+\.urdf)` \| [^|]+ \| ([^|]+) \|$", re.MULTILINE)
@@ -89,7 +93,11 @@ def test_an_arm_of_the_page(name, base, tip, letters):
     check(BY_NAME[name], conversion)
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parts[-3]}-{path.stem}")
+@pytest.mark.parametrize(
+    "path",
+    [slow(path) if MANY_LIMBS.match(path.stem) else path for path in FILES],
+    ids=lambda path: f"{path.parts[-3]}-{path.stem}",
+)
 def test_every_chain_from_the_root_is_exact_or_refused_for_a_reason_on_the_page(path):
     reasons = {reason for name, reason in REFUSED.findall(PAGE) if name == path.name}
     found = list(refusals(path))
