@@ -1,17 +1,21 @@
 """Figures of stored results: the only package that imports matplotlib (Figure API, no pyplot, no display)."""
 
 from vsacli.results.plots.comparison import COMPARISON, compare_files
-from vsacli.results.plots.drawings import drawable_figures, omitted_figures
-from vsacli.results.plots.feasibility_figure import (
+from vsacli.results.plots.corridor_figure import (
     FEASIBILITY,
     FEASIBILITY_VARIABLES,
     check_drawable,
     plot_feasibility,
 )
-from vsacli.results.plots.figures import drawings_of, plot_stored
+from vsacli.results.plots.figures import (
+    RESULT_DRAWINGS,
+    drawable_figures,
+    drawings_of,
+    omitted_figures,
+    plot_stored,
+    simulation_drawings,
+)
 from vsacli.results.plots.files import FORMATS, check_figures, save_figures
-from vsacli.results.plots.result_figures import RESULT_DRAWINGS
-from vsacli.results.plots.simulation_figures import simulation_drawings
 
 __all__ = [
     "COMPARISON",

@@ -20,17 +20,16 @@ from vsacli.base.errors import InputError
 from vsacli.base.units import POSITION, TORQUE
 from vsacli.base.variables import MOTORS, existing
 from vsacli.results.plots.curves import Failures, read_curves
-from vsacli.results.plots.drawing import draw_bands, draw_curve, line_handle
-from vsacli.results.plots.grouped import Label
+from vsacli.results.plots.drawing import draw_bands, draw_curve, house_style, line_handle, line_style
 from vsacli.results.plots.panels import (
     PANEL_WIDTH,
+    Label,
     add_title,
     complete,
     folding,
     joint_panels,
     missing_variables,
 )
-from vsacli.results.plots.style import house_style, line_style
 from vsacli.results.store.reader import StoredResult
 
 COMPARISON = "compare"

@@ -1,4 +1,4 @@
-"""Stiffness of each joint inside what its load allows, one panel per joint."""
+"""Stiffness of each joint inside what its load allows: the figure of `check-feasibility`."""
 
 from __future__ import annotations
 
@@ -8,17 +8,27 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
 from vsacli.base.units import STIFFNESS
 from vsacli.base.variables import VARIABLES, existing
 from vsacli.results.plots.curves import Curves, Failures, read_curves
-from vsacli.results.plots.drawing import draw_bands, draw_curve
-from vsacli.results.plots.panels import add_title, joint_panels
-from vsacli.results.plots.style import line_style
+from vsacli.results.plots.drawing import draw_bands, draw_curve, house_style, line_style
+from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, folding, joint_panels, result_title
 from vsacli.results.store.reader import StoredResult
+
+FEASIBILITY = "feasibility"
+"""Name of the figure; its file is called `<stem>-feasibility`."""
+
+FEASIBILITY_VARIABLES = ("stiffness", "stiffness_lower", "stiffness_upper", "flags")
+"""What it is drawn from."""
+
+PANEL_HEIGHT = 1.7
+"""Inches."""
 
 MOST_ROWS = 5
 BOUNDS = ("stiffness_lower", "stiffness_upper")
@@ -94,3 +104,23 @@ def visible_range(command: FloatArray, *bounds: FloatArray) -> tuple[float, floa
     values = np.concatenate(shown)
     margin = MARGIN * np.ptp(values) or reach
     return (float(values.min() - margin), float(values.max() + margin))
+
+
+def check_drawable(actuators: Sequence[str]) -> None:
+    """Refuse a robot whose joints, by the types of their actuators, have no stiffness to draw.
+
+    Raises:
+        InputError: they have not.
+    """
+    if not compliant_joints(actuators):
+        raise InputError.one("there is no stiffness to plot: all joints are rigid")
+
+
+def plot_feasibility(result: StoredResult) -> Figure:
+    """Draw the commanded stiffness of each joint inside what its load allows, bad stretches shaded."""
+    rows, folds = folding(len(compliant_joints(result.actuators)), MOST_ROWS)
+    width = 2 * PANEL_WIDTH if folds == 1 else PANEL_WIDTH * folds
+    with house_style():
+        figure = Figure((width, PANEL_HEIGHT * rows + 1), layout="constrained")
+        handles = draw_corridors(figure.add_gridspec()[0], result, Failures.of(result))
+        return complete(figure, result_title(result), handles)

@@ -1,18 +1,171 @@
-"""The figures of a file, whatever its kind."""
+"""The figures of a file: of a result, after Figs. 1-3 of Buondonno & De Luca (2016), and of a simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from vsacli.base.errors import InputError
+from vsacli.base.units import ENERGY, POSITION, STIFFNESS, TORQUE
+from vsacli.base.variables import MOTORS, existing
+from vsacli.results.plots.corridor_figure import MOST_ROWS, compliant_joints, draw_corridors
 from vsacli.results.plots.curves import Failures
-from vsacli.results.plots.drawings import Drawing, drawable_figures
-from vsacli.results.plots.result_figures import RESULT_DRAWINGS
-from vsacli.results.plots.simulation_figures import simulation_drawings
-from vsacli.results.plots.style import house_style
+from vsacli.results.plots.drawing import house_style
+from vsacli.results.plots.panels import (
+    GROUP_HEIGHT,
+    MOTOR_LABELS,
+    PANEL_WIDTH,
+    Label,
+    complete,
+    draw_groups,
+    folding,
+    force,
+    grouped_figure,
+    missing_variables,
+    panel_groups,
+    result_title,
+)
 from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import StoredSimulation
+
+NARROW_WIDTH = 2.5
+"""Inches: a stiffness panel where there are several columns of them."""
+
+
+class Drawing(NamedTuple):
+    """How a figure is drawn, and the variables without which it cannot be."""
+
+    needs: tuple[str, ...]
+    draw: Callable[[StoredResult, Failures], Figure]
+
+
+def drawable_figures(
+    drawings: Mapping[str, Drawing], variables: Collection[str], path: str | Path = ""
+) -> list[str]:
+    """Names of the figures that can be drawn from these variables.
+
+    Raises:
+        InputError: there is none; `path` is the file it names.
+    """
+    omitted = omitted_figures(drawings, variables)
+    if len(omitted) == len(drawings):
+        raise InputError.one("nothing can be plotted: " + "; ".join(omitted.values()), path)
+    return [name for name in drawings if name not in omitted]
+
+
+def omitted_figures(drawings: Mapping[str, Drawing], variables: Collection[str]) -> dict[str, str]:
+    """Figures that cannot be drawn from these variables, by name, each with the reason as a sentence."""
+    reasons = {}
+    for name, drawing in drawings.items():
+        missing = [variable for variable in drawing.needs if variable not in variables]
+        if missing:
+            reasons[name] = missing_variables(name, missing)
+    return reasons
+
+
+def _motion(result: StoredResult, failures: Failures) -> Figure:
+    """Fig. 1: positions at the left, stiffness at the right if any joint has one."""
+    compliant = compliant_joints(result.actuators)
+    if not compliant:
+        return grouped_figure(result, failures, "q", [_position_label])
+    rows, folds = folding(len(compliant), MOST_ROWS)
+    widths = (PANEL_WIDTH, PANEL_WIDTH if folds == 1 else NARROW_WIDTH * folds)
+    height = max(GROUP_HEIGHT * len(panel_groups(result.joint_types)), 1.4 * rows)
+    figure = Figure((sum(widths), height + 1), layout="constrained")
+    grid = figure.add_gridspec(1, 2, width_ratios=widths)
+    handles = draw_groups(grid[0], result, failures, "q", [_position_label])
+    handles += draw_corridors(grid[1], result, failures)
+    return complete(figure, result_title(result), handles)
+
+
+def _motor_torque(result: StoredResult, failures: Failures) -> Figure:
+    """Fig. 2: motor 1 at the left, motor 2 at the right."""
+    return grouped_figure(result, failures, "tau_motor", MOTOR_LABELS)
+
+
+def _elastic_torque(result: StoredResult, failures: Failures) -> Figure:
+    """Fig. 3."""
+    return grouped_figure(result, failures, "tau_e", [_elastic_label])
+
+
+def _energy(result: StoredResult, failures: Failures) -> Figure:
+    """Energy in the springs at the left, if there are any; beside it what each motor has worked."""
+    motors = int(
+        np.count_nonzero(np.any(existing(result.declared["motor_energy"], result.actuators), axis=0))
+    )
+    if not compliant_joints(result.actuators):
+        return grouped_figure(result, failures, "motor_energy", _WORK_LABELS)
+    height = GROUP_HEIGHT * len(panel_groups(result.joint_types)) + 1
+    figure = Figure(((1 + motors) * PANEL_WIDTH, height), layout="constrained")
+    grid = figure.add_gridspec(1, 2, width_ratios=(1, motors))
+    handles = draw_groups(grid[0], result, failures, "elastic_energy", [_elastic_energy_label])
+    handles += draw_groups(grid[1], result, failures, "motor_energy", _WORK_LABELS)
+    return complete(figure, result_title(result), handles)
+
+
+def _position_label(joint_type: str) -> str:
+    return f"joint position $q$ [{POSITION.unit(joint_type)}]"
+
+
+def _elastic_label(joint_type: str) -> str:
+    return rf"elastic {force(joint_type)} $\tau_e$ [{TORQUE.unit(joint_type)}]"
+
+
+def _elastic_energy_label(_joint_type: str) -> str:
+    return f"elastic energy [{ENERGY}]"
+
+
+def _work_label(motor: int, _joint_type: str) -> str:
+    return f"work of motor {motor} [{ENERGY}]"
+
+
+_WORK_LABELS = [partial(_work_label, motor) for motor in MOTORS]
+
+
+RESULT_DRAWINGS: dict[str, Drawing] = {
+    "motion": Drawing(("q", "stiffness"), _motion),
+    "motor-torque": Drawing(("tau_motor",), _motor_torque),
+    "elastic-torque": Drawing(("tau_e",), _elastic_torque),
+    "energy": Drawing(("elastic_energy", "motor_energy"), _energy),
+}
+"""The figures of a result of `invdyn`, by name."""
+
+
+def simulation_drawings(actuators: Iterable[str]) -> dict[str, Drawing]:
+    """The figures of a simulation of joints with these types of actuators, by name."""
+    types = tuple(actuators)
+    return {
+        name: _drawing(variable, labels)
+        for name, (variable, labels) in _FIGURES.items()
+        if np.any(existing(StoredSimulation.declared[variable], types))
+    }
+
+
+def _drawing(variable: str, labels: Sequence[Label]) -> Drawing:
+    def draw(simulation: StoredResult, failures: Failures) -> Figure:
+        return grouped_figure(simulation, failures, variable, labels)
+
+    return Drawing((variable,), draw)
+
+
+def _position_error(joint_type: str) -> str:
+    return f"position error $q - q_d$ [{POSITION.unit(joint_type)}]"
+
+
+def _stiffness_error(joint_type: str) -> str:
+    return rf"stiffness error $\sigma - \sigma_d$ [{STIFFNESS.unit(joint_type)}]"
+
+
+_FIGURES: dict[str, tuple[str, Sequence[Label]]] = {
+    "position-error": ("q_error", [_position_error]),
+    "stiffness-error": ("stiffness_error", [_stiffness_error]),
+    "motor-torque": ("tau_motor_actual", MOTOR_LABELS),
+}
 
 
 def drawings_of(stored: StoredResult) -> Mapping[str, Drawing]:

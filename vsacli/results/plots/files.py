@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from vsacli.base.atomic_files import AtomicFile, check_target, reporting_storage_errors
 from vsacli.base.errors import StorageError
-from vsacli.results.plots.style import house_style
+from vsacli.results.plots.drawing import house_style
 
 FORMATS = ("png", "pdf", "svg")
 
