@@ -23,7 +23,7 @@ HOMES = {"yaml": "documents", "h5py": "results.store", "matplotlib": "results.pl
 HEAVY = ("numpy", "scipy", "matplotlib", "h5py")
 
 NOT_FOR_THE_MAIN_JOB = (
-    *("scipy", "matplotlib", "numpy.ma", "numpy.polynomial", "numpy.typing", "h5py._hl.dims"),
+    *("scipy", "matplotlib", "numpy.ma", "numpy.polynomial", "numpy.typing"),
     *("concurrent", "importlib.resources", "random", "shutil", "subprocess", "tempfile", "traceback"),
     *("cli.simulate", "cli.check_feasibility", "control", "files", "studies"),
     *("results.csv_export", "results.plots", "results.store.reader", "robot.modified_dh", "robot.urdf"),

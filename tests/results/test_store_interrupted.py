@@ -12,9 +12,8 @@ import pytest
 from samples.results import PlannedTrajectory, python, random_block, robot, write_result
 
 from vsacli.base.errors import StorageError
-from vsacli.results.store.interrupts import interrupts_deferred
 from vsacli.results.store.reader import open_result
-from vsacli.results.store.writer import ResultWriter
+from vsacli.results.store.writer import ResultWriter, interrupts_deferred
 
 ENDLESS = """
 import sys

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from vsacli.control.simulation import Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
     from vsacli.documents.source import Source
-    from vsacli.results.store.simulation_writer import SimulationWriter
+    from vsacli.results.store.simulation import SimulationWriter
     from vsacli.robot.model import Robot
     from vsacli.trajectory.trajectory import Trajectory
 
@@ -131,7 +131,7 @@ def simulate(
     arm = replace(inputs.robot, sources=(*inputs.robot.sources, *sources))
     inputs = inputs._replace(robot=arm)
     refuse_input_as_output(path, inputs.files)
-    from vsacli.results.store.simulation_writer import SimulationWriter
+    from vsacli.results.store.simulation import SimulationWriter
 
     if plot_folder is not None:
         from vsacli.results.plots import check_figures, simulation_drawings

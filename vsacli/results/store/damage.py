@@ -16,7 +16,10 @@ from typing import BinaryIO
 import h5py
 
 from vsacli.base.errors import InputError, StorageError
+from vsacli.documents.source import HDF5_SIGNATURE
 from vsacli.results.store.schema import CHUNK_BYTES
+
+EXPECTED = "expected a result file, as invdyn or simulate writes it"
 
 PIECE = 2**24
 """Bytes of a file looked at in one go."""
@@ -27,6 +30,39 @@ _REFERENCE = struct.Struct("<IQI")
 _HEAP = b"GCOL\x01\0\0\0"
 _SMALLEST_HEAP = 4096
 _LARGEST_HEAP = 2**26
+
+
+def open_checked(path: str | Path) -> h5py.File:
+    """Open a file for reading, after all of it was searched for what HDF5 does not survive.
+
+    Raises:
+        InputError: there is no such file, or it is none of HDF5, or damaged.
+        StorageError: the operating system refuses to read it, or another program is writing it.
+    """
+    _check_signature(path)
+    with reporting_damage(path):
+        check_heaps(path)
+        return h5py.File(path, "r")
+
+
+def _check_signature(path: str | Path) -> None:
+    """Tell a missing file, a folder and a file of another kind from each other before HDF5 sees them."""
+    if "\0" in str(path):
+        raise InputError.one("the path holds a NUL character", path)
+    try:
+        if Path(path).is_fifo():
+            raise InputError.one(f"is a pipe; {EXPECTED}", path)
+        with Path(path).open("rb") as file:
+            start = file.read(len(HDF5_SIGNATURE))
+    except FileNotFoundError:
+        raise InputError.one(f"there is no such file; {EXPECTED}", path) from None
+    except IsADirectoryError:
+        raise InputError.one(f"is a folder; {EXPECTED}", path) from None
+    except OSError as error:
+        raise StorageError(path, f"cannot be read: {error.strerror}") from error
+    if start != HDF5_SIGNATURE:
+        kind = "is empty" if not start else "is not an HDF5 file"
+        raise InputError.one(f"{kind}; {EXPECTED}", path)
 
 
 @contextlib.contextmanager

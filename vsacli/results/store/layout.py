@@ -1,30 +1,35 @@
-"""The empty result file: attributes, coordinates, variables without samples, inputs."""
+"""The empty result file: attributes, coordinates, variables without samples, and the group `/inputs`."""
 
 from __future__ import annotations
 
 import json
 import math
 import platform
+from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
 
 import h5py
 import numpy as np
 
 from vsacli import __version__
+from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.base.wrench import WRENCH_AXES
-from vsacli.results.store.inputs import write_robot, write_sources
-from vsacli.results.store.quickly import add_array, add_empty, attach_scales, set_attributes
+from vsacli.documents.source import Source
+from vsacli.results.store.resolved import LABELS, ResolvedField, resolve
 from vsacli.results.store.schema import (
     TEXT,
     chunk_rows,
     row_shape,
     storable,
     storage_type,
+    unit_attributes,
     variable_attributes,
 )
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
+
+GZIP_LEVEL = 4
 
 
 def row_bytes(variable: Variable, joints: int) -> int:
@@ -45,17 +50,17 @@ def create_layout(
     Returns:
         The datasets that take samples, by the names of their variables, `time` first.
     """
-    set_attributes(file, {"format": format_name, **_root_attributes(robot, trajectory, command_line)})
+    file.attrs.update({"format": format_name, **_root_attributes(robot, trajectory, command_line)})
     scales = _create_coordinates(file, robot, trajectory.samples)
     if trajectory.wrench is not None and any("wrench_axis" in variable.dims for variable in variables):
         scales["wrench_axis"] = _create_wrench_axis(file, trajectory.wrench.frame)
     stored = {"time": scales["time"]}
     for variable in variables:
         dataset = stored[variable.name] = _create_variable(file, variable, robot, trajectory.samples)
-        attach_scales(dataset, [scales[dim] for dim in ("time", *variable.dims)])
+        _attach_scales(dataset, [scales[dim] for dim in ("time", *variable.dims)])
     inputs = file.create_group("inputs", track_order=True)
-    write_sources(inputs, robot.sources + trajectory.sources)
-    write_robot(inputs, robot, scales)
+    _write_sources(inputs, robot.sources + trajectory.sources)
+    _write_robot(inputs, robot, scales)
     return stored
 
 
@@ -82,37 +87,91 @@ def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str
     time = _create_variable(file, VARIABLES["time"], robot, samples)
     joint = _create_labels(file, "joint", robot.joint_names, "joint name")
     joint_type = _create_labels(file, "joint_type", robot.joint_types, "revolute or prismatic")
-    motor = add_array(file, "motor", np.array(MOTORS, dtype="<i8"))
-    set_attributes(motor, {"long_name": "motor of a joint"})
+    motor = _add_array(file, "motor", np.array(MOTORS, dtype="<i8"))
+    motor.attrs["long_name"] = "motor of a joint"
     scales = {"time": time, "joint": joint, "motor": motor}
     for name, scale in scales.items():
         scale.make_scale(name)
-    attach_scales(joint_type, [joint])
+    _attach_scales(joint_type, [joint])
     return scales
 
 
 def _create_wrench_axis(file: h5py.File, frame: str) -> h5py.Dataset:
     axis = _create_labels(file, "wrench_axis", WRENCH_AXES, "force and moment along the axes of a frame")
-    set_attributes(axis, {"frame": frame})
+    axis.attrs["frame"] = frame
     axis.make_scale("wrench_axis")
     return axis
 
 
 def _create_labels(file: h5py.File, name: str, labels: tuple[str, ...], long_name: str) -> h5py.Dataset:
-    dataset = add_array(file, name, np.array(labels, dtype=TEXT))
-    set_attributes(dataset, {"long_name": long_name})
+    dataset = _add_array(file, name, np.array(labels, dtype=TEXT))
+    dataset.attrs["long_name"] = long_name
     return dataset
 
 
 def _create_variable(file: h5py.File, variable: Variable, robot: Robot, samples: int) -> h5py.Dataset:
     joints = len(robot.joints)
-    dataset = add_empty(
-        file,
+    row = row_shape(variable, joints)
+    dataset = file.create_dataset(
         variable.name,
-        (samples, *row_shape(variable, joints)),
-        storage_type(variable),
-        chunk_rows(samples, row_bytes(variable, joints)),
-        compressed=variable.name == "flags",
+        shape=(samples, *row),
+        maxshape=(samples, *row),
+        dtype=storage_type(variable),
+        chunks=(chunk_rows(samples, row_bytes(variable, joints)), *row),
+        compression=GZIP_LEVEL if variable.name == "flags" else None,
+        track_order=True,
     )
-    set_attributes(dataset, variable_attributes(variable, robot.joint_types))
+    dataset.attrs.update(variable_attributes(variable, robot.joint_types))
     return dataset
+
+
+def _write_sources(inputs: h5py.Group, sources: tuple[Source, ...]) -> None:
+    """A subgroup `file_1`, `file_2`, ... for each file that was read, once even if it served twice."""
+    for number, source in enumerate(dict.fromkeys(sources), start=1):
+        group = inputs.create_group(f"file_{number}", track_order=True)
+        group.attrs.update({"path": storable(source.path), "sha256": source.sha256})
+        if source.text is not None:
+            group.create_dataset("text", data=storable(source.text), dtype=TEXT)
+
+
+def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5py.Dataset]) -> None:
+    """The subgroup `robot`: each declared field as an array, e.g. `gravity`, `joints/link_mass`.
+
+    One group for the joints, and no deeper: a group `motor` would collide with the coordinate `motor`.
+    """
+    group = inputs.create_group("robot", track_order=True)
+    scales = dict(coordinates)
+    for name, labels in LABELS.items():
+        scales[name] = _add_array(group, name, np.array(labels, dtype=TEXT))
+        scales[name].make_scale(name)
+    joints = group.create_group("joints")
+    for field in resolve(robot):
+        of_joints = field.path[0] == "joints"
+        name = "_".join(field.path[1:] if of_joints else field.path)
+        dataset = _write_field(joints if of_joints else group, name, field, robot.joint_types)
+        _attach_scales(dataset, [scales[dim] for dim in field.dims])
+
+
+def _write_field(
+    group: h5py.Group, name: str, field: ResolvedField, joint_types: tuple[str, ...]
+) -> h5py.Dataset:
+    if field.quantity is None:
+        units = {}
+        values = np.array([storable(text) for text in field.values.flat], dtype=TEXT)
+    else:
+        units = unit_attributes(field.quantity, joint_types)
+        values = field.values
+    dataset = _add_array(group, name, values.reshape(field.values.shape))
+    dataset.attrs.update({**units, "long_name": field.doc})
+    return dataset
+
+
+def _add_array(group: h5py.Group, name: str, values: AnyArray) -> h5py.Dataset:
+    """A new dataset of numbers, or of texts in an array of the type `TEXT`; attributes keep their order."""
+    return group.create_dataset(name, data=values, dtype=values.dtype, track_order=True)
+
+
+def _attach_scales(dataset: h5py.Dataset, scales: Iterable[h5py.Dataset]) -> None:
+    """Attach to each axis its scale."""
+    for axis, scale in enumerate(scales):
+        dataset.dims[axis].attach_scale(scale)

@@ -13,13 +13,11 @@ import h5py
 import numpy as np
 
 from vsacli.base.arrays import FlagArray, FloatArray
-from vsacli.base.errors import InputError, StorageError
+from vsacli.base.errors import InputError
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
-from vsacli.documents.source import HDF5_SIGNATURE
-from vsacli.results.store.damage import bounded, check_heaps, own_dataset, reporting_damage
+from vsacli.results.store.damage import bounded, open_checked, own_dataset, reporting_damage
 from vsacli.results.store.schema import FORMAT, row_shape, storage_type
 
-EXPECTED = "expected a result file, as invdyn or simulate writes it"
 GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
 
 
@@ -159,12 +157,9 @@ def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
     Raises:
         InputError, StorageError: as `StoredResult.open`.
     """
-    _check_signature(path)
     with contextlib.ExitStack() as stack:
-        with reporting_damage(path):
-            check_heaps(path)
-            file = stack.enter_context(h5py.File(path, "r"))
-            found = _format(file)
+        file = stack.enter_context(open_checked(path))
+        found = _format(path, file)
         kind = next((kind for kind in kinds if kind.format == found), None)
         if kind is None:
             raise InputError.one(_foreign(found, kinds), path)
@@ -184,36 +179,14 @@ def stored_format(path: str | Path) -> str | None:
     Raises:
         InputError, StorageError: as `StoredResult.open`.
     """
-    _check_signature(path)
+    with open_checked(path) as file:
+        return _format(path, file)
+
+
+def _format(path: str | Path, file: h5py.File) -> str | None:
     with reporting_damage(path):
-        check_heaps(path)
-        with h5py.File(path, "r") as file:
-            return _format(file)
-
-
-def _format(file: h5py.File) -> str | None:
-    found = file.attrs.get("format")
+        found = file.attrs.get("format")
     return found if isinstance(found, str) else None
-
-
-def _check_signature(path: str | Path) -> None:
-    """Tell a missing file, a folder and a file of another kind from each other before HDF5 sees them."""
-    if "\0" in str(path):
-        raise InputError.one("the path holds a NUL character", path)
-    try:
-        if Path(path).is_fifo():
-            raise InputError.one(f"is a pipe; {EXPECTED}", path)
-        with Path(path).open("rb") as file:
-            start = file.read(len(HDF5_SIGNATURE))
-    except FileNotFoundError:
-        raise InputError.one(f"there is no such file; {EXPECTED}", path) from None
-    except IsADirectoryError:
-        raise InputError.one(f"is a folder; {EXPECTED}", path) from None
-    except OSError as error:
-        raise StorageError(path, f"cannot be read: {error.strerror}") from error
-    if start != HDF5_SIGNATURE:
-        kind = "is empty" if not start else "is not an HDF5 file"
-        raise InputError.one(f"{kind}; {EXPECTED}", path)
 
 
 def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:

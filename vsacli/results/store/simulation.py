@@ -1,11 +1,15 @@
-"""Reading a simulation file, or whichever file a simulation or the inverse dynamics have left."""
+"""The simulation file: the layout of a result file, with the variables of a simulation."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
+from vsacli.base.variables import Variable, select_variables
 from vsacli.results.store.reader import StoredResult, open_one_of
+from vsacli.results.store.writer import ResultWriter
+from vsacli.trajectory.trajectory import Trajectory
 
 FORMAT = "vsacli-simulation/1"
 
@@ -18,6 +22,16 @@ class StoredSimulation(StoredResult):
     command = "simulate"
     declared = SIMULATION_VARIABLES
     _to_get = "run simulate again"
+
+
+class SimulationWriter(ResultWriter):
+    """Writes a simulation file; the trajectory's samples are the most it can have."""
+
+    _format = FORMAT
+
+    @staticmethod
+    def _selected(names: Iterable[str] | None, _trajectory: Trajectory) -> tuple[Variable, ...]:
+        return select_variables(SIMULATION_VARIABLES if names is None else names, SIMULATION_VARIABLES)
 
 
 def open_stored(path: str | Path) -> StoredResult:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
+import os
+import signal
+import threading
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self
@@ -16,11 +20,8 @@ from vsacli.base.atomic_files import AtomicFile, check_free_space, reporting_sto
 from vsacli.base.errors import InputError
 from vsacli.base.variables import VARIABLES, Variable, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
-from vsacli.results.store.interrupts import interrupts_deferred
 from vsacli.results.store.layout import create_layout, row_bytes
-from vsacli.results.store.quickly import write_rows
 from vsacli.results.store.schema import FORMAT, TEXT, storable
-from vsacli.results.store.sink import Sink
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -82,7 +83,7 @@ class ResultWriter:
         Raises:
             StorageError: the target must not be replaced, cannot be written, or does not fit its disk.
         """
-        self._cleanup = ExitStack()
+        self._cleanup = contextlib.ExitStack()
         try:
             with interrupts_deferred():
                 self._create()
@@ -125,7 +126,7 @@ class ResultWriter:
         with interrupts_deferred():
             self._cleanup.close()
 
-    @contextmanager
+    @contextlib.contextmanager
     def _hdf5(self) -> Iterator[None]:
         """Around any use of HDF5; an error of the disk counts more than what HDF5 makes of it."""
         with interrupts_deferred():
@@ -158,7 +159,7 @@ class ResultWriter:
 
     def _append(self, block: Samples) -> None:
         for name, dataset in self._stored.items():
-            write_rows(dataset, self._written, getattr(block, name))
+            dataset[self._written : self._written + len(block.time)] = getattr(block, name)
         self._written += len(block.time)
 
     def _complete(self, report: Mapping[str, Any]) -> None:
@@ -187,3 +188,74 @@ class ResultWriter:
             if variable.name in absent:
                 raise InputError.one(f"there is no {variable.name}: the trajectory has no wrench")
         return selected
+
+
+class Sink(io.RawIOBase):
+    """A file object for h5py whose writing never fails in HDF5's sight.
+
+    HDF5 cannot be unwound from a failed write: closing its file fails as well, and the process then crashes
+    at exit. So the first error is kept here, what follows it is dropped, and the caller looks at `error`
+    after each step.
+    """
+
+    def __init__(self, file: io.FileIO) -> None:
+        self._file = file
+        self.error: OSError | None = None
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Move to a byte."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """The current byte."""
+        return self._file.tell()
+
+    def readinto(self, buffer: Any) -> int:
+        """Read bytes that were written before."""
+        return self._file.readinto(buffer)
+
+    def write(self, data: Any) -> int:
+        """Write all of `data`, or note why not."""
+        rest = memoryview(data)
+        try:
+            while len(rest) and self.error is None:
+                rest = rest[self._file.write(rest) :]
+        except OSError as error:
+            self.error = error
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length of the file, or note why not."""
+        try:
+            return self._file.truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return 0
+
+    def close(self) -> None:
+        """Close the file, or note what the file system reports only now."""
+        try:
+            self._file.close()
+        except OSError as error:
+            self.error = self.error or error
+        super().close()
+
+
+@contextlib.contextmanager
+def interrupts_deferred() -> Iterator[None]:
+    """Let a Ctrl-C that comes during the enclosed statements take effect after them.
+
+    In a thread other than the main one, where no signal handler ever runs, this does nothing.
+    """
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(handler):
+        yield
+        return
+    arrived: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: arrived.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if arrived:
+            signal.raise_signal(signal.SIGINT)
