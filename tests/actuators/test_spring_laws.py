@@ -235,7 +235,7 @@ def test_misfit_of_a_table_is_told():
     misfit = np.abs(law.torque(deflection) - torque).max()
     assert 0.01 < misfit < 0.05
     amount = f"{misfit:.2g} ({100 * misfit / np.ptp(torque):.2g} % of its range)"
-    assert law.notes == (f"the curve through spring.csv misses a measured torque by up to {amount}",)
+    assert law.warnings == (f"the curve through spring.csv misses a measured torque by up to {amount}",)
 
 
 def test_table_that_pushes_and_pulls_is_stiff_at_rest():

@@ -23,7 +23,7 @@ from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
 MOST_JOINTS = 1000
-_POSITION, _STIFFNESS = ".q", ".stiffness"
+_POSITION_SUFFIX, _STIFFNESS_SUFFIX = ".q", ".stiffness"
 
 
 class PlaceholderRobot(NamedTuple):
@@ -80,14 +80,16 @@ def _tables(root: tree.Mapping) -> Iterator[str]:
 def _of_columns(columns: Iterable[str]) -> tuple[str, ...]:
     """Names of joints from the columns of their positions, `<joint>.q` or `q1`, with or without a unit."""
     bare = [column.partition("[")[0].strip() for column in columns]
-    named = _names(column.removesuffix(_POSITION) for column in bare if column.endswith(_POSITION))
+    named = _names(
+        column.removesuffix(_POSITION_SUFFIX) for column in bare if column.endswith(_POSITION_SUFFIX)
+    )
     numbered = sum(1 for column in bare if column[:1] == "q" and column[1:].isdecimal())
     return named or _numbered(numbered)
 
 
 def _with_stiffness(columns: Iterable[str], names: Sequence[str]) -> tuple[str, ...]:
     bare = {column.partition("[")[0].strip() for column in columns}
-    return tuple(name for name in names if f"{name}{_STIFFNESS}" in bare) or tuple(names)
+    return tuple(name for name in names if f"{name}{_STIFFNESS_SUFFIX}" in bare) or tuple(names)
 
 
 def _of_nodes(positions: Sequence[tree.Node], stiffnesses: Sequence[tree.Node]) -> tuple[str, ...]:

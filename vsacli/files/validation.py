@@ -189,7 +189,7 @@ def _table(path: str, robots: Robots) -> Checked:
     if set(table.columns) != SPRING_COLUMNS:
         return _trajectory(path, robots)
     spring = MeasuredSpring(file=table)
-    return _usable(path, f"spring of {_count(len(table.values), 'row')}", spring.notes)
+    return _usable(path, f"spring of {_count(len(table.values), 'row')}", spring.warnings)
 
 
 def _urdf(path: str, _: Robots) -> Checked:

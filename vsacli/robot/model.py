@@ -185,7 +185,8 @@ class Joint:
     def warnings(self) -> Iterator[str]:
         """What may not be what was meant, of the link and of the springs."""
         yield from (f"link of joint {self.name}: {warning}" for warning in self.link.warnings())
-        yield from (f"spring of joint {self.name}: {note}" for law in self.springs for note in law.notes)
+        for law in self.springs:
+            yield from (f"spring of joint {self.name}: {warning}" for warning in law.warnings)
 
 
 @dataclass(frozen=True)

@@ -49,8 +49,8 @@ class SpringLaw(ABC):
         return False
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """What the user should know about how the law was made."""
+    def warnings(self) -> tuple[str, ...]:
+        """How far the law may be from the spring it describes, one sentence each."""
         return ()
 
     @property

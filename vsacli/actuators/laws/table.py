@@ -50,7 +50,7 @@ class MeasuredSpring(SpringLaw):
         return fit_curve(*self.file.values.T)
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """How well the curve fits."""
         share = 100 * self._curve.residual / np.ptp(self.file.values[:, 1])
         misfit = f"{self._curve.residual:.2g} ({share:.2g} % of its range)"

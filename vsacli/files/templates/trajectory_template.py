@@ -11,6 +11,8 @@ from vsacli.robot.model import Joint, Robot
 from vsacli.trajectory.file import DEFAULT_RATE, FORMAT, OF_ANY_ROBOT
 
 DURATION = 4.0
+"""s"""
+
 POSITION_DEGREE = 9
 STIFFNESS_DEGREE = 5
 """With these, the motors' acceleration vanishes at both ends, and so does the step of their torques."""
@@ -20,16 +22,18 @@ HEAD = (
     "a step. What stands commented out is optional.",
 )
 
-ANGLE = math.radians(30)
-STROKE = 0.1
-PEAK_RATE = 2.5
+ANGLE_OF_MOTION = math.radians(30)
+STROKE_OF_MOTION = 0.1
+"""How far a joint moves where no limit is nearer, rad and m."""
+
+PEAK_TO_MEAN_VELOCITY = 2.5
 """Peak velocity of the motion, relative to its mean, rounded up."""
 
-SHARE_OF_LIMIT = 0.5
+USED_SHARE = 0.5
 """Share of a range or limit that the motion uses."""
 
-SOFT, STIFF = 1.15, 1.35
-"""Stiffness relative to the smallest reachable one, where nothing bounds it from above."""
+START_TO_LOWEST, END_TO_LOWEST = 1.15, 1.35
+"""Stiffness at both ends relative to the lowest that can be reached, where nothing bounds it from above."""
 
 Values = dict[str, Any]
 
@@ -75,9 +79,9 @@ def _way(joint: Joint) -> tuple[float, float]:
     low, high = joint.limits.position
     slowest = min(abs(bound) for bound in joint.limits.velocity)
     length = min(
-        ANGLE if joint.is_revolute else STROKE,
-        SHARE_OF_LIMIT * (high - low),
-        SHARE_OF_LIMIT * slowest * DURATION / PEAK_RATE,
+        ANGLE_OF_MOTION if joint.is_revolute else STROKE_OF_MOTION,
+        USED_SHARE * (high - low),
+        USED_SHARE * slowest * DURATION / PEAK_TO_MEAN_VELOCITY,
     )
     start = min(max(0.0, low), high - length)
     return start, start + length
@@ -103,7 +107,7 @@ def _stiffnesses(joint: Joint, load: float) -> tuple[float, float]:
     ranges = stiffness_ranges(joint, load)
     lower, upper = ranges["loaded"] if ranges["loaded"][0] < ranges["loaded"][1] else ranges["unloaded"]
     lower, upper = max(lower, joint.limits.stiffness[0]), min(upper, joint.limits.stiffness[1])
-    soft, stiff = SOFT * lower, STIFF * lower
+    soft, stiff = START_TO_LOWEST * lower, END_TO_LOWEST * lower
     if stiff > upper:
         soft, stiff = lower + (upper - lower) / 3, lower + (upper - lower) * 2 / 3
     return soft, stiff

@@ -69,9 +69,9 @@ def _scan_start(acceptance: Acceptance, few: Motion) -> int | None:
     for start in range(0, len(numbers), FACTORS_AT_ONCE):
         tried = numbers[start : start + FACTORS_AT_ONCE]
         refused = acceptance.refused(_joined(_slowed(few, number / FACTOR_DENOMINATOR) for number in tried))
-        hope = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
-        if hope.size:
-            return numbers[max(start + int(hope[0]) - 1, 0)]
+        accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
+        if accepted.size:
+            return numbers[max(start + int(accepted[0]) - 1, 0)]
     return None
 
 

@@ -25,10 +25,10 @@ from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
-MARGINS = (1, 2, 4, 8)
+MARGIN_FACTORS = (1, 2, 4, 8)
 """Multiples of the margin tried where motor limits refuse the nearest profile: torques grow with 1/margin."""
 
-SMOOTHINGS = (1, 2, 4, 8)
+SMOOTHING_FACTORS = (1, 2, 4, 8)
 """Multiples of the smoothing time tried likewise: torques grow with the second derivative."""
 
 CLEARANCE = 1e-6
@@ -77,7 +77,7 @@ def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: f
         ImpossibleError: with the reason.
     """
     _check_possible(acceptance, joint, load)
-    nearest, *others = product(MARGINS, SMOOTHINGS)
+    nearest, *others = product(MARGIN_FACTORS, SMOOTHING_FACTORS)
     change = _change(acceptance, joint, load, *nearest)
     tried = [change] if constant is None else [change, Change.constant(load.time, constant)]
     if not _accepted(acceptance, joint, load, change):
