@@ -10,8 +10,8 @@ import numpy as np
 
 from vsacli.actuators.laws.inversion import FirstGuess, inverse
 from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.laws.measured_curve import MeasuredCurve, fit_curve
 from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.table_curve import MeasuredCurve, fit_curve
 from vsacli.actuators.laws.tendon import Mirrored
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem

@@ -71,7 +71,7 @@ class _Box(NamedTuple):
         outer_1: phi_1 at the outer end, its largest.
         inner_2: phi_2 at the inner end, its largest.
         outer_2: phi_2 at the outer end, its smallest.
-        outer_near: 1 where the stiffness at the outer end is at most twice the demand, else 0.
+        outer_near: 1 where the stiffness at the outer end is less than twice the demand, else 0.
     """
 
     inner_1: FloatArray

@@ -1,4 +1,4 @@
-"""A smooth curve through measured torques that keeps the shape of a hardening spring.
+"""The curve of a table: smooth, through measured torques, with the shape of a hardening spring.
 
 The slope zeta is written as phi g(phi) with g a cubic B-spline of non-negative coefficients, so that zeta has
 the sign of phi whatever the data are; stiffness and torque are its integrals, with tau(0) = 0. The torque is
