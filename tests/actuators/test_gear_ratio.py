@@ -16,7 +16,7 @@ from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.dynamics.forward import State, state_derivative
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 from vsacli.robot.model import Robot
 
 HEAD = "format: vsacli-robot/1\nname: rig\njoints:\n"
@@ -178,7 +178,7 @@ def test_a_robot_with_single_motors_stores_its_ratios_too(vsacli: Callable[..., 
     vsacli("invdyn", "rig.yaml", "move.yaml", "-o", "result.h5")
     assert vsacli("export", "result.h5", "-o", "joint.csv").code == 0
     assert vsacli("export", "result.h5", "-o", "motor.csv", "--side", "motor").code == 0
-    with open_result("result.h5") as result:
+    with StoredResult.open("result.h5") as result:
         np.testing.assert_array_equal(result.gear_ratio, [[20, np.nan]])
     same(20 * columns("motor.csv")["a.tau_motor_shaft_1"], columns("joint.csv")["a.tau_motor_1"])
 

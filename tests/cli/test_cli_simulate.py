@@ -14,7 +14,7 @@ from samples.command_line import REPOSITORY, ROBOT, contents, edited
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.cli.console import Exit
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import StoredSimulation
 
 FEEDBACK = ("--controller", "feedback-linearization")
@@ -43,7 +43,7 @@ def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
         q, actual, error = (stored.read(name) for name in ("q", "q_actual", "q_error"))
         assert np.array_equal(actual - q, error)
         assert np.abs(error).max() < 1e-8  # the integrator's tolerance, as elsewhere
-        assert stored.report["format"] == "vsacli-simulation-report/1"
+        assert stored.report_json["format"] == "vsacli-simulation-report/1"
 
 
 def test_a_simulation_opens_in_xarray(vsacli, quick, tmp_path):
@@ -171,4 +171,4 @@ def test_a_simulation_is_no_result_of_invdyn(vsacli, quick, tmp_path):
     with pytest.raises(
         InputError, match=r"is a simulation \(vsacli-simulation/1\), expected a result \(vsacli-result/1\)"
     ):
-        open_result(tmp_path / "s.h5")
+        StoredResult.open(tmp_path / "s.h5")

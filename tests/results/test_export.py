@@ -14,7 +14,7 @@ from vsacli.base.errors import InputError, StorageError
 from vsacli.base.variables import Block
 from vsacli.results import csv_export as export
 from vsacli.results.csv_export import UndefinedSamplesError, export_csv, export_csv_file
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 
 SAMPLES = 241
 RATE = 1000.0
@@ -31,7 +31,7 @@ def stored(tmp_path):
     opened = []
 
     def store(block):
-        opened.append(open_result(write_result(tmp_path / f"{len(opened)}.h5", block)))
+        opened.append(StoredResult.open(write_result(tmp_path / f"{len(opened)}.h5", block)))
         return opened[-1]
 
     yield store
@@ -142,7 +142,10 @@ def test_a_single_sample_has_no_rate(stored):
 def test_a_variable_that_is_not_stored(tmp_path, block):
     stream = io.StringIO()
     path = write_result(tmp_path / "r.h5", block, variables=["q"])
-    with open_result(path) as result, pytest.raises(InputError, match="holds no tau_motor; run invdyn again"):
+    with (
+        StoredResult.open(path) as result,
+        pytest.raises(InputError, match="holds no tau_motor; run invdyn again"),
+    ):
         export_csv(result, stream)
     assert stream.getvalue() == ""
 
@@ -206,11 +209,11 @@ FULL = """
 import resource
 from vsacli.base.errors import StorageError
 from vsacli.results.csv_export import export_csv_file
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
 try:
-    with open_result("r.h5") as result:
+    with StoredResult.open("r.h5") as result:
         export_csv_file(result, "out.csv")
 except StorageError as error:
     print(error)

@@ -17,7 +17,7 @@ from samples.command_line import ROBOT
 
 from vsacli.base.errors import InputError
 from vsacli.results.store.damage import check_heaps
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 
 CASES = 60
 SECONDS = 30
@@ -118,7 +118,7 @@ def test_a_heap_of_texts_that_never_ends(
     struct.pack_into(form, content, heap_object(bytes(content), 3), *fields)
     (tmp_path / "r.h5").write_bytes(content)
     with pytest.raises(InputError, match=r"r.h5: is damaged: the texts at byte \d+ have no end"):
-        open_result(tmp_path / "r.h5")
+        StoredResult.open(tmp_path / "r.h5")
 
 
 def test_a_text_is_not_longer_than_the_file(small_result: Path, tmp_path: Path) -> None:
@@ -128,7 +128,7 @@ def test_a_text_is_not_longer_than_the_file(small_result: Path, tmp_path: Path) 
     struct.pack_into("<I", content, offset, 2**32 - 1)
     (tmp_path / "r.h5").write_bytes(content)
     with pytest.raises(InputError, match=r"r.h5: is damaged .*joint_type claims texts of 4,294,967,"):
-        open_result(tmp_path / "r.h5")
+        StoredResult.open(tmp_path / "r.h5")
 
 
 def test_heaps_are_found_wherever_a_piece_of_the_file_ends(

@@ -15,7 +15,7 @@ from samples.results import random_block, write_result
 
 from vsacli.base.errors import StorageError
 from vsacli.results.plots import FORMATS, check_figures, compare_files, plot_stored, save_figures
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 
 
 def motion() -> dict[str, Figure]:
@@ -61,7 +61,7 @@ def test_a_folder_that_is_a_file_is_a_storage_error(tmp_path: Path) -> None:
 
 
 def test_a_stored_result_is_drawn(tmp_path: Path) -> None:
-    with open_result(write_result(tmp_path / "run.h5", random_block(5000, 2))) as result:
+    with StoredResult.open(write_result(tmp_path / "run.h5", random_block(5000, 2))) as result:
         figures = plot_stored(result)
         comparison = compare_files([result, result])
     assert list(figures) == ["motion", "motor-torque", "elastic-torque", "energy"]

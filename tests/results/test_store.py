@@ -24,7 +24,7 @@ from vsacli.base.units import POSITION
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import number
 from vsacli.documents.source import Source
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.resolved import resolve
 from vsacli.results.store.writer import ResultWriter
 
@@ -207,7 +207,7 @@ def test_a_run_that_ends_early_keeps_the_steps_so_far(tmp_path, block):
     with ResultWriter(path, robot(), PlannedTrajectory(10_000)) as writer:
         writer.write(part(block, 0, 120))
         writer.finish({**REPORT, "verdict": "infeasible", "complete": False})
-    with open_result(path) as result:
+    with StoredResult.open(path) as result:
         assert result.samples == 120
         assert result.complete is False
         assert result.verdict == "infeasible"
@@ -264,7 +264,7 @@ def test_files_that_were_read_are_stored_once_each(tmp_path, block):
 
 def test_text_that_hdf5_cannot_hold_is_escaped(tmp_path, block):
     path = write_result(tmp_path / "r.h5", block, command_line="vsacli a\udcff\0b")
-    with open_result(path) as result:
+    with StoredResult.open(path) as result:
         assert result.attributes["command_line"] == r"vsacli a\udcff\0b"
 
 
@@ -308,13 +308,13 @@ def test_joints_with_different_fields_share_the_arrays(monkeypatch):
 
 
 def test_reading(path, block):
-    with open_result(path) as result:
+    with StoredResult.open(path) as result:
         assert result.joint_names == ("j0", "j1")
         assert result.joint_types == ("revolute", "prismatic")
         assert (result.robot_name, result.trajectory_name, result.verdict) == ("two", "swing", "ok")
         assert result.complete is True
         assert result.samples == SAMPLES
-        assert result.report["warnings"] == ["µ: –"]
+        assert result.report_json["warnings"] == ["µ: –"]
         assert result.variables == tuple(name for name in VARIABLES if name != "time")
         np.testing.assert_array_equal(result.time, block.time)
         np.testing.assert_array_equal(result.read("phi", 20, 30), block.phi[20:30], strict=True)

@@ -12,7 +12,7 @@ import pytest
 from samples.results import PlannedTrajectory, python, random_block, robot, write_result
 
 from vsacli.base.errors import StorageError
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.writer import ResultWriter, interrupts_deferred
 
 ENDLESS = """
@@ -102,7 +102,7 @@ def test_an_interrupt_takes_effect_after_the_deferring_statements():
 def test_a_writer_works_in_any_thread(tmp_path, block):
     with ThreadPoolExecutor(1) as threads:
         path = threads.submit(write_result, tmp_path / "r.h5", block).result()
-    with open_result(path) as result:
+    with StoredResult.open(path) as result:
         assert result.samples == 50
 
 

@@ -16,7 +16,7 @@ from samples.results import (
 
 from vsacli.base.atomic_files import AtomicFile
 from vsacli.base.errors import StorageError
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.writer import ResultWriter
 
 
@@ -55,7 +55,7 @@ def test_an_existing_file_is_refused_before_the_first_step(tmp_path, old):
 
 @pytest.mark.usefixtures("old")
 def test_an_existing_file_is_replaced_on_request(tmp_path, block):
-    with open_result(write_result(tmp_path / "r.h5", block, overwrite=True)) as result:
+    with StoredResult.open(write_result(tmp_path / "r.h5", block, overwrite=True)) as result:
         assert result.samples == 50
     assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
 
@@ -79,7 +79,7 @@ def no_links(*_, **__):
 
 def test_file_systems_without_hard_links(tmp_path, block, monkeypatch):
     monkeypatch.setattr(os, "link", no_links)
-    with open_result(write_result(tmp_path / "r.h5", block)) as result:
+    with StoredResult.open(write_result(tmp_path / "r.h5", block)) as result:
         assert result.samples == 50
 
 
@@ -98,7 +98,7 @@ def test_a_link_goes_on_pointing_to_the_file(tmp_path, block):
     (tmp_path / "link.h5").symlink_to("real/r.h5")
     write_result(tmp_path / "link.h5", block, overwrite=True)
     assert (tmp_path / "link.h5").is_symlink()
-    with open_result(tmp_path / "real" / "r.h5") as result:
+    with StoredResult.open(tmp_path / "real" / "r.h5") as result:
         assert result.samples == 50
 
 

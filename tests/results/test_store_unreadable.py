@@ -14,7 +14,7 @@ from samples.results import (
 )
 
 from vsacli.base.errors import InputError, StorageError
-from vsacli.results.store.reader import open_result
+from vsacli.results.store.reader import StoredResult
 
 
 def foreign(path):
@@ -62,7 +62,7 @@ def test_files_that_are_no_result(tmp_path, block, spoil, match):
     path = write_result(tmp_path / "r.h5", block)
     spoil(path)
     with pytest.raises(InputError, match=r"r\.h5: .*" + match):
-        open_result(path)
+        StoredResult.open(path)
 
 
 def test_every_truncation_is_noticed(tmp_path, block):
@@ -70,14 +70,14 @@ def test_every_truncation_is_noticed(tmp_path, block):
     for size in range(1, len(whole), len(whole) // 40):
         (tmp_path / "part.h5").write_bytes(whole[:size])
         with pytest.raises(InputError, match=r"part\.h5: is"):
-            open_result(tmp_path / "part.h5")
+            StoredResult.open(tmp_path / "part.h5")
 
 
 def test_a_file_that_may_not_be_read(tmp_path, block):
     path = write_result(tmp_path / "r.h5", block)
     path.chmod(0)
     with ordinary_user(), pytest.raises(StorageError, match="cannot be read: Permission denied"):
-        open_result(path)
+        StoredResult.open(path)
 
 
 def test_a_file_that_another_program_is_writing(tmp_path, block):
@@ -87,13 +87,13 @@ def test_a_file_that_another_program_is_writing(tmp_path, block):
     try:
         assert process.stdout.readline() == "open\n"
         with pytest.raises(StorageError, match="another program has it open for writing"):
-            open_result(path)
+            StoredResult.open(path)
     finally:
         process.communicate("\n")
 
 
 def test_a_variable_that_was_not_stored(tmp_path, block):
-    with open_result(write_result(tmp_path / "r.h5", block, variables=["theta"])) as result:
+    with StoredResult.open(write_result(tmp_path / "r.h5", block, variables=["theta"])) as result:
         assert result.variables == ("theta",)
         with pytest.raises(
             InputError, match=r"r\.h5: holds no phi; run invdyn again without --variables, or with phi"

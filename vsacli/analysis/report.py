@@ -9,6 +9,7 @@ from vsacli.analysis import report_text as text
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.base.json_records import JsonObject, Stored, named
+from vsacli.base.tables import aligned
 
 VERDICTS = ("ok", "over_limit", "singular", "infeasible", "self_check_failed")
 """From best to worst; the worst that applies wins."""
@@ -70,7 +71,7 @@ class Report(Stored):
         return "\n".join(
             [
                 self._headline(),
-                *text.joint_table(self.joints),
+                *aligned(text.joint_rows(self.joints)),
                 *text.warnings_and_notes(self.warnings, self.notes),
                 *(sentence for joint in self.joints for sentence in text.sentences(joint)),
                 *text.stops(self.joints, self.drifts),

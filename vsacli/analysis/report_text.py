@@ -42,23 +42,10 @@ def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
     return f"{left:<{WIDTH - 32}} {words:>31}".rstrip()
 
 
-def joint_table(joints: Iterable[JointReport]) -> Iterator[str]:
-    """Peaks, stiffness, and what of it can be reached."""
-    rows: list[tuple[str, ...]] = [
-        ("joint", "peak tau_e", "peak motor 1 / 2", "stiffness", "reachable", "margin")
-    ]
-    return aligned(rows + [_row(joint) for joint in joints])
-
-
-def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """The lines of a table: the first column to the left, the others to the right."""
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    for row in rows:
-        name, *cells = (
-            cell.ljust(width) if column == 0 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        yield "   ".join([name, *cells])
+def joint_rows(joints: Iterable[JointReport]) -> list[tuple[str, ...]]:
+    """A table of peaks, stiffness, and what of it can be reached, below its header."""
+    header = ("joint", "peak tau_e", "peak motor 1 / 2", "stiffness", "reachable", "margin")
+    return [header, *map(_row, joints)]
 
 
 def _row(joint: JointReport) -> tuple[str, ...]:

@@ -160,7 +160,7 @@ def inverse_dynamics(
     run = Run(
         robot, trajectory, stop_on_infeasible=stop_on_infeasible, deflections=deflections, engine=engine
     )
-    return Result(**_joined(list(run)), report=run.report(), joint_names=robot.joint_names)
+    return Result(**_joined(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
 
 
 def _integrated(

@@ -127,13 +127,13 @@ def check_feasibility(
 def _compute_and_draw(run: Run, talk: Talk) -> tuple[Report, Mapping[str, Any]]:
     """Compute, and draw figures, by name, from a result file that exists no longer than it takes."""
     from vsacli.results.plots import FEASIBILITY, FEASIBILITY_VARIABLES, plot_feasibility
-    from vsacli.results.store.reader import open_result
+    from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
 
     with TemporaryDirectory(prefix="vsacli-") as folder:
         path = Path(folder) / "result.h5"
         report = compute(run, talk, ResultWriter(path, run.robot, run.trajectory, FEASIBILITY_VARIABLES))
-        with open_result(path) as result:
+        with StoredResult.open(path) as result:
             return report, {FEASIBILITY: plot_feasibility(result)}
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, check_type
+from vsacli.base.tables import aligned, html_table
 from vsacli.documents.fields import (
     NON_NEGATIVE,
     Items,
@@ -189,7 +191,7 @@ class Joint:
             yield from (f"spring of joint {self.name}: {warning}" for warning in law.warnings)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Robot:
     """A serial chain of joints from a fixed base."""
 
@@ -205,6 +207,38 @@ class Robot:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Robot {self.name}", *aligned(self._joint_rows())])
+
+    def _repr_html_(self) -> str:
+        return html_table(f"Robot {self.name}", self._joint_rows())
+
+    def _joint_rows(self) -> list[tuple[str, ...]]:
+        """A line for each joint, below a header."""
+        joints = ((joint.name, joint.type, joint.actuator_type) for joint in self.joints)
+        return [("joint", "type", "actuator"), *joints]
+
+    def replace(self, path: str | Mapping[str, Any], value: Any = None) -> Self:
+        """A robot with another value at a path into it; this one stays as it is.
+
+        `robot.replace("joints.elbow.link.mass", 2.5)`, or several at once:
+        `robot.replace({"joints.*.damping": 0, "gravity.2": -1.62})`. The new robot is checked as a whole.
+
+        Args:
+            path: words of the robot file joined by dots; an entry of a list goes by its name or index, `*`
+                stands for all. Or a mapping of such paths to values, which are replaced in turn.
+            value: what the file could hold there: a number, a text such as "90 deg", a list or a mapping.
+
+        Raises:
+            InputError: the path leads nowhere, saying what there is; or the value cannot stand there.
+        """
+        from vsacli.documents import paths
+
+        robot = self
+        for each, wanted in ({path: value} if isinstance(path, str) else path).items():
+            robot = paths.replace(robot, each, wanted)
+        return robot
 
     @property
     def joint_names(self) -> tuple[str, ...]:

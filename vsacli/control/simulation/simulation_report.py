@@ -9,9 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from vsacli.analysis.report import VERDICTS
-from vsacli.analysis.report_text import WIDTH, aligned, energy_lines, warnings_and_notes
+from vsacli.analysis.report_text import WIDTH, energy_lines, warnings_and_notes
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Stored, named
+from vsacli.base.tables import aligned
 from vsacli.base.units import POSITION
 from vsacli.control.simulation.history import History
 from vsacli.control.simulation.joint_tracking import HEADER, Deviation, JointTracking, limit_sentence, row

@@ -138,7 +138,7 @@ def describe_result(result: StoredResult) -> dict[str, Any]:
             }
             for name in result.variables
         ],
-        "report": result.report,
+        "report": result.report_json,
     }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from vsacli.analysis import report_text
 from vsacli.analysis.report import Report
-from vsacli.analysis.report_text import aligned
+from vsacli.base.tables import aligned
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE
 
 Description = Mapping[str, Any]

@@ -37,7 +37,7 @@ class StoredResult:
         variables: names of the variables the file holds, in declared order, without `time`.
         samples: number of steps stored.
         time: (samples,) in s.
-        report: the report of the run, as in `--json`.
+        report_json: the report of the run, as in `--json`.
     """
 
     format = FORMAT
@@ -74,7 +74,7 @@ class StoredResult:
             )
             self.time: FloatArray = self._bounded("time")[...]
             self.samples = len(self.time)
-            self.report = self._json("report/json")
+            self.report_json = self._json("report/json")
             self._check_shapes()
 
     def _bounded(self, name: str) -> h5py.Dataset:
@@ -166,11 +166,6 @@ def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
         stored = kind(path, file)
         stack.pop_all()
     return stored
-
-
-def open_result(path: str | Path) -> StoredResult:
-    """Open a result file of `invdyn`; see `StoredResult.open`."""
-    return StoredResult.open(path)
 
 
 def stored_format(path: str | Path) -> str | None:

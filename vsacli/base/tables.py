@@ -1,0 +1,29 @@
+"""Tables of text, for reports and terminals, and the same for notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from html import escape
+
+
+def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """The lines of a table: the first column to the left, the others to the right."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    for row in rows:
+        name, *cells = (
+            cell.ljust(width) if column == 0 else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        )
+        yield "   ".join([name, *cells])
+
+
+def html_table(title: str, rows: Sequence[tuple[str, ...]]) -> str:
+    """A title and a table whose first row is its header, as HTML; the texts are escaped."""
+    header, *body = rows
+    lines = "".join(_html_row(row, "td") for row in body)
+    table = f"<table><thead>{_html_row(header, 'th')}</thead><tbody>{lines}</tbody></table>"
+    return f"<p>{escape(title)}</p>{table}"
+
+
+def _html_row(row: tuple[str, ...], cell: str) -> str:
+    return "<tr>" + "".join(f"<{cell}>{escape(text)}</{cell}>" for text in row) + "</tr>"
