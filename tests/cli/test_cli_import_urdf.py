@@ -15,7 +15,7 @@ from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.rigid import Rigid
 from vsacli.cli.import_urdf import ACTUATOR_TYPES
-from vsacli.robot.urdf import Placeholders, convert, render, robot_text
+from vsacli.robot.urdf import Placeholders, import_urdf, render, robot_text
 
 DESK_ARM = REPOSITORY / "robots" / "desk_arm.urdf"
 
@@ -28,7 +28,7 @@ def converted(vsacli, *options):
 
 def test_the_file_is_the_conversion(vsacli, tmp_path):
     done = converted(vsacli)
-    conversion = convert(DESK_ARM, tip="flange")
+    conversion = import_urdf(DESK_ARM, tip="flange")
     assert load_robot(tmp_path / "arm.yaml") == conversion.robot
     assert (tmp_path / "arm.yaml").read_text() == robot_text(conversion)
     assert (done.out, done.err) == (f"{render(conversion)}\n", "wrote arm.yaml\n")
@@ -40,7 +40,7 @@ def test_every_number_comes_back_from_the_file(tmp_path, actuator, seed):
     text = random_serial("RPRCR", seed).replace("</joint>", '<dynamics damping="0.1"/></joint>')
     limits = '<limit lower="-0.7" upper="1.1" velocity="2.3" effort="17.5"/>'
     path = write(tmp_path / "arm.urdf", text.replace("</joint>", f"{limits}</joint>"))
-    conversion = convert(path, placeholders=Placeholders(actuator, 0.3, 123.4, (1.5, 2.5)))
+    conversion = import_urdf(path, placeholders=Placeholders(actuator, 0.3, 123.4, (1.5, 2.5)))
     loaded = load_robot(write(tmp_path / "arm.yaml", robot_text(conversion)))
     assert loaded == conversion.robot
 
@@ -112,7 +112,7 @@ def test_doubtful_links_are_reported(vsacli, tmp_path):
 
 def test_names_stay_in_their_place(tmp_path):
     text = robot(link("a"), link("b # } é"), joint("turn: [", "a", "b # } é"))
-    conversion = convert(write(tmp_path / "arm.urdf", text.replace('"sample"', '"a &quot;b: #c\\"')))
+    conversion = import_urdf(write(tmp_path / "arm.urdf", text.replace('"sample"', '"a &quot;b: #c\\"')))
     loaded = load_robot(write(tmp_path / "arm.yaml", robot_text(conversion)))
     assert loaded == conversion.robot
     assert (loaded.name, loaded.joint_names) == ('a "b: #c\\', ("turn___",))

@@ -9,7 +9,7 @@ import pytest
 from samples.urdf import joint, link, robot, write
 
 from vsacli.base.errors import InputError
-from vsacli.robot.urdf import convert
+from vsacli.robot.urdf import import_urdf
 
 NO_INERTIA = '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>'
 TREE = robot(
@@ -44,14 +44,14 @@ def point(xyz: str, mass: float) -> str:
 
 
 def test_fixed_links_and_held_branches_are_lumped(urdf):
-    conversion = convert(urdf(TREE), tip="hand")
+    conversion = import_urdf(urdf(TREE), tip="hand")
     assert names(conversion) == [["torso", "head"], ["arm"], ["hand", "left", "right"]]
     assert conversion.chain.held_beside == ("open_left", "open_right", "nod")
     assert any("held at zero beside the chain" in note and "nod" in note for note in conversion.notes())
 
 
 def test_joints_below_the_base_are_held(urdf):
-    conversion = convert(urdf(TREE), base="torso", tip="hand")
+    conversion = import_urdf(urdf(TREE), base="torso", tip="hand")
     assert names(conversion) == [["arm"], ["hand", "left", "right"]]
     assert conversion.chain.held_below == ("lift",)
     assert "held at zero below the base: lift" in conversion.notes()
@@ -65,7 +65,7 @@ def test_two_points_make_a_dumbbell(urdf):
         joint("turn", "base", "rod", xyz="0 0 0"),
         joint("weld", "rod", "end", "F", xyz="-1 0 0"),
     )
-    (only,) = convert(urdf(text), tip="rod").robot.joints
+    (only,) = import_urdf(urdf(text), tip="rod").robot.joints
     assert only.link.mass == 4
     assert only.link.com == (0.5, 0, 0)
     # Reduced mass 3/4 kg at the distance of 2 m.
@@ -82,7 +82,7 @@ def test_a_welded_body_keeps_its_orientation(urdf):
         joint("turn", "base", "rod"),
         joint("weld", "rod", "end", "F", rpy="1.5707963267948966 0 0"),
     )
-    (only,) = convert(urdf(text), tip="rod").robot.joints
+    (only,) = import_urdf(urdf(text), tip="rod").robot.joints
     assert np.diag(only.link.inertia.tensor).tolist() == [1, 2.5, 2]
 
 
@@ -91,8 +91,8 @@ def test_gravity_follows_the_base(urdf):
         link("floor"), link("wall"), link("arm"),
         joint("hang", "floor", "wall", "F", rpy="1.5707963267948966 0 0"), joint("turn", "wall", "arm"),
     )  # fmt: skip
-    assert convert(urdf(text)).robot.gravity == (0, 0, -9.81)
-    assert convert(urdf(text), base="wall").robot.gravity == (0, -9.81, 0)
+    assert import_urdf(urdf(text)).robot.gravity == (0, 0, -9.81)
+    assert import_urdf(urdf(text), base="wall").robot.gravity == (0, -9.81, 0)
 
 
 def test_the_only_end_is_the_tip(urdf):
@@ -101,7 +101,7 @@ def test_the_only_end_is_the_tip(urdf):
         joint("j1", "a", "b"), joint("j2", "b", "c", rpy="1 0 0"), joint("weld", "c", "tool", "F"),
         joint("bolt", "b", "screw", "F"),
     )  # fmt: skip
-    assert convert(urdf(text)).chain.tip == "tool"
+    assert import_urdf(urdf(text)).chain.tip == "tool"
 
 
 @pytest.mark.parametrize(
@@ -122,14 +122,14 @@ def test_the_only_end_is_the_tip(urdf):
 def test_a_chain_that_cannot_be(urdf, base, tip, problem):
     separator = "" if problem[0].isdigit() else " "
     with pytest.raises(InputError, match=f"^arm.urdf:{separator}{re.escape(problem)}"):
-        convert(urdf(TREE), base, tip)
+        import_urdf(urdf(TREE), base, tip)
 
 
 def test_a_floating_base_may_be_held(urdf):
     text = TREE.replace('name="lift" type="prismatic"', 'name="lift" type="floating"')
-    assert convert(urdf(text), base="torso", tip="hand").chain.held_below == ("lift",)
+    assert import_urdf(urdf(text), base="torso", tip="hand").chain.held_below == ("lift",)
     with pytest.raises(InputError, match=r"^arm.urdf:9: joint 'lift' is floating; a chain has revolute"):
-        convert(urdf(text), tip="hand")
+        import_urdf(urdf(text), tip="hand")
 
 
 def test_names_become_identifiers_that_differ(urdf):
@@ -137,4 +137,4 @@ def test_names_become_identifiers_that_differ(urdf):
         link("a"), link("b"), link("c"), link("d"),
         joint("arm.1", "a", "b"), joint("arm 1", "b", "c"), joint("7: é", "c", "d"),
     )  # fmt: skip
-    assert convert(urdf(text)).robot.joint_names == ("arm_1", "arm_1_2", "_7___")
+    assert import_urdf(urdf(text)).robot.joint_names == ("arm_1", "arm_1_2", "_7___")

@@ -12,7 +12,7 @@ from samples.urdf import INERTIAL, joint, link, robot, serial
 
 from vsacli.base.errors import InputError
 from vsacli.robot.model import UNBOUNDED
-from vsacli.robot.urdf import Placeholders, convert
+from vsacli.robot.urdf import Placeholders, import_urdf
 
 BOMB = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>\n<robot name="&b;"/>'
 EXTERNAL = '<!DOCTYPE robot SYSTEM "file:///etc/passwd">\n<robot name="x"/>'
@@ -177,7 +177,7 @@ def test_what_is_not_utf8(vsacli, tmp_path):
 )
 def test_limits_that_bound_nothing_are_none(tmp_path, limit, position, velocity, torque):
     (tmp_path / "arm.urdf").write_text(ARM.replace("</joint>", f"<limit {limit}/></joint>"))
-    joint = convert(tmp_path / "arm.urdf", placeholders=Placeholders("rigid")).robot.joints[0]
+    joint = import_urdf(tmp_path / "arm.urdf", placeholders=Placeholders("rigid")).robot.joints[0]
     assert (joint.limits.position, joint.limits.velocity) == (position, velocity)
     assert joint.actuator.motor.max_torque == torque
 
@@ -185,7 +185,7 @@ def test_limits_that_bound_nothing_are_none(tmp_path, limit, position, velocity,
 def test_a_continuous_joint_has_no_position_limits(tmp_path):
     limited = serial("C").replace("</joint>", '<limit lower="-1" upper="1"/></joint>')
     (tmp_path / "arm.urdf").write_text(limited)
-    assert convert(tmp_path / "arm.urdf").robot.joints[0].limits.position == UNBOUNDED
+    assert import_urdf(tmp_path / "arm.urdf").robot.joints[0].limits.position == UNBOUNDED
 
 
 PARTS = st.sampled_from(
@@ -212,7 +212,7 @@ def test_a_damaged_file_is_refused_or_converted(tmp_path, cut, length, part):
     path.write_text(ARM[:cut] + part + ARM[cut + length :])
     problems = []
     try:
-        convert(path)
+        import_urdf(path)
     except InputError as error:
         problems = [str(problem) for problem in error.problems]
     assert all(re.match(rf"{re.escape(str(path))}:", problem) for problem in problems)

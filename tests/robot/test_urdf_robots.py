@@ -16,7 +16,7 @@ from samples.marks import slow
 
 from vsacli.base.errors import InputError
 from vsacli.dynamics.link_torques import link_torques
-from vsacli.robot.urdf import Conversion, convert
+from vsacli.robot.urdf import Conversion, import_urdf
 from vsacli.robot.urdf.link_tree import Urdf, below
 from vsacli.robot.urdf.reader import read_urdf
 
@@ -81,14 +81,14 @@ def refusals(path: Path) -> Iterator[str]:
         return
     for tip in tips or [None]:
         try:
-            check(path, convert(path, tip=tip))
+            check(path, import_urdf(path, tip=tip))
         except InputError as error:
             yield str(error)
 
 
 @pytest.mark.parametrize(("name", "base", "tip", "letters"), ARM.findall(PAGE))
 def test_an_arm_of_the_page(name, base, tip, letters):
-    conversion = convert(BY_NAME[name], base, tip)
+    conversion = import_urdf(BY_NAME[name], base, tip)
     assert "".join("R" if joint.is_revolute else "P" for joint in conversion.robot.joints) == letters
     check(BY_NAME[name], conversion)
 

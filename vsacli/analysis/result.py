@@ -17,7 +17,8 @@ from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.figure import Figure
+
+    from vsacli.results.plots.figures import Figures
 
 
 class Shown:
@@ -78,7 +79,7 @@ class Result(Shown, Block):
         stem: str = "result",
         file_format: str = "png",
         overwrite: bool = False,
-    ) -> dict[str, Figure]:
+    ) -> Figures:
         """Draw the figures of `vsacli plot`, from a result file that exists no longer than it takes.
 
         Args:

@@ -15,7 +15,8 @@ from vsacli.results.store.reader import StoredResult, open_one_of
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.figure import Figure
+
+    from vsacli.results.plots.figures import Figures
 
 
 class ResultFile(Shown, StoredResult):
@@ -60,7 +61,7 @@ class ResultFile(Shown, StoredResult):
         *,
         file_format: str = "png",
         overwrite: bool = False,
-    ) -> dict[str, Figure]:
+    ) -> Figures:
         """Draw the figures of `vsacli plot`, and save them if a folder is given; see `Result.plot`.
 
         Raises:

@@ -64,11 +64,25 @@ def check_type(argument: str, value: object, expected: type, remedy: str) -> Non
     raise TypeError(f"{argument} must be a {expected.__name__}, not {given}; {remedy.format(repr(path))}")
 
 
+def check_path(value: object, call: str) -> None:
+    """Refuse what is no path of a file.
+
+    Raises:
+        TypeError: with the call that would do.
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise TypeError(f"path must be a path, not {_described(value)}; call {call}")
+
+
 def _described(value: object) -> str:
+    if value is None:
+        return "None"
     if isinstance(value, type):
         return f"the class {value.__name__} itself"
-    name = type(value).__name__
-    return name if value is None else f"{'an' if name[0] in 'AEIOUaeio' else 'a'} {name}"
+    kind = type(value)
+    room = kind.__module__.partition(".")[0]
+    name = kind.__name__ if room in ("builtins", "vsacli") else f"{room}.{kind.__name__}"
+    return f"{'an' if name[0] in 'AEIOUaeio' else 'a'} {name}"
 
 
 class FieldProblem(NamedTuple):

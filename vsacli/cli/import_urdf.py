@@ -90,13 +90,13 @@ def import_urdf(
     says nothing about motors and springs: these are placeholders, marked in the file.
     """
     from vsacli.base.atomic_files import check_target, write_text
-    from vsacli.robot.urdf import Placeholders, convert, render, robot_text
+    from vsacli.robot import urdf as conversions
 
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
     refuse_input_as_output(path, [urdf])
-    placeholders = Placeholders(actuator, motor_inertia, stiffness, spring)
+    placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)
     check_target(path, overwrite=overwrite)
-    conversion = convert(urdf, base, tip, placeholders, snap)
-    write_text(path, robot_text(conversion), overwrite=overwrite)
-    click.echo(render(conversion))
+    conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap)
+    write_text(path, conversions.robot_text(conversion), overwrite=overwrite)
+    click.echo(conversions.render(conversion))
     talk.note(f"wrote {path}")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, check_type
 from vsacli.control.computed_torque import ComputedTorque
 from vsacli.control.decoupling import Decoupling
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, Gains
 from vsacli.control.linear_control import Integral
 from vsacli.dynamics.forward import Plant, State
-from vsacli.robot.model import Robot
+from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.motion import Motion
 
 
@@ -36,7 +36,9 @@ def feedback_linearization(
 
     Raises:
         InputError: the robot mixes rigid joints with others, the gains are not for it, or shapes do not fit.
+        TypeError: an argument is of another type.
     """
+    check_type("reference", reference, Motion, "trajectory.at(time) gives one")
     frame = None if reference.wrench is None else reference.wrench.frame
     return FeedbackLinearization(robot, gains, frame)(state, reference, integral)
 
@@ -50,6 +52,8 @@ class FeedbackLinearization:
     """
 
     def __init__(self, robot: Robot, gains: Gains, frame: str | None = None) -> None:
+        check_robot(robot)
+        check_type("gains", gains, Gains, "Gains.from_poles([-20] * 4) makes some")
         self.plant = Plant(robot, frame)
         gains.check_fit(len(robot.joints), position_order(robot, self.plant))
         self.law = control_law(self.plant, gains)

@@ -6,7 +6,7 @@ import dataclasses
 import os
 from dataclasses import dataclass
 
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, check_path
 from vsacli.documents.fields import choice, declared
 from vsacli.documents.reading import read_document
 from vsacli.robot.model import Robot
@@ -40,7 +40,9 @@ def load_robot(path: str | os.PathLike[str]) -> Robot:
 
     Raises:
         InputError: with every problem of the file, each with its line.
+        TypeError: path is none.
     """
+    check_path(path, "load_robot(path)")
     document, source = read_document(path, RobotFile, FORMAT)
     try:
         robot = document.robot()

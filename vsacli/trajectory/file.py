@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
-from vsacli.base.errors import FieldProblem, InputError, Problem
+from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, check_fields, number, text, value
 from vsacli.documents.reading import read_document
-from vsacli.robot.model import Robot
+from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import POSITIONS, RIGID_POSITIONS, STIFFNESSES, WRENCHES, Course, WrenchCourse
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes, uniform_times_over
@@ -133,7 +133,10 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
 
     Raises:
         InputError: with every problem of the file, each with its line.
+        TypeError: path or robot is none.
     """
+    check_path(path, "load_trajectory(path, robot)")
+    check_robot(robot)
     if Path(path).suffix.lower() == ".csv":
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -68,6 +69,15 @@ class Trajectory:
         self.notes = (*notes, *times.notes, *(each for profile in profiles for each in profile.notes))
         self.sources = tuple(sources)
         self._check()
+
+    def __repr__(self) -> str:
+        first, last = self.times.span
+        pushed = "" if self.wrench is None else ", with a wrench"
+        size = f"{self.joints} joints, {self.samples} samples, {first:g} to {last:g} s"
+        return f"Trajectory {self.name}: {size}{pushed}"
+
+    def _repr_html_(self) -> str:
+        return f"<p>{escape(repr(self))}</p>"
 
     def _profiles(self) -> Iterator[tuple[str, Profile]]:
         yield POSITION.key, self.position
@@ -190,9 +200,11 @@ class Trajectory:
         time = self.times.block(start, stop)
         return self._motion(time, lambda profile: profile.samples(start, stop, time))
 
-    def at(self, time: FloatArray) -> Motion:
-        """The smooth functions at any times of the span, (samples,); given derivatives play no part."""
-        return self._motion(time, lambda profile: profile.at(time))
+    def at(self, time: ArrayLike) -> Motion:
+        """The smooth functions at any times of the span, (samples,) or (); given derivatives play no part."""
+        times = np.asarray(time, dtype=np.float64)
+        motion = self._motion(np.atleast_1d(times), lambda profile: profile.at(np.atleast_1d(times)))
+        return motion if times.ndim else motion.mapped(times, lambda rows, _: rows[0])
 
     def _motion(self, time: FloatArray, rows: Callable[[Profile], FloatArray]) -> Motion:
         signals = {POSITION: self.position, **{COMMANDED[key]: each for key, each in self.commanded.items()}}

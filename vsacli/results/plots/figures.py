@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -35,6 +35,10 @@ from vsacli.results.store.simulation import StoredSimulation
 
 NARROW_WIDTH = 2.5
 """Inches: a stiffness panel where there are several columns of them."""
+
+
+Figures: TypeAlias = dict[str, Figure]
+"""By name, such as "motion"."""
 
 
 class Drawing(NamedTuple):
@@ -175,7 +179,7 @@ def drawings_of(stored: StoredResult) -> Mapping[str, Drawing]:
     return RESULT_DRAWINGS
 
 
-def plot_stored(stored: StoredResult) -> dict[str, Figure]:
+def plot_stored(stored: StoredResult) -> Figures:
     """Draw the figures of a result or a simulation by name, all but the `omitted_figures`.
 
     Raises:

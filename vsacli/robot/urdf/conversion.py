@@ -99,14 +99,14 @@ class Conversion:
         yield from self.robot.warnings
 
 
-def convert(
+def import_urdf(
     path: str | os.PathLike[str],
     base: str | None = None,
     tip: str | None = None,
     placeholders: Placeholders | None = None,
     snap: float = SNAP_ANGLE,
 ) -> Conversion:
-    """Convert a serial chain of a URDF.
+    """A robot from a serial chain of a URDF file.
 
     Args:
         path: the URDF file.

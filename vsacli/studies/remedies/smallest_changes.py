@@ -11,6 +11,7 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import STIFFNESS
+from vsacli.dynamics.inverse import check_fit
 from vsacli.robot.model import Joint, Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import Load, joint_loads
@@ -45,8 +46,10 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
         near_singular: the margin min(sigma - lower, upper - sigma)/sigma that every step shall have.
 
     Raises:
-        InputError: `near_singular` is no possible margin.
+        InputError: the trajectory is not for the robot, or `near_singular` is no possible margin.
+        TypeError: robot or trajectory is none.
     """
+    check_fit(robot, trajectory)
     check_near_singular(near_singular)
     acceptance = Acceptance(robot, near_singular)
     refused = np.flatnonzero(acceptance.refused_joints(trajectory)).tolist()

@@ -144,6 +144,9 @@ class Suggestions(Published):
         "stiffness_profile": "other course of stiffness",
     }
 
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
     def lines(self) -> Iterator[str]:
         """One sentence for each kind, under a heading."""
         margin = f"a margin of at least {100 * self.near_singular:.6g} %"
