@@ -51,7 +51,7 @@ _EXPORTS = OnDemand(
     {
         **{name.title().replace("_", ""): home for name, home in LAWS.homes.items()},
         "Tendon": "vsacli.actuators.laws.tendon:Tendon",
-        "make_pair": "vsacli.actuators.pairs:make_pair",
+        "make_pair": "vsacli.actuators.pairs:make_pair",  # pairs know laws; no law knows them
     }
 )
 """What is imported at its first use; each law by its name in a robot file, written as the name of a class."""
