@@ -25,6 +25,7 @@ from noise_study import draw, table_rows
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.laws import LAWS
 from vsacli.base.flags import Flag
+from vsacli.base.signals import COMMANDED, POSITION
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
@@ -33,8 +34,7 @@ from vsacli.cli.main import vsacli
 from vsacli.control.poles import PolesFile
 from vsacli.files.examples import Example, examples, opening_comment
 from vsacli.robot.file import RobotFile
-from vsacli.trajectory.file import TrajectoryFile
-from vsacli.trajectory.recorded.columns import JOINT_SIGNALS
+from vsacli.trajectory.file import content
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -95,7 +95,7 @@ def spring_fields() -> str:
 
 def trajectory_fields() -> str:
     """Fields of a trajectory file."""
-    return record_sections(TrajectoryFile)
+    return record_sections(content(frozenset(COMMANDED), rigid=False))
 
 
 def csv_columns() -> str:
@@ -107,7 +107,7 @@ def csv_columns() -> str:
 
 
 def _signal_columns() -> Iterator[tuple[str, str, str]]:
-    for signal in JOINT_SIGNALS:
+    for signal in (POSITION, *COMMANDED.values()):
         for name in signal.names:
             needed = "yes" if name == signal.names[0] else "no"
             yield f"`<joint>.{name}`", str(VARIABLES[name].quantity), needed

@@ -13,10 +13,12 @@ from samples.command_line import REPOSITORY
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.base.errors import InputError
+from vsacli.base.signals import POSITION
 from vsacli.documents.paths import find, replace
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
-from vsacli.trajectory.declared.via_points import PositionVia
+from vsacli.trajectory.declared import Use
+from vsacli.trajectory.declared.via_points import Via
 
 ROBOT = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")
 CONTENT = {
@@ -144,7 +146,7 @@ def test_a_variant_is_replaced_as_a_whole() -> None:
     assert springs(changed) == (Cubic(k=100, k_c=200),) * 2
 
 
-MOVE = PositionVia(degree=9, points=((0.0, 0.0), (1.0, 1.0), (2.0, 0.0)), times=(0.0, 1.0, 2.0))
+MOVE = Via.record(Use(POSITION))(degree=9, points=((0.0, 0.0), (1.0, 1.0), (2.0, 0.0)), times=(0.0, 1.0, 2.0))
 MEMBERS = {"left": "revolute", "right": "prismatic"}
 
 

@@ -8,9 +8,10 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.trajectory.joints import CommandedJoints
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 
-JOINTS = {"base": "revolute", "elbow": "revolute"}
+JOINTS = CommandedJoints({"base": "revolute", "elbow": "revolute"}, exempt={})
 TIME = np.arange(8) / 10
 NAMES = [*POSITION.names, *STIFFNESS.names]
 
@@ -34,7 +35,7 @@ def columns(*names, time=TIME):
 
 
 def by_joint(*names):
-    return [f"{joint}.{name}" for joint in JOINTS for name in names]
+    return [f"{joint}.{name}" for joint in JOINTS.names for name in names]
 
 
 def by_number(*names):

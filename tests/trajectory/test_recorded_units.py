@@ -1,4 +1,5 @@
-"""Units, separators and resampling of recorded motions, from the file to the trajectory."""
+"""Units, separators and resampling of recorded motions, from vsacli.trajectory.joints import CommandedJoints
+from the file to the trajectory."""
 
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from vsacli.trajectory.recorded.recording import read_recording, recorded_trajec
 from vsacli.trajectory.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[2]
-JOINTS = {"arm": "revolute", "slide": "prismatic"}
+JOINTS = CommandedJoints({"arm": "revolute", "slide": "prismatic"}, exempt={})
 TIME = np.arange(2001) / 1000
 RATES = np.array([3.0, 2.0])
 

@@ -135,10 +135,11 @@ class TableFile(NamedTuple):
 class PerJoint(NamedTuple):
     """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint.
 
-    Joints that have no such quantity are named in no mapping and null in a list; their entry is None.
+    Joints that are exempt from `purpose` are named in no mapping and null in a list; their entry is None.
     """
 
     unit: Quantity
+    purpose: str = ""
 
 
 Single: TypeAlias = "Number | Integer | Text | Choice | Vector | Interval | PerJoint | TableFile"

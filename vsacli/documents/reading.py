@@ -39,7 +39,7 @@ def read_document(
     cls: type[_Document],
     format_name: str,
     members: Mapping[str, str] | None = None,
-    exempt: Mapping[Quantity, Mapping[str, str]] | None = None,
+    exempt: Mapping[str, Mapping[str, str]] | None = None,
 ) -> tuple[_Document, Source]:
     """Read a YAML file into a record.
 
@@ -48,7 +48,7 @@ def read_document(
         cls: the record class of the whole document.
         format_name: what its key `format` has to say.
         members: name and unit variant of every joint, where the document has PerJoint values.
-        exempt: for a quantity the joints that have none, each with the reason: a clause about the joint.
+        exempt: for a purpose of PerJoint values the joints that have none, each with a clause about it.
 
     Raises:
         InputError: with every problem of the file, each with its line.

@@ -37,7 +37,7 @@ class Scope(NamedTuple):
     Attributes:
         problems: receives everything that is wrong.
         members: name and unit variant of every joint, for PerJoint values.
-        exempt: for a quantity the joints that have none, each with the reason.
+        exempt: for a purpose of PerJoint values the joints that have none, each with the reason.
         variant: the choice on which units depend here, None while it is unknown.
         survey: collects the quantity and the node of each PerJoint value, which is then not read; None to
             read them.
@@ -45,7 +45,7 @@ class Scope(NamedTuple):
 
     problems: Problems
     members: Mapping[str, str]
-    exempt: Mapping[Quantity, Mapping[str, str]]
+    exempt: Mapping[str, Mapping[str, str]]
     variant: str | None = None
     survey: list[tuple[Quantity, tree.Node]] | None = None
 
@@ -164,7 +164,7 @@ def _read_per_joint(kind: PerJoint, node: tree.Node, label: str, scope: Scope) -
     if scope.survey is not None:
         scope.survey.append((kind.unit, node))
         return INVALID
-    exempt = scope.exempt.get(kind.unit, {})
+    exempt = scope.exempt.get(kind.purpose, {})
     nodes = _by_joint(node, label, scope, exempt)
     if nodes is None:
         return INVALID

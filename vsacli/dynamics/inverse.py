@@ -23,6 +23,7 @@ from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.link_torques import TORQUES, LinkTorques, link_torques
 from vsacli.robot.model import Robot, check_robot
+from vsacli.trajectory.joints import takers
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -181,7 +182,7 @@ def check_fit(robot: Robot, trajectory: Trajectory) -> None:
         if lacking:
             raise InputError.one(
                 f"the trajectory {trajectory.name} has no {key} for {', '.join(lacking)}; "
-                "each antagonistic joint needs one"
+                f"each {takers(key)} joint needs one"
             )
 
 

@@ -256,15 +256,6 @@ class Robot:
         return tuple(joint.actuator for joint in self.joints)
 
     @property
-    def without_stiffness(self) -> dict[str, str]:
-        """The joints for which a trajectory chooses no stiffness, each with the reason, a clause."""
-        return {
-            joint.name: joint.actuator.no_choice
-            for joint in self.joints
-            if not isinstance(joint.actuator, Antagonistic)
-        }
-
-    @property
     def spring_sources(self) -> tuple[Source, ...]:
         """Files that springs were read from, each once."""
         sources = (source for joint in self.joints for law in joint.springs for source in law.sources)

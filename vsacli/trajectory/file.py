@@ -4,27 +4,26 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, make_dataclass
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
-from vsacli.documents.fields import POSITIVE, check_fields, number, text, value
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.documents.fields import POSITIVE, REQUIRED, check_fields, number, text, value
 from vsacli.documents.reading import read_document
 from vsacli.robot.model import Robot, check_robot
-from vsacli.trajectory.declared import POSITIONS, RIGID_POSITIONS, STIFFNESSES, WRENCHES, Course, WrenchCourse
+from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
+from vsacli.trajectory.joints import CommandedJoints
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes, uniform_times_over
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from vsacli.trajectory.declared.csv_samples import Recorded
     from vsacli.trajectory.recorded.recording import Recording
-    from vsacli.trajectory.recorded.samples import SampledProfile
 
 FORMAT = "vsacli-trajectory/1"
 DEFAULT_RATE = 1000.0
@@ -32,7 +31,10 @@ DEFAULT_RATE = 1000.0
 
 @dataclass(frozen=True)
 class TrajectoryFile:
-    """The content of a trajectory file."""
+    """The content of a trajectory file.
+
+    What it declares of each signal is an attribute named by the key of the signal, see `content`.
+    """
 
     name: str = text("name of the trajectory")
     duration: float | None = number(
@@ -49,49 +51,37 @@ class TrajectoryFile:
         check=POSITIVE,
         default=None,
     )
-    position: Course | Recorded = value(POSITIONS, "motion of the joints")
-    stiffness: Course | Recorded | None = value(
-        STIFFNESSES, "stiffness of the antagonistic joints; may be absent if there are none"
-    )
-    wrench: WrenchCourse | None = value(
-        WRENCHES,
-        "what the environment exerts on the end effector: force, and moment about the tool frame's origin",
-        default=None,
-    )
 
     def __post_init__(self) -> None:
         check_fields(self, *self._time_problems())
 
     @property
-    def recorded(self) -> dict[Signal, Recorded]:
-        """The courses that are recorded."""
-        courses = {
-            POSITION: self.position,
-            STIFFNESS: self.stiffness,
-            WRENCH: self.wrench,
-        }
-        return {
-            signal: course
-            for signal, course in courses.items()
-            if course is not None and not isinstance(course, Course)
-        }
+    def declared(self) -> dict[Signal, Declaration]:
+        """What is declared of each signal, if anything is."""
+        signals = (POSITION, *COMMANDED.values(), WRENCH)
+        found = {signal: getattr(self, signal.key) for signal in signals}
+        return {signal: declaration for signal, declaration in found.items() if declaration is not None}
 
     @property
-    def declared(self) -> dict[str, Course]:
-        """What is not recorded, by its key."""
-        courses = {"position": self.position, "stiffness": self.stiffness, "wrench": self.wrench}
-        return {key: course for key, course in courses.items() if isinstance(course, Course)}
+    def recorded(self) -> dict[Signal, Recorded]:
+        """The signals that are recorded."""
+        return {signal: each for signal, each in self.declared.items() if isinstance(each, Recorded)}
+
+    @property
+    def formulas(self) -> dict[Signal, Formula]:
+        """The signals that are not recorded."""
+        return {signal: each for signal, each in self.declared.items() if isinstance(each, Formula)}
 
     @property
     def lasts(self) -> float | None:
-        """The duration, s, as given or as it follows from a course; None if it follows from nothing here."""
-        durations = (self.duration, *(course.lasts for course in self.declared.values()))
+        """The duration, s, as given or as it follows from a formula; None if it follows from nothing here."""
+        durations = (self.duration, *(formula.lasts for formula in self.formulas.values()))
         return next((duration for duration in durations if duration is not None), None)
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
-        """What keeps the courses from lasting so long, in s."""
-        for key, course in self.declared.items():
-            yield from (problem.inside(key) for problem in course.problems_over(duration))
+        """What keeps the formulas from lasting so long, in s."""
+        for signal, formula in self.formulas.items():
+            yield from (problem.inside(signal.key) for problem in formula.problems_over(duration))
 
     def _time_problems(self) -> Iterator[FieldProblem]:
         if self.recorded:
@@ -108,23 +98,26 @@ class TrajectoryFile:
                 yield from self.problems_over(self.lasts)
 
 
-@dataclass(frozen=True)
-class _WithoutStiffness(TrajectoryFile):
-    """The content for a robot without antagonistic joints."""
+@cache
+def content(required: frozenset[str], *, rigid: bool) -> type[TrajectoryFile]:
+    """The record that says what a trajectory must have.
 
-    stiffness: Course | Recorded | None = value(
-        STIFFNESSES, "stiffness of the antagonistic joints", default=None
-    )
+    Args:
+        required: keys of the signals that some joint takes; others may be absent.
+        rigid: whether all joints are rigid.
+    """
+    fields = {POSITION.key: value(declared_as(Use(POSITION, rigid)), POSITION.meaning)}
+    for key, signal in COMMANDED.items():
+        needed = key in required
+        meaning = signal.meaning + ("; may be absent if there are none" if needed else "")
+        fields[key] = value(declared_as(Use(signal)), meaning, default=REQUIRED if needed else None)
+    fields[WRENCH.key] = value(declared_as(Use(WRENCH)), WRENCH.meaning, default=None)
+    signals = [(name, Any, field) for name, field in fields.items()]
+    doc = {"__doc__": TrajectoryFile.__doc__}
+    return make_dataclass("TrajectoryFile", signals, bases=(TrajectoryFile,), namespace=doc, frozen=True)
 
 
-@dataclass(frozen=True)
-class _Rigid(_WithoutStiffness):
-    """The content for a robot whose joints are all rigid."""
-
-    position: Course | Recorded = value(RIGID_POSITIONS, "motion of the joints")
-
-
-OF_ANY_ROBOT: type[TrajectoryFile] = _Rigid
+OF_ANY_ROBOT = content(frozenset(), rigid=True)
 """The content for a robot that is not known: what some robot would accept."""
 
 
@@ -137,58 +130,45 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     """
     check_path(path, "load_trajectory(path, robot)")
     check_robot(robot)
+    joints = CommandedJoints.of(robot)
     if Path(path).suffix.lower() == ".csv":
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
-        return recorded_trajectory(path, _types(robot), robot.without_stiffness)
-    members = _types(robot)
-    exempt = {units.STIFFNESS: robot.without_stiffness}
-    document, source = read_document(path, _content(robot), FORMAT, members, exempt)
-    recordings = _read_recordings(document, Path(path).parent, robot)
+        return recorded_trajectory(path, joints)
+    cls = content(joints.taken, rigid=joints.rigid)
+    document, source = read_document(path, cls, FORMAT, joints.types, joints.exempt)
+    recordings = _read_recordings(document, Path(path).parent, joints)
     times = _times(document, recordings, source.path)
     if recordings:
-        _check_lasting(document, times, source.path, robot.joint_names)
-    recorded = {profile.signal: profile for recording in recordings for profile in recording.profiles}
+        _check_lasting(document, times, source.path, joints.names)
+    profiles: dict[str, Profile] = {
+        signal.key: formula.over(times.span) for signal, formula in document.formulas.items()
+    }
+    profiles |= {each.signal.key: each for recording in recordings for each in recording.profiles}
+    wrench = document.declared.get(WRENCH)
     return Trajectory(
         times,
-        _profile(document.position, POSITION, times, recorded),
-        {}
-        if document.stiffness is None
-        else {"stiffness": _profile(document.stiffness, STIFFNESS, times, recorded)},
-        wrench=_wrench(document.wrench, times, recorded),
+        profiles[POSITION.key],
+        profiles,
+        wrench=None if wrench is None else WrenchProfile(profiles[WRENCH.key], wrench.frame),
         name=document.name,
-        warnings=_warnings(document, times, members),
+        warnings=_warnings(document, times, joints),
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, times)],
         sources=[source, *(recording.source for recording in recordings)],
     )
 
 
-def _content(robot: Robot) -> type[TrajectoryFile]:
-    """The record that says what a trajectory of this robot must have."""
-    if all(isinstance(joint.actuator, Rigid) for joint in robot.joints):
-        return _Rigid
-    return _WithoutStiffness if len(robot.without_stiffness) == len(robot.joints) else TrajectoryFile
-
-
-def _types(robot: Robot) -> dict[str, str]:
-    """The joints, each with its type."""
-    return dict(zip(robot.joint_names, robot.joint_types, strict=True))
-
-
-def _read_recordings(document: TrajectoryFile, folder: Path, robot: Robot) -> list[Recording]:
+def _read_recordings(document: TrajectoryFile, folder: Path, joints: CommandedJoints) -> list[Recording]:
     """Each CSV file once, for the signals that are wanted from it; all with the times of the first."""
     wanted: dict[Path, dict[Signal, str | None]] = defaultdict(dict)
-    for signal, course in document.recorded.items():
-        wanted[folder / course.file][signal] = course.fit
+    for signal, declared in document.recorded.items():
+        wanted[folder / declared.file][signal] = declared.fit
     if not wanted:
         return []
     from vsacli.trajectory.recorded.recording import read_recording
 
     resampled = document.rate is not None
-    recordings = [
-        read_recording(file, _types(robot), fits, robot.without_stiffness, resampled=resampled)
-        for file, fits in wanted.items()
-    ]
+    recordings = [read_recording(file, joints, fits, resampled=resampled) for file, fits in wanted.items()]
     for other in recordings[1:]:
         recordings[0].check_times(other)
     return recordings
@@ -210,35 +190,19 @@ def _uniform_times(duration: float, rate: float | None) -> UniformTimes:
 
 
 def _check_lasting(document: TrajectoryFile, times: Times, file: str, joint_names: Sequence[str]) -> None:
-    """Refuse courses that cannot last as long as what is recorded; the file alone could not tell."""
+    """Refuse formulas that cannot last as long as what is recorded; the file alone could not tell."""
     first, last = times.span
     problems = list(document.problems_over(last - first))
     if problems:
         raise InputError(Problem(file, 0, problem.in_file(joint_names)) for problem in problems)
 
 
-def _warnings(document: TrajectoryFile, times: Times, joints: Mapping[str, str]) -> Iterator[str]:
-    for key, course in document.declared.items():
-        yield from (f"{key}: {warning}" for warning in course.warnings_over(times.span, joints))
+def _warnings(document: TrajectoryFile, times: Times, joints: CommandedJoints) -> Iterator[str]:
+    for signal, formula in document.formulas.items():
+        for warning in formula.warnings_over(times.span, joints.types):
+            yield f"{signal.key}: {warning}"
 
 
 def _notes(document: TrajectoryFile, times: Times) -> Iterator[str]:
-    for key, course in document.declared.items():
-        yield from (f"{key}: {note}" for note in course.notes_over(times.span))
-
-
-def _wrench(
-    course: WrenchCourse | None, times: Times, recorded: Mapping[Signal, SampledProfile]
-) -> WrenchProfile | None:
-    if course is None:
-        return None
-    return WrenchProfile(_profile(course, WRENCH, times, recorded), course.frame)
-
-
-def _profile(
-    course: Course | Recorded,
-    signal: Signal,
-    times: Times,
-    recorded: Mapping[Signal, SampledProfile],
-) -> Profile:
-    return course.over(times.span) if isinstance(course, Course) else recorded[signal]
+    for signal, formula in document.formulas.items():
+        yield from (f"{signal.key}: {note}" for note in formula.notes_over(times.span))

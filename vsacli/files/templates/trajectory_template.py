@@ -92,7 +92,7 @@ def _stiffness(robot: Robot) -> Values:
     chosen = {
         joint.name: _stiffnesses(joint, float(load))
         for joint, load in zip(robot.joints, loads, strict=True)
-        if joint.name not in robot.without_stiffness
+        if "stiffness" in joint.actuator.commanded
     }
     if not chosen:
         return {}

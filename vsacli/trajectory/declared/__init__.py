@@ -1,60 +1,47 @@
-"""Courses of position, stiffness and wrench, as they are declared in trajectory files."""
+"""What a trajectory file may declare: the types of each signal.
+
+A new type is a class like those in this folder, and its row in `TYPES`.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import Any
 
 from vsacli.base.lazy import OnDemand
+from vsacli.base.signals import POSITION, WRENCH
 from vsacli.documents.fields import OneOf
-from vsacli.trajectory.declared.course import Course
+from vsacli.trajectory.declared.declaration import Declaration, Formula, Recorded, Use
 
-if TYPE_CHECKING:
-    from vsacli.trajectory.declared.constant import WrenchConstant
-    from vsacli.trajectory.declared.csv_samples import RecordedWrench
-    from vsacli.trajectory.declared.polynomial import WrenchPolynomial
-    from vsacli.trajectory.declared.steps import WrenchSteps
+_JOINTS = ("position", "commanded")
+_EVERY = (*_JOINTS, "wrench")
 
-WrenchCourse: TypeAlias = "WrenchPolynomial | WrenchConstant | WrenchSteps | RecordedWrench"
-
-_POSITIONS = {
-    "polynomial": "vsacli.trajectory.declared.polynomial:PositionPolynomial",
-    "via": "vsacli.trajectory.declared.via_points:PositionVia",
-    "sinusoids": "vsacli.trajectory.declared.sinusoids:PositionSinusoids",
-    "sequence": "vsacli.trajectory.declared.sequence:PositionSequence",
-    "constant": "vsacli.trajectory.declared.constant:PositionConstant",
-    "csv": "vsacli.trajectory.declared.csv_samples:Recorded",
+TYPES = {
+    "polynomial": ("vsacli.trajectory.declared.polynomial:Polynomial", _EVERY),
+    "via": ("vsacli.trajectory.declared.via_points:Via", _JOINTS),
+    "sinusoids": ("vsacli.trajectory.declared.sinusoids:SumOfSinusoids", ("position",)),
+    "sequence": ("vsacli.trajectory.declared.sequence:Sequence", ("position",)),
+    "steps": ("vsacli.trajectory.declared.steps:Steps", ("commanded", "wrench")),
+    "constant": ("vsacli.trajectory.declared.polynomial:Hold", _EVERY),
+    "csv": ("vsacli.trajectory.declared.declaration:Recorded", _EVERY),
 }
-POSITIONS = OneOf(OnDemand(_POSITIONS))
-RIGID_POSITIONS = OneOf(
-    OnDemand(
-        {
-            **_POSITIONS,
-            "polynomial": "vsacli.trajectory.declared.polynomial:RigidPositionPolynomial",
-            "via": "vsacli.trajectory.declared.via_points:RigidPositionVia",
-            "sequence": "vsacli.trajectory.declared.sequence:RigidPositionSequence",
-        }
-    )
-)
-STIFFNESSES = OneOf(
-    OnDemand(
-        {
-            "polynomial": "vsacli.trajectory.declared.polynomial:StiffnessPolynomial",
-            "via": "vsacli.trajectory.declared.via_points:StiffnessVia",
-            "steps": "vsacli.trajectory.declared.steps:StiffnessSteps",
-            "constant": "vsacli.trajectory.declared.constant:StiffnessConstant",
-            "csv": "vsacli.trajectory.declared.csv_samples:Recorded",
-        }
-    )
-)
-WRENCHES = OneOf(
-    OnDemand(
-        {
-            "polynomial": "vsacli.trajectory.declared.polynomial:WrenchPolynomial",
-            "steps": "vsacli.trajectory.declared.steps:WrenchSteps",
-            "constant": "vsacli.trajectory.declared.constant:WrenchConstant",
-            "csv": "vsacli.trajectory.declared.csv_samples:RecordedWrench",
-        }
-    )
-)
+"""Each type with its home, and what it serves: the position, any commanded signal, the wrench."""
 
-__all__ = ["POSITIONS", "RIGID_POSITIONS", "STIFFNESSES", "WRENCHES", "Course", "WrenchCourse"]
+
+class _Types(OnDemand):
+    """The record classes of the types that serve a use."""
+
+    def __init__(self, use: Use) -> None:
+        served = {POSITION: "position", WRENCH: "wrench"}.get(use.signal, "commanded")
+        super().__init__({name: home for name, (home, serves) in TYPES.items() if served in serves})
+        self._use = use
+
+    def __getitem__(self, name: str) -> Any:
+        return super().__getitem__(name).record(self._use)
+
+
+def declared_as(use: Use) -> OneOf:
+    """How a signal may be declared."""
+    return OneOf(_Types(use))
+
+
+__all__ = ["TYPES", "Declaration", "Formula", "Recorded", "Use", "declared_as"]

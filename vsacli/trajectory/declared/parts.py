@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
 from vsacli.base.signals import POSITION
-from vsacli.documents.fields import POSITIVE, PerJoint, check_fields, integer, number, value
-from vsacli.trajectory.curves import ClosedForm, Constant, RestToRest
-from vsacli.trajectory.declared import degrees
-from vsacli.trajectory.declared.course import Course, same_time
-from vsacli.trajectory.declared.sinusoids import PositionSinusoids
-from vsacli.trajectory.declared.via_points import PositionVia
+from vsacli.documents.fields import POSITIVE, integer, number
+from vsacli.trajectory.curves import DEGREES, ClosedForm, Constant, RestToRest
+from vsacli.trajectory.declared.declaration import Declaration, Formula, Use, same_time
+from vsacli.trajectory.declared.sinusoids import SumOfSinusoids
+from vsacli.trajectory.declared.via_points import Via
 
 Position: TypeAlias = tuple[float, ...]
 
 
-class Part(ABC):
+class Part(Declaration):
     """A motion with a duration of its own; what is declared may leave open where it begins."""
 
     opening: ClassVar[tuple[str | int, ...]]
@@ -52,8 +50,10 @@ class _Timed(Part):
 
     duration: float
 
-    def __post_init__(self) -> None:
-        check_fields(self)
+    @classmethod
+    def fields(cls, _use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        return {"duration": number(units.TIME, "duration of the part", check=POSITIVE)}
 
     @property
     def lasts(self) -> float:
@@ -61,33 +61,42 @@ class _Timed(Part):
         return self.duration
 
 
-@dataclass(frozen=True)
 class Dwell(_Timed):
     """The robot stands still where the part before ends; at the beginning, where the next part starts."""
 
     opening = ()
     begins = None
-    duration: float = number(units.TIME, "duration of the part", check=POSITIVE)
 
     def placed(self, span: tuple[float, float], here: Position) -> Constant:
         """The profile over a span, in s, after a part that ends here."""
         return Constant(signal=POSITION, span=span, value=here)
 
 
-@dataclass(frozen=True)
 class PolynomialPart(_Timed):
     """Rest to rest: all derivatives up to (degree-1)/2 vanish at both ends."""
 
     opening = ("start",)
-    duration: float = number(units.TIME, "duration of the part", check=POSITIVE)
-    degree: int = integer(
-        "degree of the polynomial: from 9 on next to another part; from 5 on if all joints are rigid",
-        check=degrees.POSITION,
-    )
-    start: Position | None = value(
-        PerJoint(units.POSITION), "position at the start; where the part before ends, if absent", default=None
-    )
-    end: Position = value(PerJoint(units.POSITION), "position at the end")
+    degree: int
+    start: Position | None
+    end: Position
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        degree = "degree of the polynomial"
+        if not use.rigid:
+            degree += ": from 9 on next to another part; from 5 on if all joints are rigid"
+        return {
+            **super().fields(use),
+            "degree": integer(degree, check=use.degree(DEGREES)),
+            "start": use.one("at the start; where the part before ends, if absent", default=None),
+            "end": use.one("at the end"),
+        }
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
 
     @property
     def begins(self) -> Position | None:
@@ -100,15 +109,8 @@ class PolynomialPart(_Timed):
         return RestToRest(signal=POSITION, span=span, degree=self.degree, start=start, end=self.end)
 
 
-@dataclass(frozen=True)
-class RigidPolynomialPart(PolynomialPart):
-    """The same for a robot whose joints are all rigid."""
-
-    degree: int = integer("degree of the polynomial", check=degrees.RIGID_POSITION)
-
-
-class _Standalone(Course, Part):
-    """A course that is a part as well: it knows by itself where it begins."""
+class _Standalone(Formula, Part):
+    """A formula that is a part as well: it knows by itself where it begins."""
 
     @property
     @abstractmethod
@@ -130,14 +132,22 @@ class _Standalone(Course, Part):
         return self.problems_over(self.lasts)
 
 
-@dataclass(frozen=True)
-class ViaPart(PositionVia, _Standalone):
+class ViaPart(Via, _Standalone):
     """A spline through points as above."""
 
     opening = ("points", 0)
-    duration: float | None = number(
-        units.TIME, "duration of the part, if there are no times", check=POSITIVE, default=None
-    )
+    duration: float | None
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        doc = "duration of the part, if there are no times"
+        return {**super().fields(use), "duration": number(units.TIME, doc, check=POSITIVE, default=None)}
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        return "The same for a robot whose joints are all rigid." if use.rigid else cls.__doc__ or ""
 
     def _problems(self) -> Iterator[FieldProblem]:
         yield from super()._problems()
@@ -157,19 +167,17 @@ class ViaPart(PositionVia, _Standalone):
         return duration
 
 
-@dataclass(frozen=True)
-class RigidViaPart(ViaPart):
-    """The same for a robot whose joints are all rigid."""
-
-    degree: int = integer("degree of the spline", check=degrees.RIGID_POSITION_VIA)
-
-
-@dataclass(frozen=True)
-class SinusoidsPart(PositionSinusoids, _Standalone):
+class SinusoidsPart(SumOfSinusoids, _Standalone):
     """A sum of sinusoids as above; it needs a `ramp` where another part precedes or follows."""
 
     opening = ("offset",)
-    duration: float = number(units.TIME, "duration of the part", check=POSITIVE)
+    duration: float
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        duration = number(units.TIME, "duration of the part", check=POSITIVE)
+        return {**super().fields(use), "duration": duration}
 
     @property
     def lasts(self) -> float:
@@ -177,5 +185,9 @@ class SinusoidsPart(PositionSinusoids, _Standalone):
         return self.duration
 
 
-PARTS = {"polynomial": PolynomialPart, "via": ViaPart, "sinusoids": SinusoidsPart, "dwell": Dwell}
-RIGID_PARTS = {**PARTS, "polynomial": RigidPolynomialPart, "via": RigidViaPart}
+PARTS: dict[str, type[Part]] = {
+    "polynomial": PolynomialPart,
+    "via": ViaPart,
+    "sinusoids": SinusoidsPart,
+    "dwell": Dwell,
+}

@@ -1,27 +1,48 @@
-"""From one value to another: a polynomial."""
+"""From one value to another by a polynomial, or the same value all the time."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Any
 
-from vsacli.base import units
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.documents.fields import POSITIVE, PerJoint, check_fields, integer, value, vector
-from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.declared import degrees
-from vsacli.trajectory.declared.course import Course, Values, numbers
-from vsacli.trajectory.declared.framed import Framed
+from vsacli.base.signals import POSITION, WRENCH
+from vsacli.base.wrench import WRENCH_AXES
+from vsacli.documents.fields import integer
+from vsacli.trajectory.curves import DEGREES, Constant, RestToRest
+from vsacli.trajectory.declared.declaration import Formula, Use, Values, numbers
+
+AXES = f", `[{', '.join(WRENCH_AXES)}]`"
 
 
-class Polynomial(Course):
+class Polynomial(Formula):
     """From one value to another, at rest before and after."""
 
     degree: int
     start: Values
     end: Values
 
-    def __post_init__(self) -> None:
-        check_fields(self)
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        degree = "degree of the polynomial"
+        if use.signal is not POSITION:
+            degree += f", odd, {DEGREES[0]} to {DEGREES[-1]}"
+        elif not use.rigid:
+            degree += "; from 3 on if all joints are rigid"
+        return {
+            **use.frame(),
+            "degree": integer(degree, check=use.degree(DEGREES)),
+            "start": use.one("at the start" + (AXES if use.signal is WRENCH else "")),
+            "end": use.one("at the end"),
+        }
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        if use.rigid:
+            same = "The same for a robot whose joints are all rigid"
+            return f"{same}: its torques do not depend on jerk and snap."
+        way = "Rest to rest" if use.signal is POSITION else f"From one {use.signal.key} to another"
+        return f"{way}: all derivatives up to (degree-1)/2 vanish at both ends."
 
     def over(self, span: tuple[float, float]) -> RestToRest:
         """The profile from the first to the last time of a span, in s."""
@@ -29,40 +50,23 @@ class Polynomial(Course):
         return RestToRest(signal=self.signal, span=span, degree=self.degree, start=start, end=end)
 
 
-@dataclass(frozen=True)
-class PositionPolynomial(Polynomial):
-    """Rest to rest: all derivatives up to (degree-1)/2 vanish at both ends."""
+class Hold(Formula):
+    """The same value all the time."""
 
-    signal = POSITION
-    degree: int = integer(
-        "degree of the polynomial; from 3 on if all joints are rigid", check=degrees.POSITION
-    )
-    start: tuple[float, ...] = value(PerJoint(units.POSITION), "position at the start")
-    end: tuple[float, ...] = value(PerJoint(units.POSITION), "position at the end")
+    value: Values
 
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        return {**use.frame(), "value": use.one("all the time" + (AXES if use.signal is WRENCH else ""))}
 
-@dataclass(frozen=True)
-class RigidPositionPolynomial(PositionPolynomial):
-    """The same for a robot whose joints are all rigid: its torques do not depend on jerk and snap."""
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        if use.signal is POSITION:
+            return "The robot stands still."
+        return f"The same {use.signal.key} all the time."
 
-    degree: int = integer("degree of the polynomial", check=degrees.RIGID_POSITION)
-
-
-@dataclass(frozen=True)
-class StiffnessPolynomial(Polynomial):
-    """From one stiffness to another: all derivatives up to (degree-1)/2 vanish at both ends."""
-
-    signal = STIFFNESS
-    degree: int = integer("degree of the polynomial, odd, 3 to 15", check=degrees.STIFFNESS)
-    start: Values = value(PerJoint(units.STIFFNESS), "stiffness at the start", check=POSITIVE)
-    end: Values = value(PerJoint(units.STIFFNESS), "stiffness at the end", check=POSITIVE)
-
-
-@dataclass(frozen=True)
-class WrenchPolynomial(Polynomial, Framed):
-    """From one wrench to another: all derivatives up to (degree-1)/2 vanish at both ends."""
-
-    signal = WRENCH
-    degree: int = integer("degree of the polynomial, odd, 3 to 15", check=degrees.WRENCH)
-    start: tuple[float, ...] = vector(6, units.WRENCH, "wrench at the start, `[fx, fy, fz, mx, my, mz]`")
-    end: tuple[float, ...] = vector(6, units.WRENCH, "wrench at the end")
+    def over(self, span: tuple[float, float]) -> Constant:
+        """The profile from the first to the last time of a span, in s."""
+        return Constant(signal=self.signal, span=span, value=numbers(self.value))

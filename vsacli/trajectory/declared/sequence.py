@@ -3,34 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InvalidRecordError
-from vsacli.base.signals import POSITION
 from vsacli.documents.fields import Items, OneOf, check_fields, value
 from vsacli.trajectory.curves import ClosedForm
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.curves.piecewise import Chain, Jump
-from vsacli.trajectory.declared.course import Course
-from vsacli.trajectory.declared.parts import PARTS, RIGID_PARTS, Dwell, Part
+from vsacli.trajectory.declared.declaration import Formula, Use
+from vsacli.trajectory.declared.parts import PARTS, Dwell, Part
 
 
-@dataclass(frozen=True)
-class PositionSequence(Course):
+class Sequence(Formula):
     """Parts one after the other. Each begins as the one before ends, to the fourth derivative."""
 
-    signal = POSITION
-    smoothness: ClassVar[int] = 4
-    remedy: ClassVar[str] = (
-        "the motion must be four times continuously differentiable, so that parts meet at rest:"
-        " take degree 9 or more, and a ramp for sinusoids"
-    )
-    parts: tuple[Part, ...] = value(Items(OneOf(PARTS)), "what happens, in this order")
+    parts: tuple[Part, ...]
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        parts = {name: part.record(use) for name, part in PARTS.items()}
+        return {"parts": value(Items(OneOf(parts)), "what happens, in this order")}
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -63,7 +65,7 @@ class PositionSequence(Course):
 
     def _discontinuities(self) -> Iterator[FieldProblem]:
         with np.errstate(all="ignore"):  # numbers that are too large are noticed elsewhere
-            jumps = list(self.over((0.0, self.lasts)).jumps(self.smoothness + 1))
+            jumps = list(self.over((0.0, self.lasts)).jumps(self.use.smoothness + 1))
         for jump in jumps:
             part = ("parts", jump.part)
             if jump.order == 0:
@@ -72,7 +74,12 @@ class PositionSequence(Course):
             else:
                 name = self.signal.names[jump.order]
                 change = f"{name} jumps from {jump.before:.4g} to {jump.after:.4g} where this part begins"
-                yield FieldProblem(part, f"{change}; {self.remedy}", jump.component)
+                yield FieldProblem(part, f"{change}; {self._remedy()}", jump.component)
+
+    def _remedy(self) -> str:
+        smooth = "twice" if self.use.rigid else "four times"
+        remedy = f"the motion must be {smooth} continuously differentiable, so that parts meet at rest"
+        return f"{remedy}: take degree {2 * self.use.smoothness + 1} or more, and a ramp for sinusoids"
 
     def _ends(self) -> FloatArray:
         """Where the parts end, from the start of the first on, s; (parts+1,)."""
@@ -100,28 +107,16 @@ class PositionSequence(Course):
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
         """Those of the parts."""
         for part, profile in self._placed(span):
-            if isinstance(part, Course):
+            if isinstance(part, Formula):
                 yield from part.warnings_over(profile.span, joints)
 
     def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
         """Those of the parts."""
         for part, profile in self._placed(span):
-            if isinstance(part, Course):
+            if isinstance(part, Formula):
                 yield from part.notes_over(profile.span)
 
 
 def _elsewhere(jump: Jump, path: tuple[str | int, ...]) -> str:
     remedy = "leave this key out" if "start" in path else "begin there"
     return f"begins at {jump.after:.12g}, but the part before ends at {jump.before:.12g}; {remedy}"
-
-
-@dataclass(frozen=True)
-class RigidPositionSequence(PositionSequence):
-    """The same for a robot whose joints are all rigid."""
-
-    smoothness = 2
-    remedy = (
-        "the motion must be twice continuously differentiable, so that parts meet at rest:"
-        " take degree 5 or more, and a ramp for sinusoids"
-    )
-    parts: tuple[Part, ...] = value(Items(OneOf(RIGID_PARTS)), "what happens, in this order")

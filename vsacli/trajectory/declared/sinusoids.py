@@ -3,49 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import Any
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
-from vsacli.base.signals import POSITION
-from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, check_fields, number, value
+from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, number, value
 from vsacli.trajectory.curves.sinusoids import Sinusoids
-from vsacli.trajectory.declared.course import Course
+from vsacli.trajectory.declared.declaration import Formula, Use
 from vsacli.trajectory.times import MAX_STEPS
 
 MAX_HARMONICS = 100
 """More are taken for a mistake: identification uses about five."""
 
 
-@dataclass(frozen=True)
-class PositionSinusoids(Course):
+class SumOfSinusoids(Formula):
     """offset + sum over k = 1, 2, ... of sine_k sin(k w t) + cosine_k cos(k w t) with w = 2 pi frequency.
 
     The periodic excitation of identification experiments (Swevers et al., IEEE Transactions on Robotics and
     Automation, 1997); t counts from the start. Without `ramp` it begins and ends in motion.
     """
 
-    signal = POSITION
-    frequency: float = number(units.RATE, "frequency of the lowest harmonic, k = 1", check=POSITIVE)
-    offset: tuple[float, ...] = value(PerJoint(units.POSITION), "position about which the joint moves")
-    sine: tuple[tuple[float, ...], ...] = value(
-        Items(PerJoint(units.POSITION)),
-        "amplitudes of sin(k w t), one entry for each k from 1 on",
-        default=(),
-    )
-    cosine: tuple[tuple[float, ...], ...] = value(
-        Items(PerJoint(units.POSITION)), "amplitudes of cos(k w t), likewise", default=()
-    )
-    ramp: float = number(
-        units.TIME,
-        "how long the sum rises from zero at the start, and falls to zero at the end, so that the robot"
-        " begins and ends at rest at the offset",
-        check=NON_NEGATIVE,
-        default=0.0,
-    )
+    frequency: float
+    offset: tuple[float, ...]
+    sine: tuple[tuple[float, ...], ...]
+    cosine: tuple[tuple[float, ...], ...]
+    ramp: float
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._problems())
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        amplitudes = Items(PerJoint(use.signal.quantities[0]))
+        sine = "amplitudes of sin(k w t), one entry for each k from 1 on"
+        ramp = (
+            "how long the sum rises from zero at the start, and falls to zero at the end, so that the robot"
+            " begins and ends at rest at the offset"
+        )
+        return {
+            "frequency": number(units.RATE, "frequency of the lowest harmonic, k = 1", check=POSITIVE),
+            "offset": use.one("about which the joint moves"),
+            "sine": value(amplitudes, sine, default=()),
+            "cosine": value(amplitudes, "amplitudes of cos(k w t), likewise", default=()),
+            "ramp": number(units.TIME, ramp, check=NON_NEGATIVE, default=0.0),
+        }
 
     def _problems(self) -> Iterator[FieldProblem]:
         if not (self.sine or self.cosine):

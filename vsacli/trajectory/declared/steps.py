@@ -3,54 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
-from vsacli.base.signals import STIFFNESS, WRENCH
-from vsacli.documents.fields import (
-    NON_NEGATIVE,
-    POSITIVE,
-    Items,
-    Number,
-    PerJoint,
-    Vector,
-    check_fields,
-    integer,
-    number,
-    value,
-)
+from vsacli.base.signals import WRENCH
+from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, Number, integer, number, value
+from vsacli.trajectory.curves import DEGREES
 from vsacli.trajectory.curves.piecewise import Chain, stepwise
-from vsacli.trajectory.declared import degrees
-from vsacli.trajectory.declared.course import SAME_TIME, Course, Values, numbers
-from vsacli.trajectory.declared.framed import Framed
+from vsacli.trajectory.declared.declaration import SAME_TIME, Formula, Use, Values, numbers, odd
+from vsacli.trajectory.declared.polynomial import AXES
+
+_SMOOTH = (
+    "it must be twice continuously differentiable, so two derivatives must vanish where it begins to change"
+)
 
 
-def _degree() -> Any:
-    return integer("degree of the polynomials that lead from level to level", check=degrees.STEPPED)
-
-
-def _times() -> Any:
-    doc = "when the change to each further level begins, from the start on; one less than levels"
-    return value(Items(Number(units.TIME)), doc, check=NON_NEGATIVE)
-
-
-def _transition() -> Any:
-    return number(units.TIME, "how long each change lasts", check=POSITIVE)
-
-
-class Steps(Course):
-    """Levels that are held, with rest-to-rest changes between them."""
+class Steps(Formula):
+    """Levels that are held, with rest-to-rest changes from each to the next."""
 
     degree: int
     levels: tuple[Values, ...]
     times: tuple[float, ...]
     transition: float
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._problems())
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        degree = "degree of the polynomials that lead from level to level"
+        times = "when the change to each further level begins, from the start on; one less than levels"
+        axes = f" {AXES.removeprefix(', ')}" if use.signal is WRENCH else ""
+        return {
+            **use.frame(),
+            "degree": integer(degree, check=odd(DEGREES, 2 * use.smoothness + 1, _SMOOTH)),
+            "levels": use.several(f"{axes}, the first from the start on"),
+            "times": value(Items(Number(units.TIME)), times, check=NON_NEGATIVE),
+            "transition": number(units.TIME, "how long each change lasts", check=POSITIVE),
+        }
 
     def _problems(self) -> Iterator[FieldProblem]:
         if len(self.times) != len(self.levels) - 1:
@@ -78,29 +68,3 @@ class Steps(Course):
         ]  # rounding must not make them overlap
         levels, changes = list(map(numbers, self.levels)), list(zip(starts, ends, strict=True))
         return stepwise(self.signal, span, self.degree, levels, changes)
-
-
-@dataclass(frozen=True)
-class StiffnessSteps(Steps):
-    """Levels that are held, with rest-to-rest changes from each to the next."""
-
-    signal = STIFFNESS
-    degree: int = _degree()
-    levels: tuple[Values, ...] = value(
-        Items(PerJoint(units.STIFFNESS)), "stiffnesses, the first from the start on", check=POSITIVE
-    )
-    times: tuple[float, ...] = _times()
-    transition: float = _transition()
-
-
-@dataclass(frozen=True)
-class WrenchSteps(Steps, Framed):
-    """Levels that are held, with rest-to-rest changes from each to the next."""
-
-    signal = WRENCH
-    degree: int = _degree()
-    levels: tuple[tuple[float, ...], ...] = value(
-        Items(Vector(6, units.WRENCH)), "wrenches `[fx, fy, fz, mx, my, mz]`, the first from the start on"
-    )
-    times: tuple[float, ...] = _times()
-    transition: float = _transition()

@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
-from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.base.units import Quantity
-from vsacli.documents.fields import (
-    NON_NEGATIVE,
-    POSITIVE,
-    Items,
-    Number,
-    PerJoint,
-    check_fields,
-    integer,
-    value,
-)
+from vsacli.base.signals import POSITION
+from vsacli.documents.fields import NON_NEGATIVE, Items, Number, integer, value
+from vsacli.trajectory.curves import VIA_DEGREES
 from vsacli.trajectory.curves.via_points import ViaPoints, passing_shares
-from vsacli.trajectory.declared import degrees
-from vsacli.trajectory.declared.course import Course, Values, numbers
+from vsacli.trajectory.declared.declaration import Formula, Use, Values, numbers
 
 OVERSHOOT = 0.1
 """Share of a joint's range of points beyond which it is said how far the spline goes further."""
@@ -42,16 +31,37 @@ _TIMES = (
 )
 
 
-class Via(Course):
+class Via(Formula):
     """A spline through points, at rest at both ends."""
 
-    quantity: ClassVar[Quantity]
     degree: int
     points: tuple[Values, ...]
     times: tuple[float, ...] | None
 
-    def __post_init__(self) -> None:
-        check_fields(self, *self._problems())
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        degree = "degree of the spline"
+        if use.signal is POSITION and not use.rigid:
+            degree += "; from 3 on if all joints are rigid"
+        return {
+            "degree": integer(degree, check=use.degree(VIA_DEGREES)),
+            "points": use.several(" to pass, from the first to the last"),
+            "times": value(Items(Number(units.TIME)), _TIMES, check=NON_NEGATIVE, default=None),
+        }
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        if use.rigid:
+            return "The same for a robot whose joints are all rigid."
+        what = "A spline through points, from rest to rest"
+        if use.signal is POSITION:
+            what += "; that of degree 7 has the least mean square snap"
+        elif use.signal.positive:
+            what = "A spline through points, which must stay positive between them"
+        vanishing = "All derivatives up to (degree-1)/2 vanish at both ends"
+        return f"{what}.\n\n{vanishing}, those up to degree-1 are continuous."
 
     def _problems(self) -> Iterator[FieldProblem]:
         if not 2 <= len(self.points) <= MAX_POINTS:
@@ -120,7 +130,7 @@ class Via(Course):
             lowest, lowest_at, highest, highest_at = extremes
             further, when = max((points.min() - lowest, lowest_at), (highest - points.max(), highest_at))
             if further > OVERSHOOT * np.ptp(points):
-                unit = self.quantity.unit(joint_type)
+                unit = self.signal.quantities[0].unit(joint_type)
                 yield f"{name} goes {further:.3g} {unit} beyond its via points, at t = {when:.3f} s"
 
 
@@ -130,48 +140,3 @@ def _listed(times: list[float]) -> str:
         half = SHOWN_TIMES // 2
         shown[half:-half] = ["..."]
     return ", ".join(shown)
-
-
-@dataclass(frozen=True)
-class PositionVia(Via):
-    """A spline through points, from rest to rest; that of degree 7 has the least mean square snap.
-
-    All derivatives up to (degree-1)/2 vanish at both ends, those up to degree-1 are continuous.
-    """
-
-    signal = POSITION
-    quantity = units.POSITION
-    degree: int = integer(
-        "degree of the spline; from 3 on if all joints are rigid", check=degrees.POSITION_VIA
-    )
-    points: tuple[tuple[float, ...], ...] = value(
-        Items(PerJoint(units.POSITION)), "positions to pass, from the first to the last"
-    )
-    times: tuple[float, ...] | None = value(
-        Items(Number(units.TIME)), _TIMES, check=NON_NEGATIVE, default=None
-    )
-
-
-@dataclass(frozen=True)
-class RigidPositionVia(PositionVia):
-    """The same for a robot whose joints are all rigid."""
-
-    degree: int = integer("degree of the spline", check=degrees.RIGID_POSITION_VIA)
-
-
-@dataclass(frozen=True)
-class StiffnessVia(Via):
-    """A spline through points, which must stay positive between them.
-
-    All derivatives up to (degree-1)/2 vanish at both ends, those up to degree-1 are continuous.
-    """
-
-    signal = STIFFNESS
-    quantity = units.STIFFNESS
-    degree: int = integer("degree of the spline", check=degrees.STIFFNESS_VIA)
-    points: tuple[Values, ...] = value(
-        Items(PerJoint(units.STIFFNESS)), "stiffnesses to pass, from the first to the last", check=POSITIVE
-    )
-    times: tuple[float, ...] | None = value(
-        Items(Number(units.TIME)), _TIMES, check=NON_NEGATIVE, default=None
-    )

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, wrench_columns
+from vsacli.trajectory.joints import CommandedJoints
 
 TIME = "time"
-JOINT_SIGNALS = (POSITION, STIFFNESS)
-SIGNALS = (*JOINT_SIGNALS, WRENCH)
 
 Way = dict[str, dict[int, str]]
 """For each quantity the names of its columns, by index of the joint (wrench axis)."""
@@ -25,8 +24,6 @@ Way = dict[str, dict[int, str]]
 _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
 _WRENCH_WAY: Way = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
-
-_MOTION_ALONE = "; a trajectory in YAML can take the motion from here and set the stiffness itself"
 
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 _PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
@@ -54,21 +51,20 @@ class Layout:
     Attributes:
         time: the column of the times.
         quantities: for each quantity that the table has, e.g. `dq`, the columns by index of the joint (axis).
-        unused: names of the other columns.
+        unused: names of the columns of joints that do not take their signal, by the key of the signal.
     """
 
     time: Column
     quantities: Mapping[str, Mapping[int, Column]]
-    unused: tuple[str, ...]
+    unused: Mapping[str, Sequence[str]]
 
 
 def column_layout(
     header: Sequence[str],
-    joints: Mapping[str, str],
+    joints: CommandedJoints,
     wanted: Sequence[Signal],
     file: str,
     line: int = 1,
-    without_stiffness: Collection[str] = (),
 ) -> Layout:
     """Where the quantities stand in a table.
 
@@ -77,19 +73,20 @@ def column_layout(
 
     Args:
         header: names of all columns, none twice.
-        joints: names with types, base to tip; each must have a column of each quantity that any joint has.
+        joints: those commanded; each must have a column of each quantity that any joint has, but needs none
+            of signals that it does not take: such columns are admitted, but not in the layout.
         wanted: signals whose values must be there; their derivatives are optional.
         file: named in errors.
         line: of the header, likewise.
-        without_stiffness: joints that need no stiffness; columns of it are admitted, but not in the layout.
 
     Raises:
         InputError: all that is wrong with the header.
     """
     headings = [_HEADING.fullmatch(text) for text in header]
     names = [text if match is None else match["name"] for text, match in zip(header, headings, strict=True)]
-    everything = [column for pattern in _PATTERNS for column in _all(_columns(pattern, joints))]
-    ways = [_columns(pattern, joints, without_stiffness) for pattern in _PATTERNS]
+    of_every_joint = [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in _PATTERNS]
+    everything = [column for way in of_every_joint for column in _all(way)]
+    ways = [_columns(pattern, joints) for pattern in _PATTERNS]
     used = [way for way in ways if any(column in names for column in _all(way))]
     way = used[0] if used else ways[0]
     expected = [TIME, *_all(way), *(_all(_WRENCH_WAY) if WRENCH in wanted else ())]
@@ -113,20 +110,30 @@ def column_layout(
             for name, of_joints in way.items()
             if all(column in columns for column in of_joints.values())
         },
-        unused=tuple(name for name in names if name not in columns),
+        unused={
+            key: [column for column in names if column in known and column not in columns]
+            for key, known in _of_signals(of_every_joint).items()
+        },
     )
 
 
-def _columns(pattern: str, joint_names: Collection[str], without_stiffness: Collection[str] = ()) -> Way:
-    """The columns of the joints."""
+def _columns(pattern: str, joints: CommandedJoints) -> Way:
+    """The columns of the joints, those of each signal for the joints that take it."""
     return {
         name: {
             index: pattern.format(name=name, joint=joint, number=index + 1)
-            for index, joint in enumerate(joint_names)
-            if signal is not STIFFNESS or joint not in without_stiffness
+            for index, joint in joints.taking(signal).items()
         }
-        for signal in JOINT_SIGNALS
+        for signal in (POSITION, *COMMANDED.values())
         for name in signal.names
+    }
+
+
+def _of_signals(ways: Sequence[Way]) -> dict[str, set[str]]:
+    """All columns of each commanded signal, by its key."""
+    return {
+        key: {column for way in ways for name in signal.names for column in way[name].values()}
+        for key, signal in COMMANDED.items()
     }
 
 
@@ -155,8 +162,9 @@ def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[
             continue
         missing = f"there {'is no column' if len(absent) == 1 else 'are no columns'} {', '.join(absent)}"
         if name in needed:
-            alone = name in STIFFNESS.names and len(absent) == len(columns)
-            yield missing + (_MOTION_ALONE if alone else "")
+            alone = name in COMMANDED and len(absent) == len(columns)
+            elsewhere = f"; a trajectory in YAML can take the motion from here and set the {name} itself"
+            yield missing + (elsewhere if alone else "")
         elif len(absent) < len(columns):
             every = "axes" if name in WRENCH.names else "joints"
             yield f"{missing}; {name} is given for all {every} or for none"
@@ -166,14 +174,15 @@ def _measured(
     names: Sequence[str],
     units: Sequence[str | None],
     way: Way,
-    joints: Mapping[str, str],
+    joints: CommandedJoints,
     problems: list[str],
 ) -> Iterator[tuple[str, Column]]:
     """The columns that are used, by name; notes units that cannot be converted."""
+    types = tuple(joints.types.values())
     expected = {TIME: VARIABLES[TIME].quantity.unit("")}
     for quantity, columns in way.items():
         for index, column in columns.items():
-            expected[column] = _unit(VARIABLES[quantity].quantity, quantity, index, tuple(joints.values()))
+            expected[column] = _unit(VARIABLES[quantity].quantity, quantity, index, types)
     for place, (name, unit) in enumerate(zip(names, units, strict=True)):
         if name in expected:
             try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,11 +12,12 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.signals import STIFFNESS, WRENCH, Signal
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
-from vsacli.trajectory.recorded.columns import JOINT_SIGNALS, SIGNALS, Column, Layout, column_layout
+from vsacli.trajectory.joints import CommandedJoints, takers
+from vsacli.trajectory.recorded.columns import Column, Layout, column_layout
 from vsacli.trajectory.recorded.samples import (
     SampledProfile,
     SampleProblem,
@@ -27,8 +28,8 @@ from vsacli.trajectory.recorded.samples import (
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
-DEFAULT_FITS: Mapping[Signal, str | None] = dict.fromkeys(JOINT_SIGNALS)
-"""Position and stiffness, each fitted as its noise asks for."""
+DEFAULT_FITS: Mapping[Signal, str | None] = dict.fromkeys((POSITION, *COMMANDED.values()))
+"""All signals of joints, each fitted as its noise asks for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +70,8 @@ class Recording:
 
 def read_recording(
     path: str | os.PathLike[str],
-    joints: Mapping[str, str],
+    joints: CommandedJoints,
     wanted: Mapping[Signal, str | None] = DEFAULT_FITS,
-    without_stiffness: Collection[str] = (),
     *,
     resampled: bool = False,
 ) -> Recording:
@@ -79,9 +79,8 @@ def read_recording(
 
     Args:
         path: a file with the columns `time` and those of `column_layout`.
-        joints: names with types, from the base to the tip.
+        joints: those that are commanded.
         wanted: the signals to read, each with the method of its fit as in `fit_samples`.
-        without_stiffness: joints for which no stiffness is read.
         resampled: whether the steps will be other times than the recorded ones.
 
     Raises:
@@ -90,9 +89,9 @@ def read_recording(
     table = read_table(path)
     file = table.source.path
     signals = tuple(wanted)
-    layout = column_layout(table.columns, joints, signals, file, table.header_line, without_stiffness)
+    layout = column_layout(table.columns, joints, signals, file, table.header_line)
     time = _si(table, layout.time)
-    records = [_samples(signal, tuple(joints), time, table, layout) for signal in signals]
+    records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
 
     problems = [*time_problems(time), *(problem for record in records for problem in value_problems(record))]
     if problems:
@@ -107,11 +106,12 @@ def read_recording(
 
 
 def _unused(layout: Layout, wanted: Sequence[Signal]) -> Iterator[str]:
-    for signal in SIGNALS:
+    for signal in (POSITION, *COMMANDED.values(), WRENCH):
         if signal not in wanted and any(layout.quantities.get(name) for name in signal.names):
             yield f"its columns of {signal.names[0]} are not used"
-    if layout.unused:
-        yield f"not used: {', '.join(layout.unused)}; only antagonistic joints take a stiffness"
+    for key, columns in layout.unused.items():
+        if columns:
+            yield f"not used: {', '.join(columns)}; only {takers(key)} joints take a {key}"
 
 
 def _samples(
@@ -152,20 +152,18 @@ def _located(problem: SampleProblem, table: Table, layout: Layout) -> Problem:
     return Problem(table.source.path, line, f"{column} {problem.message}")
 
 
-def recorded_trajectory(
-    path: str | os.PathLike[str], joints: Mapping[str, str], without_stiffness: Collection[str] = ()
-) -> Trajectory:
-    """A trajectory whose position and stiffness come from one CSV file, named after the file.
+def recorded_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> Trajectory:
+    """A trajectory whose position and commanded signals come from one CSV file, named after the file.
 
     Raises:
         InputError: as `read_recording`.
     """
-    recording = read_recording(path, joints, without_stiffness=without_stiffness)
-    position, stiffness = recording.profiles
+    recording = read_recording(path, joints)
+    profiles = {profile.signal.key: profile for profile in recording.profiles}
     return Trajectory(
         recording.times,
-        position,
-        {STIFFNESS.key: stiffness},
+        profiles[POSITION.key],
+        profiles,
         name=Path(path).stem,
         notes=recording.notes,
         sources=[recording.source],

@@ -1,0 +1,69 @@
+"""Who a trajectory is for: the joints of a robot, and by which signals each can be commanded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.kinds import ACTUATORS, Actuator
+from vsacli.actuators.rigid import Rigid
+from vsacli.base.signals import COMMANDED, STIFFNESS, Signal
+from vsacli.robot.model import Robot
+
+
+@dataclass(frozen=True)
+class CommandedJoints:
+    """The joints that a trajectory commands.
+
+    Attributes:
+        types: name and type of each, from the base to the tip.
+        exempt: for each signal by key the joints that do not take it, each with the reason, a clause.
+        rigid: whether all are rigid, so that torques do not depend on jerk and snap.
+    """
+
+    types: Mapping[str, str]
+    exempt: Mapping[str, Mapping[str, str]]
+    rigid: bool = False
+
+    @classmethod
+    def of(cls, robot: Robot) -> Self:
+        """Those of a robot."""
+        exempt = {
+            key: {
+                joint.name: _reason(joint.actuator, key)
+                for joint in robot.joints
+                if key not in joint.actuator.commanded
+            }
+            for key in COMMANDED
+        }
+        rigid = all(isinstance(joint.actuator, Rigid) for joint in robot.joints)
+        return cls(dict(zip(robot.joint_names, robot.joint_types, strict=True)), exempt, rigid)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(self.types)
+
+    @property
+    def taken(self) -> frozenset[str]:
+        """Keys of the signals that any joint takes."""
+        return frozenset(key for key, exempt in self.exempt.items() if len(exempt) < len(self.types))
+
+    def taking(self, signal: Signal) -> dict[int, str]:
+        """The joints that take a signal, by index."""
+        exempt = self.exempt.get(signal.key, {})
+        return {index: name for index, name in enumerate(self.types) if name not in exempt}
+
+
+def takers(key: str) -> str:
+    """The kinds of actuator that take a signal, as words before "joint"."""
+    return " or ".join(kind for kind, actuator in ACTUATORS.items() if key in actuator.commanded)
+
+
+def _reason(actuator: Actuator, key: str) -> str:
+    """Why an actuator does not take a signal, a clause."""
+    if key == STIFFNESS.key and not isinstance(actuator, Antagonistic):
+        return actuator.no_choice
+    return f"its actuator takes no {key}"
