@@ -11,6 +11,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.joints import CommandedJoints
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
