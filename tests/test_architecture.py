@@ -29,7 +29,6 @@ NOT_FOR_THE_MAIN_JOB = (
     *("results.csv_export", "results.plots", "results.store.reader", "robot.modified_dh", "robot.urdf"),
     *("analysis.result", "dynamics.integrated_deflections", "documents.table"),
     *("compute.engine.compiled_engine", "compute.engine.compiler", "compute.engine.lanes", "compute.tracing"),
-    *("trajectory.declared.csv_samples", "trajectory.declared.sequence", "trajectory.declared.via_points"),
     *("trajectory.curves.piecewise", "trajectory.curves.sinusoids", "trajectory.curves.via_points"),
     *("trajectory.recorded", "trajectory.fits"),
     *("actuators.pairs.solver", "actuators.laws.polynomial", "actuators.laws.sinh", "actuators.laws.table"),
