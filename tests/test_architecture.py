@@ -30,6 +30,7 @@ NOT_FOR_THE_MAIN_JOB = (
     *("analysis.result", "dynamics.integrated_deflections", "documents.table"),
     *("compute.engine.compiled_engine", "compute.engine.compiler", "compute.engine.lanes", "compute.tracing"),
     *("trajectory.curves.piecewise", "trajectory.curves.sinusoids", "trajectory.curves.via_points"),
+    *("trajectory.declared.sequence", "trajectory.declared.via_points"),
     *("trajectory.recorded", "trajectory.fits"),
     *("actuators.pairs.solver", "actuators.laws.polynomial", "actuators.laws.sinh", "actuators.laws.table"),
 )
