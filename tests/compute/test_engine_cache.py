@@ -101,6 +101,14 @@ def test_folder_that_others_may_write_to_is_not_trusted(folder: Path):
     assert warnings() == (f"{expected}; compiled code is not kept",)
 
 
+@pytest.mark.parametrize("mode", [0o720, 0o702], ids=["group", "others"])
+def test_a_folder_that_only_one_of_group_and_others_may_write_to(folder: Path, mode: int):
+    folder.mkdir(parents=True)
+    folder.chmod(mode)
+    with pytest.raises(CacheError, match=f"the cache folder {folder} can be written by others"):
+        open_cache()
+
+
 def test_folder_of_somebody_else_is_not_trusted(folder: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(os, "getuid", lambda: -1)
     with pytest.raises(CacheError, match=f"the cache folder {folder} belongs to somebody else"):

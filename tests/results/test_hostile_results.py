@@ -178,6 +178,32 @@ def test_shapes_are_not_believed(
         assert not Path("r.csv").exists()
 
 
+def test_a_chunk_is_not_larger_than_the_file(small_result: Path, tmp_path: Path) -> None:
+    """By its shape: 1.6 GB, all of which HDF5 would allocate to read one row."""
+    path = tmp_path / "r.h5"
+    shutil.copy(small_result, path)
+    with h5py.File(path, "r+") as file:
+        shape = file["tau_motor"].shape
+        del file["tau_motor"]
+        file.create_dataset(
+            "tau_motor", shape, "<f8", maxshape=(None, *shape[1:]), chunks=(2**25, *shape[1:])
+        )
+    with pytest.raises(InputError, match=r"tau_motor claims chunks of 1,610,612,736 bytes in a file of"):
+        StoredResult.open(path)
+
+
+def test_a_compressed_chunk_is_not_larger_than_the_file(small_result: Path, tmp_path: Path) -> None:
+    """By the index of chunks: a key of size, mask of filters and place of the chunk, then its address."""
+    with h5py.File(small_result) as file:
+        chunk = file["flags"].id.get_chunk_info(0)
+    content = bytearray(small_result.read_bytes())
+    entry = struct.pack("<IIQQQQ", chunk.size, 0, 0, 0, 0, chunk.byte_offset)
+    struct.pack_into("<I", content, content.index(entry), 2**31)
+    (tmp_path / "r.h5").write_bytes(content)
+    with pytest.raises(InputError, match=r"flags claims chunks of 2,147,483,648 bytes in a file of"):
+        StoredResult.open(tmp_path / "r.h5")
+
+
 @pytest.mark.parametrize("report", ["[]", "1", "{", "[" * 100_000, '{"a": NaN'], ids=len)
 def test_reports_that_are_none(vsacli: Any, small_result: Path, report: str) -> None:
     shutil.copy(small_result, "r.h5")

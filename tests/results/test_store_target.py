@@ -53,6 +53,13 @@ def test_an_existing_file_is_refused_before_the_first_step(tmp_path, old):
     assert (tmp_path / "r.h5").read_bytes() == old
 
 
+def test_the_whole_file_is_on_the_disk_before_it_has_its_name(tmp_path, block, monkeypatch):
+    path, synced = tmp_path / "r.h5", []
+    monkeypatch.setattr(os, "fsync", lambda file: synced.append((os.fstat(file).st_size, path.exists())))
+    write_result(path, block)
+    assert synced[0] == (path.stat().st_size, False)
+
+
 @pytest.mark.usefixtures("old")
 def test_an_existing_file_is_replaced_on_request(tmp_path, block):
     with StoredResult.open(write_result(tmp_path / "r.h5", block, overwrite=True)) as result:
