@@ -21,6 +21,7 @@ import click
 from click.testing import CliRunner
 from field_tables import record_sections, table, variant_sections
 from noise_study import draw, table_rows
+from python_names import public_names
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.laws import LAWS
@@ -234,6 +235,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "stiffness-cost": stiffness_cost,
     "simulation-variables": simulation_variables,
     "robots": robots,
+    "public-names": public_names,
     "variables": variables,
     "flags": flags,
 }

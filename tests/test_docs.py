@@ -40,6 +40,9 @@ SAVED_AS = re.compile(r"Save as `(\S+)`:$")
 EXIT_CODE = re.compile(r"# exit code (\d+)$")
 SETTING_UP = re.compile(r"-m venv|pip install")
 HELP_EXAMPLE = re.compile(r"^ +(vsacli .*)$", re.MULTILINE)
+PRINTED = re.compile(r"^ *print\(.*?\)(?:  # ([^:\n]*)[^\n]*)?$", re.MULTILINE)
+"""Statements that print, and what they print if a comment says so."""
+
 ROUNDING = re.compile(r"self-check passed \(\S+,")
 """What of a report differs between machines."""
 
@@ -145,13 +148,23 @@ def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
 
 
 def check_python_examples(page: Path, folder: Path) -> None:
-    """Run the Python blocks of a page; a comment behind `print` says what it prints, up to a colon."""
+    """Run the Python blocks of a page; a comment behind `print` says what it prints, up to a colon.
+
+    What is printed without a comment is one of the page's blocks of text.
+    """
     code = "".join(block.text for block in blocks(page) if block.language == "python")
+    texts = [comparable(block.text) for block in blocks(page) if block.language == "text"]
     outcome = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], cwd=folder, capture_output=True, text=True, check=False
     )
     assert outcome.returncode == 0, outcome.stderr
-    assert outcome.stdout.splitlines() == re.findall(r"^ *print\(.*\)  # ([^:\n]*)", code, re.MULTILINE)
+    printed = f"{comparable(outcome.stdout)}\n"
+    for comment in PRINTED.findall(code):
+        expected = [comment] if comment else texts
+        shown = next((text for text in expected if printed.startswith(f"{text}\n")), None)
+        assert shown is not None, f"{comment!r} is not how this begins: {printed!r}"
+        printed = printed.removeprefix(f"{shown}\n")
+    assert printed.strip() == ""
 
 
 def test_the_readme_has_one_line_for_the_main_job_and_one_for_the_tests() -> None:

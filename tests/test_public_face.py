@@ -336,3 +336,9 @@ def test_a_single_state_is_a_row_of_many() -> None:
 def test_a_robot_comes_from_a_urdf() -> None:
     conversion = import_urdf(REPOSITORY / "robots" / "desk_arm.urdf", tip="flange")
     assert conversion.robot.joint_names == ("turn", "shoulder", "elbow", "quill")
+
+
+def test_every_name_is_on_the_page() -> None:
+    page = (REPOSITORY / "docs" / "python.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^- `(\w+)", page.partition("## Every name")[2], re.M)
+    assert sorted(listed) == sorted(vsacli._HOME)
