@@ -24,11 +24,11 @@ from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.motor import Motor
-from vsacli.actuators.reach import NEAR_SINGULAR, margin, reach_flags
+from vsacli.actuators.reach import margin, reach_flags
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.flags import LIMITS, Flag
+from vsacli.base.flags import LIMITS, NEAR_SINGULAR_MARGIN, Flag
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.robot.model import Joint, Limits
 
@@ -104,7 +104,7 @@ def test_slack_is_named_below_the_corridor_only():
 
 def test_threshold_of_near_singular_steps_can_be_chosen():
     solution = corridor(900, math.inf)
-    for threshold, expected in [(NEAR_SINGULAR, Flag(0)), (0.11, Flag.NEAR_SINGULAR)]:
+    for threshold, expected in [(NEAR_SINGULAR_MARGIN, Flag(0)), (0.11, Flag.NEAR_SINGULAR)]:
         assert Flag(int(reach_flags(np.array([1000.0]), solution, threshold)[0])) == expected
 
 

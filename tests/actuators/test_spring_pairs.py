@@ -19,9 +19,9 @@ from samples.springs import SPRINGS, Spring, measured, on_side_2, residuals
 from vsacli.actuators.antagonistic import solve_deflections
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.pairs import make_pair, solver
-from vsacli.actuators.reach import TOUCHING, margin, reach_flags
+from vsacli.actuators.reach import margin, reach_flags
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
 
 DRAWS = 400
 """Points on the two curves for each pair; about half of them lie on the branch."""
@@ -95,7 +95,7 @@ def round_trip(first: Spring, second: Spring, count: int, seed: int = 0) -> Roun
     found = make_pair(law_1, law_2).solve(tau_e, stiffness)
     gap = margin(stiffness, found.lower, found.upper)
     error = np.abs(np.stack((found.phi_1, found.phi_2)) - phi).max(axis=0)
-    refused = ~(gap >= -TOUCHING)
+    refused = ~(gap >= -SINGULAR_MARGIN)
     elsewhere = (gap > 1e-3) & ~(error < 1e-6)
     # A finer scan knows better where the coarse one saw no turn.
     for doubtful in (refused, elsewhere):

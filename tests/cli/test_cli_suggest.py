@@ -7,7 +7,7 @@ import json
 import pytest
 from samples.command_line import ROBOT, contents, edited
 
-from vsacli.actuators.reach import NEAR_SINGULAR
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.cli.check_feasibility import check_feasibility
 
 
@@ -33,7 +33,7 @@ def test_json_has_them_under_one_key(vsacli, too_soft):
     report = json.loads(vsacli("check-feasibility", ROBOT, too_soft, "--json", "--suggest").out)
     suggestions = report.pop("suggestions")
     assert report == plain
-    assert suggestions["near_singular"] == NEAR_SINGULAR
+    assert suggestions["near_singular"] == NEAR_SINGULAR_MARGIN
     assert suggestions["slow_down"]["possible"] is False
     offsets = suggestions["stiffness_offset"]["offsets"]
     assert offsets.keys() == {"base", "shoulder", "elbow"}
@@ -163,4 +163,4 @@ def test_suggestions_keep_the_margin_that_is_asked_for(vsacli, motion):
 
 def test_help_names_the_default_margin():
     (option,) = [each for each in check_feasibility.params if each.name == "near_singular"]
-    assert option.help.endswith(f"by default {NEAR_SINGULAR}.")
+    assert option.help.endswith(f"by default {NEAR_SINGULAR_MARGIN}.")

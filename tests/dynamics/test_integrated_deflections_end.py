@@ -18,9 +18,8 @@ from samples.deflections import (
 from samples.drives import Stopped, joint_with, springs, with_joint
 
 from vsacli import inverse_dynamics
-from vsacli.actuators.reach import TOUCHING
 from vsacli.analysis.result import Result
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
 from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.dynamics.integrated_deflections.task import REASONS, SINGULAR, STALLED, UNREACHABLE, Task
 
@@ -33,7 +32,7 @@ def touching() -> Result:
 def test_touching_the_singular_set_ends_the_way(touching: Result):
     base, shoulder = touching.report.drifts
     # The margin is 60 (t - 1.3)^2 / 800, which the smallest that counts as regular equals at:
-    end = 1.3 - np.sqrt(TOUCHING * 800 / 60)
+    end = 1.3 - np.sqrt(SINGULAR_MARGIN * 800 / 60)
     assert base.stop is not None
     assert base.stop.time == pytest.approx(end, abs=1e-9)  # a margin of 1e-9 is good to 1e-13
     assert base.stop.reason == REASONS[SINGULAR]

@@ -10,31 +10,12 @@ import numpy as np
 
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag, marked
-
-TOUCHING = 1e-9
-"""Relative margin that counts as zero: deflections are good to about 1e-16/margin, so to 1e-7 at this one."""
-
-NEAR_SINGULAR = 0.01
-"""Relative margin to a critical point below which a step is near-singular; the paper's runs keep 3 %."""
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN, Flag, marked
 
 
 def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
     """Relative distance of the stiffness to the nearer end of its corridor; negative outside, NaN if none."""
     return np.minimum(stiffness - lower, upper - stiffness) / stiffness
-
-
-def check_near_singular(threshold: float) -> None:
-    """Refuse a threshold for near-singular steps that no margin can be compared with.
-
-    Raises:
-        InputError: it is not above `TOUCHING` and below 1.
-    """
-    if not TOUCHING < threshold < 1:
-        raise InputError.one(
-            f"the near-singular margin must lie between {TOUCHING:g} and 1, as 0.01 does, not {threshold:g}"
-        )
 
 
 class Reach(NamedTuple):
@@ -53,22 +34,24 @@ class Reach(NamedTuple):
         return reduce(operator.or_, others, first)
 
 
-def reach(stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR) -> Reach:
+def reach(
+    stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR_MARGIN
+) -> Reach:
     """Reach of the steps of a joint; near-singular is what has a smaller margin than that."""
     gap = margin(stiffness, solution.lower, solution.upper)
     at_lower = stiffness - solution.lower <= solution.upper - stiffness
     critical = np.where(at_lower, solution.lower_critical, solution.upper_critical)
-    infeasible = ~((gap >= -TOUCHING) & (stiffness > 0))
+    infeasible = ~((gap >= -SINGULAR_MARGIN) & (stiffness > 0))
     return Reach(
         infeasible=infeasible,
         slack=infeasible & at_lower & solution.slack_below,
-        singular=critical & (np.abs(gap) <= TOUCHING),
-        near_singular=critical & (gap > TOUCHING) & (gap < near_singular),
+        singular=critical & (np.abs(gap) <= SINGULAR_MARGIN),
+        near_singular=critical & (gap > SINGULAR_MARGIN) & (gap < near_singular),
     )
 
 
 def reach_flags(
-    stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR
+    stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR_MARGIN
 ) -> FlagArray:
     """Bits INFEASIBLE, SLACK, SINGULAR and NEAR_SINGULAR of the steps of a joint, (samples,)."""
     return reach(stiffness, solution, near_singular).flags

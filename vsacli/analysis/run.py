@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, has
 from vsacli.base.variables import Block
 from vsacli.compute.engine import choose
 from vsacli.dynamics.energy import RunEnergy
@@ -59,7 +58,7 @@ class Run:
         trajectory: Trajectory,
         *,
         stop_on_infeasible: bool = False,
-        near_singular: float = NEAR_SINGULAR,
+        near_singular: float = NEAR_SINGULAR_MARGIN,
         deflections: str | IntegratedDeflections = "root",
         block_samples: int | None = None,
         engine: str = "numpy",

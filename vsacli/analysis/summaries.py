@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do, solve_deflections
-from vsacli.actuators.reach import TOUCHING, margin
+from vsacli.actuators.reach import margin
 from vsacli.actuators.rigid import Rigid
 from vsacli.analysis.joint_report import COUNTED, JointDrift, JointReport, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import has
+from vsacli.base.flags import SINGULAR_MARGIN, has
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.inverse import Stop
@@ -64,7 +64,7 @@ class JointSummary:
         gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
         self._record_margin(gap, block.time, corridor)
         self._record_reach(flags, gap, block)
-        outside = gap < -TOUCHING
+        outside = gap < -SINGULAR_MARGIN
         if self._other_preload and outside.any():
             demand = block.tau_e[outside, index], stiffness[outside]
             self._other_preload = bool(other_preload_would_do(actuator, *demand).all())
@@ -115,7 +115,7 @@ class JointSummary:
 
     def _record_reach(self, flags: FlagArray, gap: FloatArray, block: Block) -> None:
         """Followed deflections may end inside the corridor; such a step is infeasible, but has no worst."""
-        outside = gap < -TOUCHING
+        outside = gap < -SINGULAR_MARGIN
         for kind, bits in REACH.items():
             hit = has(flags, bits) & (outside if kind == "infeasible" else ~outside)
             for step in _worst_step(hit, -gap):

@@ -10,6 +10,13 @@ from typing import Self
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FlagArray
+from vsacli.base.errors import InputError
+
+SINGULAR_MARGIN = 1e-9
+"""Relative margin that counts as zero: deflections are good to about 1e-16/margin, so to 1e-7 at this one."""
+
+NEAR_SINGULAR_MARGIN = 0.01
+"""Relative margin to a critical point below which a step is near-singular; the paper's runs keep 3 %."""
 
 
 class Flag(enum.IntFlag):
@@ -74,3 +81,16 @@ def has(flags: FlagArray, bits: Flag) -> BoolArray:
 def marked(flag: Flag, where: BoolArray) -> FlagArray:
     """The bit where it shall be set, else 0."""
     return where.astype(np.uint16) * np.uint16(flag)
+
+
+def check_near_singular(threshold: float) -> None:
+    """Refuse a threshold for near-singular steps that no margin can be compared with.
+
+    Raises:
+        InputError: it is not above `SINGULAR_MARGIN` and below 1.
+    """
+    if not SINGULAR_MARGIN < threshold < 1:
+        raise InputError.one(
+            f"the near-singular margin must lie between {SINGULAR_MARGIN:g} and 1, as 0.01 does, "
+            f"not {threshold:g}"
+        )

@@ -90,11 +90,11 @@ def check_feasibility(
     confirmed on all steps.
     """
     inputs = load_inputs(robot, trajectory, talk)
-    from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular
     from vsacli.analysis.run import Run
+    from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
     from vsacli.studies.remedies import check_fixed_target, fixed_paths, suggest
 
-    margin = NEAR_SINGULAR if near_singular is None else near_singular
+    margin = NEAR_SINGULAR_MARGIN if near_singular is None else near_singular
     check_near_singular(margin)
     if fixed is not None:
         check_fixed_target(fixed, overwrite=overwrite)

@@ -11,10 +11,10 @@ from vsacli.actuators import antagonistic, elastic, rigid
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.drivetrain import SIDES, motors_and_springs
 from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.reach import NEAR_SINGULAR
 from vsacli.actuators.rigid import Rigid
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import FlagArray, FloatArray
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Joint
 
@@ -48,7 +48,7 @@ class Drive(NamedTuple):
 def drive(
     joint: Joint,
     command: Command,
-    near_singular: float = NEAR_SINGULAR,
+    near_singular: float = NEAR_SINGULAR_MARGIN,
     followed: FloatArray | None = None,
 ) -> Drive:
     """Motor motion and motor torques of a joint, (61)-(74).

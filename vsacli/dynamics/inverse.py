@@ -9,10 +9,10 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.limit_check import LimitCheck
-from vsacli.actuators.reach import NEAR_SINGULAR
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import AnyArray, FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.base.json_records import Stored
 from vsacli.base.signals import COMMANDED, commanded_names, orders_of_derivation
 from vsacli.base.variables import VARIABLES, Block
@@ -61,7 +61,7 @@ class InverseDynamics:
 
     robot: Robot
     frame: str | None = None
-    near_singular: float = NEAR_SINGULAR
+    near_singular: float = NEAR_SINGULAR_MARGIN
     followed: bool = False
     limits: tuple[tuple[LimitCheck, ...], ...] = field(init=False, repr=False)
 
@@ -120,7 +120,7 @@ class InverseDynamics:
 def compute_block(
     robot: Robot,
     motion: Motion,
-    near_singular: float = NEAR_SINGULAR,
+    near_singular: float = NEAR_SINGULAR_MARGIN,
     followed: FloatArray | None = None,
     engine: Engine = NUMPY,
 ) -> Block:

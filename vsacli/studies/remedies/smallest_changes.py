@@ -8,8 +8,8 @@ from typing import TypeVar
 import numpy as np
 
 from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.reach import NEAR_SINGULAR, check_near_singular
 from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
 from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.inverse import check_fit
 from vsacli.robot.model import Joint, Robot
@@ -35,7 +35,7 @@ STEPS = slice(None, None, 2)
 """The instants of a load that are steps."""
 
 
-def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR) -> Suggestions:
+def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Suggestions:
     """The smallest changes, each by itself, after which every step has the margin and keeps every limit.
 
     Each is recomputed over all steps and confirmed.
