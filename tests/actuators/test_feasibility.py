@@ -20,7 +20,7 @@ from samples.drives import (
 from samples.robots import vsa_3r
 
 from vsacli import inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do
+from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.motor import Motor
@@ -250,9 +250,9 @@ def test_other_preload_may_reach_less_stiffness_under_heavy_load():
     between = np.array([0.99 * lower[low][0], (lower[low][1] + lower[high][1]) / 2])
     for preload, expected in [(high, [False, True]), (low, [False, False])]:
         actuator = with_preload(joint_with(unlike), preload).actuator
-        assert other_preload_would_do(actuator, tau_e, between).tolist() == expected
+        assert actuator.other_preload(tau_e, between).tolist() == expected
 
 
 def test_other_preload_does_no_better_where_sides_are_alike():
     alike = springs(ALIKE, ALIKE)
-    assert not other_preload_would_do(alike, np.array([100.0]), np.array([810.0])).any()
+    assert not alike.other_preload(np.array([100.0]), np.array([810.0])).any()

@@ -12,7 +12,7 @@ from samples.springs import SPRINGS
 from subjects import motion, seven_joints
 from timing import medians
 
-from vsacli.actuators.antagonistic import Antagonistic, solve_deflections
+from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
@@ -84,7 +84,7 @@ def _drive(joint: Joint, command: Command) -> None:
 def _command(actuator: Antagonistic, samples: int, share: float) -> Command:
     """Demands that can be met: stiffness and load swing, the load to a share of the largest it can carry."""
     time, still = np.linspace(0, 1, samples), np.zeros(samples)
-    least = solve_deflections(actuator, np.zeros(1), np.ones(1)).lower[0]
+    least = actuator.solve(np.zeros(1), np.ones(1)).lower[0]
     levels = max(least, 10.0) * STIFFNESS_LEVELS
     level = np.rint((len(levels) - 1) * _swinging(time, STIFFNESS_SWINGS)).astype(int)
     load = 2 * _swinging(time, LOAD_SWINGS) - 1
@@ -105,7 +105,7 @@ def _largest_load(actuator: Antagonistic, stiffness: FloatArray) -> FloatArray:
         middle = (low + high) / 2
         fits = np.ones(stiffness.shape, dtype=bool)
         for sign in (-1, 1):
-            solution = solve_deflections(actuator, sign * middle, stiffness)
+            solution = actuator.solve(sign * middle, stiffness)
             fits &= (solution.lower <= stiffness) & (stiffness <= solution.upper)
         low, high = np.where(fits, middle, low), np.where(fits, high, middle)
     return low

@@ -10,11 +10,11 @@ from samples.command_line import REPOSITORY, contents
 from samples.urdf import joint, link, random_serial, robot, serial, write
 
 from vsacli import load_robot
+from vsacli.actuators import ACTUATORS
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.rigid import Rigid
-from vsacli.cli.import_urdf import ACTUATOR_TYPES
+from vsacli.cli.import_urdf import import_urdf as command
 from vsacli.robot.urdf import Placeholders, import_urdf, render, robot_text
 
 DESK_ARM = REPOSITORY / "robots" / "desk_arm.urdf"
@@ -52,7 +52,8 @@ def test_right_angles_are_written_as_such(vsacli, tmp_path):
 
 
 def test_the_command_names_every_actuator():
-    assert tuple(ACTUATORS) == ACTUATOR_TYPES
+    option = next(option for option in command.params if option.name == "actuator")
+    assert tuple(option.type.choices) == tuple(ACTUATORS)
 
 
 def test_placeholders_are_marked_and_come_from_the_options(vsacli, tmp_path):

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import Any, Self
 
 import numpy as np
 
+from vsacli.actuators.actuator import Actuator, Carried, Placeholders
+from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.motor import Motor
+from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.pairs.decoupling_matrix import Sides, beta, determinant, solve
 from vsacli.actuators.reach import Reach, reach
@@ -18,10 +23,16 @@ from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import OneOf, Pair, Record, check_fields, choice, value
+from vsacli.documents.source import Source
+
+EXAMPLE_SPRING = {
+    "revolute": {"type": "cubic", "k": 400, "k_c": 2000},
+    "prismatic": {"type": "cubic", "k": 4000, "k_c": 200000},
+}
 
 
 @dataclass(frozen=True)
-class Antagonistic:
+class Antagonistic(Actuator):
     """Two motors, each pulling the link through a nonlinear spring of its own."""
 
     motor: tuple[Motor, Motor] = value(Pair(Record(Motor)), "motors 1 and 2; one mapping serves both")
@@ -32,8 +43,10 @@ class Antagonistic:
         default="positive",
     )
 
-    commanded: ClassVar[tuple[str, ...]] = ("stiffness",)
-    """Signals that the actuator takes, by their keys in `COMMANDED`."""
+    motor_count = 2
+    commanded = ("stiffness",)
+    co_contracts = True
+    integrable = True
 
     def __post_init__(self) -> None:
         problems = []
@@ -54,92 +67,126 @@ class Antagonistic:
         first, second = self.spring
         return first, second.as_second()
 
+    @classmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:
+        """Motors and springs alike on both sides."""
+        return {"motor": Motor.example(joint_type), "spring": EXAMPLE_SPRING[joint_type]}
 
-class Motors(NamedTuple):
-    """What the motors of a joint do; arrays (samples,), or any other kind of number."""
+    @classmethod
+    def placeholder(cls, constants: Placeholders, _effort: float | None) -> Self:
+        """Cubic springs; the effort of the joint bounds neither of the two motors."""
+        from vsacli.actuators.laws.cubic import Cubic
 
-    phi: Sides
-    dphi: Sides
-    ddtheta: Sides
-    tau_spring: Sides
-    elastic_energy: FloatArray
-    det_A: FloatArray  # noqa: N815  (the published name)
+        k, k_c = constants.spring
+        motor, spring = Motor(inertia=constants.motor_inertia), Cubic(k=k, k_c=k_c)
+        return cls(motor=(motor, motor), spring=(spring, spring))
 
+    @property
+    def motors(self) -> tuple[JointMotor, ...]:
+        """Motors 1 and 2."""
+        return tuple(motor.at_joint for motor in self.motor)
 
-def transmit(
-    actuator: Antagonistic, command: Command, near_singular: float, followed: FloatArray | None
-) -> Transmission:
-    """Deflections on the actuator's branch, their rates, and motor accelerations; arguments as of `drive`."""
-    solution = solve_deflections(actuator, command.tau_e, command.commanded["stiffness"])
-    reached = reach(command.commanded["stiffness"], solution, near_singular)
-    phi = (solution.phi_1, solution.phi_2)  # (61)
-    if followed is not None:
-        phi = (followed[0], followed[1])
-        reached = reached._replace(infeasible=reached.infeasible | np.isnan(followed[0]))
-    motors = motor_motion(actuator, command, reached, phi)
-    return Transmission(
-        stiffness=command.commanded["stiffness"],
-        dstiffness=command.commanded["dstiffness"],
-        ddstiffness=command.commanded["ddstiffness"],
-        phi=np.stack(motors.phi),
-        dphi=np.stack(motors.dphi),
-        ddtheta=np.stack(motors.ddtheta),
-        tau_spring=np.stack(motors.tau_spring),
-        elastic_energy=motors.elastic_energy,
-        det_A=motors.det_A,
-        stiffness_lower=solution.lower,
-        stiffness_upper=solution.upper,
-        flags=reached.flags,
-    )
+    @property
+    def max_deflections(self) -> tuple[float, ...]:
+        """Those of the springs."""
+        return tuple(spring.max_deflection for spring in self.spring)
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the springs, once if both are one."""
+        return tuple(warning for law in self._distinct_springs for warning in law.warnings)
 
-def motor_motion(actuator: Antagonistic, command: Command, reached: Reach, deflections: Sides) -> Motors:
-    """Motion of both motors and torques of both springs at given deflections, (62)-(72).
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Those of the springs."""
+        return tuple(source for law in self._distinct_springs for source in law.sources)
 
-    NaN where the step is infeasible; what needs the inverse of A also where it is singular.
-    """
-    phi_1, phi_2 = (np.where(reached.infeasible, np.nan, phi) for phi in deflections)
-    first, second = actuator.laws
-    (energy_1, one), (energy_2, two) = first.energy_and_state(phi_1), second.energy_and_state(phi_2)
-    det_a = determinant(one, two)  # (67)
-    divisor = np.where(reached.singular, np.nan, det_a)
-    dphi = solve(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
-    accelerating = beta(one, two, dphi, command.ddtau_e, command.commanded["ddstiffness"], command.ddq)
-    return Motors(
-        phi=(phi_1, phi_2),
-        dphi=dphi,
-        ddtheta=solve(one, two, divisor, *accelerating),  # (72)
-        tau_spring=(one.tau, two.tau),
-        elastic_energy=energy_1 + energy_2,
-        det_A=det_a,
-    )
+    @property
+    def _distinct_springs(self) -> tuple[SpringLaw, ...]:
+        return tuple({id(law): law for law in self.spring}.values())
 
+    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
+        """Deflections on the actuator's branch, their rates, and motor accelerations."""
+        solution = self.solve(command.tau_e, command.commanded["stiffness"])
+        reached = reach(command.commanded["stiffness"], solution, near_singular)
+        phi = (solution.phi_1, solution.phi_2)  # (61)
+        if integrated is not None:
+            phi = (integrated[0], integrated[1])
+            reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
+        return self._moved(command, solution, reached, phi)
 
-def solve_deflections(actuator: Antagonistic, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
-    """Solve (14) on the branch that the actuator's preload names."""
-    first, second = actuator.laws
-    if actuator.preload == "negative":
-        return make_pair(second, first).solve(tau_e, stiffness).exchanged()
-    return make_pair(first, second).solve(tau_e, stiffness)
+    def _moved(
+        self, command: Command, solution: PairSolution, reached: Reach, deflections: Sides
+    ) -> Transmission:
+        """Motion of both motors and torques of both springs at given deflections, (62)-(72).
 
+        NaN where the step is infeasible; what needs the inverse of A also where it is singular.
+        """
+        phi_1, phi_2 = (np.where(reached.infeasible, np.nan, phi) for phi in deflections)
+        first, second = self.laws
+        (energy_1, one), (energy_2, two) = first.energy_and_state(phi_1), second.energy_and_state(phi_2)
+        det_a = determinant(one, two)  # (67)
+        divisor = np.where(reached.singular, np.nan, det_a)
+        dphi = solve(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
+        right = beta(one, two, dphi, command.ddtau_e, command.commanded["ddstiffness"], command.ddq)
+        ddtheta = solve(one, two, divisor, *right)  # (72)
+        return Transmission(
+            stiffness=command.commanded["stiffness"],
+            dstiffness=command.commanded["dstiffness"],
+            ddstiffness=command.commanded["ddstiffness"],
+            phi=np.stack((phi_1, phi_2)),
+            dphi=np.stack(dphi),
+            ddtheta=np.stack(ddtheta),
+            tau_spring=np.stack((one.tau, two.tau)),
+            elastic_energy=energy_1 + energy_2,
+            det_A=det_a,
+            stiffness_lower=solution.lower,
+            stiffness_upper=solution.upper,
+            flags=reached.flags,
+        )
 
-def deflection_rates(
-    actuator: Antagonistic, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray
-) -> FloatArray:
-    """Rates of the deflections phi, both (2, samples), by (19)-(20)."""
-    one, two = (law.state(deflection) for law, deflection in zip(actuator.laws, phi, strict=True))
-    return np.stack(solve(one, two, determinant(one, two), dtau_e, dstiffness))
+    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
+        """sigma_k phi_k'."""
+        sides = zip(self.laws, of_joint["phi"], of_joint["dphi"], strict=True)
+        return np.stack([law.stiffness(phi) * dphi for law, phi, dphi in sides])
 
+    def carried(self, phi: FloatArray) -> Carried:
+        """Sums over both springs, (14)."""
+        sides = list(zip(self.laws, phi, strict=True))
+        tau = np.stack([law.torque(deflection) for law, deflection in sides])
+        sigma = np.stack([law.stiffness(deflection) for law, deflection in sides])
+        return Carried(tau.sum(axis=0), np.abs(tau).sum(axis=0), sigma.sum(axis=0))
 
-def decoupling_determinant(actuator: Antagonistic, phi: FloatArray) -> FloatArray:
-    """Determinant of A at deflections (2, samples), (67)."""
-    one, two = (law.state(deflection) for law, deflection in zip(actuator.laws, phi, strict=True))
-    return determinant(one, two)
+    @classmethod
+    def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
+        """The springs of several joints."""
+        from vsacli.actuators.pairs.joints import PairElasticity
 
+        return PairElasticity([actuator.laws for actuator in actuators])
 
-def other_preload_would_do(actuator: Antagonistic, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
-    """Where the branch with the opposite preload reaches the stiffness."""
-    if any(law.pulls_only for law in actuator.laws):
-        return np.zeros(tau_e.shape, dtype=bool)
-    opposite = replace(actuator, preload="negative" if actuator.preload == "positive" else "positive")
-    return ~reach(stiffness, solve_deflections(opposite, tau_e, stiffness)).infeasible
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+        """Solve (14) on the branch that the actuator's preload names."""
+        first, second = self.laws
+        if self.preload == "negative":
+            return make_pair(second, first).solve(tau_e, stiffness).exchanged()
+        return make_pair(first, second).solve(tau_e, stiffness)
+
+    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
+        """Where the branch with the opposite preload reaches the stiffness."""
+        if any(law.pulls_only for law in self.laws):
+            return np.zeros(tau_e.shape, dtype=bool)
+        opposite = replace(self, preload="negative" if self.preload == "positive" else "positive")
+        return ~reach(stiffness, opposite.solve(tau_e, stiffness)).infeasible
+
+    def deflection_rates(self, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray) -> FloatArray:
+        """A^-1 (tau_e', sigma'), (19)-(20)."""
+        one, two = self._states(phi)
+        return np.stack(solve(one, two, determinant(one, two), dtau_e, dstiffness))
+
+    def determinant(self, phi: FloatArray) -> FloatArray:
+        """Det A (67)."""
+        return determinant(*self._states(phi))
+
+    def _states(self, phi: FloatArray) -> tuple[SpringState, SpringState]:
+        (first, second), (phi_1, phi_2) = self.laws, phi
+        return first.state(phi_1), second.state(phi_2)

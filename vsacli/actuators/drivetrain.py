@@ -1,50 +1,30 @@
 """Motors and springs of all joints in a row, whatever the actuators: what the equations of motion need.
 
-Arrays over motors have the motors on their last axis, joint by joint, side 1 before side 2.
+Arrays over motors have the motors on their last axis, joint by joint, motor 1 before motor 2. Springs come
+before the motors of joints that have any; values of them have one entry for each such motor.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import singledispatch
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.kinds import Actuator
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.state import SpringState
-from vsacli.actuators.motor import JointMotor
-from vsacli.actuators.pairs.decoupling_matrix import determinant
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.arrays import FloatArray
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.base.arrays import FloatArray, IndexArray
 
 SIDES = 2
 """Motors that a joint has at most."""
 
 
-@singledispatch
-def motors_and_springs(actuator: object) -> list[tuple[JointMotor, SpringLaw | None]]:
-    """Each motor of an actuator with the spring between it and the link; None if there is none."""
-    raise TypeError(f"{type(actuator).__name__} is no actuator")
+class _Group(NamedTuple):
+    """The joints whose actuators are of one kind: their springs, and where the joints and motors are."""
 
-
-@motors_and_springs.register(Antagonistic)
-def _(actuator: Antagonistic) -> list[tuple[JointMotor, SpringLaw | None]]:
-    return [(motor.at_joint, law) for motor, law in zip(actuator.motor, actuator.laws, strict=True)]
-
-
-@motors_and_springs.register(Elastic)
-def _(actuator: Elastic) -> list[tuple[JointMotor, SpringLaw | None]]:
-    from vsacli.actuators.laws.polynomial import Polynomial
-
-    return [(actuator.motor.at_joint, Polynomial(c1=actuator.stiffness))]
-
-
-@motors_and_springs.register(Rigid)
-def _(actuator: Rigid) -> list[tuple[JointMotor, SpringLaw | None]]:
-    return [(actuator.motor.at_joint, None)]
+    elasticity: Elasticity
+    joints: IndexArray
+    springs: IndexArray
 
 
 class Drivetrain:
@@ -54,40 +34,39 @@ class Drivetrain:
         present: (joints, 2), where there is a motor.
         sprung: (motors,), whether the motor acts through a spring; of motors without one, one a joint.
         joint: (motors,), index of the joint of each motor.
-        side: (motors,), 0 or 1.
         inertia, damping, max_torque: (motors,) of the motors, joint side of the gear.
         rigid: (joints,), whether the joint has no spring.
+        chosen: indices of the joints whose stiffness is commanded.
         spring_joint: (springs,), index of the joint of each spring.
-        domain: (2, springs), lowest and highest deflection of each law.
-        first, second: (pairs,), the springs of each joint that has two.
-        single: the springs of the other joints.
+        domain: (2, springs), lowest and highest phi for which each law holds.
     """
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
-        units = [
-            (joint, side, motor, law)
-            for joint, actuator in enumerate(actuators)
-            for side, (motor, law) in enumerate(motors_and_springs(actuator))
+        motors = [(index, motor) for index, actuator in enumerate(actuators) for motor in actuator.motors]
+        counts = [len(actuator.motors) for actuator in actuators]
+        self.present = np.arange(SIDES) < np.array(counts)[:, None]
+        self.joint = np.array([index for index, _ in motors])
+        self.rigid = np.array([not actuator.sprung for actuator in actuators])
+        self.sprung = ~self.rigid[self.joint]
+        self.inertia, self.damping, self.max_torque = (
+            np.array([getattr(motor, name) for _, motor in motors])
+            for name in ("inertia", "damping", "max_torque")
+        )
+        self.chosen = np.flatnonzero(["stiffness" in actuator.commanded for actuator in actuators])
+        self.spring_joint = self.joint[self.sprung]
+        self._direct = np.flatnonzero(self.rigid)
+        kinds = dict.fromkeys(type(actuator) for actuator in actuators if actuator.sprung)
+        self._groups = [self._group(kind, actuators) for kind in kinds]
+        self._alone = len(self._groups) == 1 and not self.rigid.any()
+        domains = [
+            np.broadcast_to(group.elasticity.domain, (2, *group.springs.shape)) for group in self._groups
         ]
-        joints, sides, motors, laws = zip(*units, strict=True)
-        self.joint, self.side = np.array(joints), np.array(sides)
-        self.present = np.zeros((len(actuators), SIDES), dtype=bool)
-        self.present[self.joint, self.side] = True
-        self.sprung = np.array([law is not None for law in laws])
-        self.inertia = np.array([motor.inertia for motor in motors])
-        self.damping = np.array([motor.damping for motor in motors])
-        self.max_torque = np.array([motor.max_torque for motor in motors])
+        self.domain = self.of_springs(domains, np.empty((2, len(self.spring_joint))))
 
-        springs = [law for law in laws if law is not None]
-        self.rigid = ~np.isin(np.arange(len(actuators)), self.joint[self.sprung])
-        self.spring_joint, spring_side = self.joint[self.sprung], self.side[self.sprung]
-        self.domain = np.array([law.domain for law in springs]).reshape(-1, 2).T
-        paired = self.present[self.spring_joint].all(axis=1)
-        self.first = np.flatnonzero(paired & (spring_side == 0))
-        self.second = np.flatnonzero(paired & (spring_side == 1))
-        self.single = np.flatnonzero(~paired)
-        self._groups = list(_alike(springs))
-        self._incidence = (self.joint[:, None] == np.arange(len(actuators))).astype(np.float64)
+    def _group(self, kind: type[Actuator], actuators: Sequence[Actuator]) -> _Group:
+        members = [index for index, actuator in enumerate(actuators) if type(actuator) is kind]
+        springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in members])
+        return _Group(kind.elasticity([actuators[joint] for joint in members]), np.array(members), springs)
 
     def of_motors(self, values: FloatArray) -> FloatArray:
         """(..., motors) from (..., joints, 2), whose entries without a motor do not matter."""
@@ -108,47 +87,128 @@ class Drivetrain:
         values[..., self.sprung] = sprung
         return self.of_joints(values)
 
-    def joint_sum(self, values: FloatArray) -> FloatArray:
-        """Sum over the springs of each joint, (..., joints) from (..., springs); 0 where there is none."""
-        result: FloatArray = values @ self._incidence[self.sprung]
-        return result
-
-    def rigid_sum(self, values: FloatArray) -> FloatArray:
+    def direct(self, values: FloatArray) -> FloatArray:
         """The value of the motor that moves a joint directly, (..., joints) from (..., motors), else 0."""
-        result: FloatArray = values[..., ~self.sprung] @ self._incidence[~self.sprung]
+        result = np.zeros((*values.shape[:-1], len(self.rigid)))
+        result[..., self._direct] = values[..., ~self.sprung]
         return result
 
-    def torque(self, phi: FloatArray) -> FloatArray:
-        """Torque of each spring at its deflection, (..., springs)."""
-        return self._each(phi, lambda law, part: law.torque(part))
+    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """phi, (..., springs), from positions of joints (..., joints) and motors (..., springs); or rates."""
+        return self.of_springs([phi for _, phi in self.at(q, theta)], theta)
 
-    def springs(self, phi: FloatArray) -> SpringState:
-        """The springs at their deflections, (..., springs)."""
-        result = SpringState(*(np.empty_like(phi) for _ in SpringState._fields))
-        for law, members in self._groups:
-            for values, of_law in zip(result, law.state(phi[..., members]), strict=True):
-                values[..., members] = of_law
+    def torques(self, q: FloatArray, theta: FloatArray) -> Torques:
+        """Of the springs: on the links, (..., joints), and against the motors, (..., springs)."""
+        parts = [elasticity.torques(phi) for elasticity, phi in self.at(q, theta)]
+        return Torques(
+            self.by_joint([part.tau_e for part in parts], q),
+            self.of_springs([part.tau_spring for part in parts], theta),
+        )
+
+    def energy(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Elastic energy of each joint, (..., joints)."""
+        return self.by_joint([elasticity.energy(phi) for elasticity, phi in self.at(q, theta)], q)
+
+    def stiffness(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Of the joints (11), (..., joints), 0 where there are no springs."""
+        return self.by_joint([each.state(phi).stiffness for each, phi in self.at(q, theta)], q)
+
+    def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Det A (67), (..., joints), NaN where no stiffness is commanded."""
+        found = self.by_joint([each.state(phi).determinant() for each, phi in self.at(q, theta)], q)
+        return np.where(self.rigid, np.nan, found)
+
+    def state(self, q: FloatArray, theta: FloatArray, dq: FloatArray, dtheta: FloatArray) -> DrivetrainState:
+        """The springs with their derivatives, at positions and velocities of joints and motors."""
+        parts = [elasticity.state(phi) for elasticity, phi in self.at(q, theta)]
+        rates = [dphi for _, dphi in self.at(dq, dtheta)]
+        return DrivetrainState(self, q, theta, list(zip(parts, rates, strict=True)))
+
+    def of_groups(self, values: FloatArray) -> list[FloatArray]:
+        """The part of each kind of actuator, (..., joints), of (..., joints)."""
+        return [values if self._alone else values[..., group.joints] for group in self._groups]
+
+    def by_joint(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
+        """(..., joints) from the part of each kind; 0 where there are no springs."""
+        if self._alone:
+            return parts[0]
+        result = np.zeros_like(like)
+        for group, part in zip(self._groups, parts, strict=True):
+            result[..., group.joints] = part
         return result
 
-    def energy(self, phi: FloatArray) -> FloatArray:
-        """Elastic energy of each joint, (..., joints), from the deflections (..., springs)."""
-        return self.joint_sum(self._each(phi, lambda law, part: law.energy(part)))
-
-    def decoupling_determinant(self, springs: SpringState) -> FloatArray:
-        """Det A (67) of the joints that have two springs, (..., pairs)."""
-        return determinant(springs.take(self.first), springs.take(self.second))
-
-    def _each(self, phi: FloatArray, value: Callable[[SpringLaw, FloatArray], FloatArray]) -> FloatArray:
-        result = np.empty_like(phi)
-        for law, members in self._groups:
-            result[..., members] = value(law, phi[..., members])
+    def of_springs(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
+        """(..., springs) from the part of each kind, (..., joints, motors)."""
+        if self._alone:
+            return parts[0].reshape(*like.shape)
+        result = np.empty_like(like)
+        for group, part in zip(self._groups, parts, strict=True):
+            result[..., group.springs] = part
         return result
 
+    def at(self, q: FloatArray, theta: FloatArray) -> Iterator[tuple[Elasticity, FloatArray]]:
+        """The springs of each kind with their phi, (..., joints, motors)."""
+        for group, of_joints in zip(self._groups, self.of_groups(q), strict=True):
+            if self._alone:
+                of_motors = theta.reshape(*theta.shape[:-1], *group.springs.shape)
+            else:
+                of_motors = theta[..., group.springs]
+            yield group.elasticity, group.elasticity.deflections(of_joints, of_motors)
 
-def _alike(laws: list[SpringLaw]) -> Iterator[tuple[SpringLaw, list[int]]]:
-    """Each distinct law, with the springs that obey it."""
-    distinct: list[SpringLaw] = []
-    for law in laws:
-        if law not in distinct:
-            distinct.append(law)
-            yield law, [index for index, other in enumerate(laws) if other == law]
+
+class DrivetrainState:
+    """The springs of all joints at positions and velocities of joints and motors.
+
+    Values of joints are (..., joints), 0 where there are no springs, those of motors (..., springs).
+    """
+
+    def __init__(
+        self,
+        drivetrain: Drivetrain,
+        q: FloatArray,
+        theta: FloatArray,
+        parts: Sequence[tuple[ElasticState, FloatArray]],
+    ) -> None:
+        self._drivetrain, self._q, self._theta, self._parts = drivetrain, q, theta, parts
+
+    @property
+    def tau_e(self) -> FloatArray:
+        """Elastic torque (6)."""
+        return self._drivetrain.by_joint([part.tau_e for part, _ in self._parts], self._q)
+
+    @property
+    def dtau_e(self) -> FloatArray:
+        """Its rate (17)."""
+        return self._drivetrain.by_joint([part.torque_rate(dphi) for part, dphi in self._parts], self._q)
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Stiffness of the joints (11)."""
+        return self._drivetrain.by_joint([part.stiffness for part, _ in self._parts], self._q)
+
+    @property
+    def dstiffness(self) -> FloatArray:
+        """Its rate (18)."""
+        return self._drivetrain.by_joint([part.stiffness_rate(dphi) for part, dphi in self._parts], self._q)
+
+    @property
+    def tau_spring(self) -> FloatArray:
+        """Torque against each motor (62)."""
+        return self._drivetrain.of_springs([part.tau_spring for part, _ in self._parts], self._theta)
+
+    def motor_accelerations(
+        self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> FloatArray:
+        """Accelerations of the motors that give torque and stiffness these second derivatives, (70)-(72).
+
+        Args:
+            ddq: acceleration of the joints.
+            ddtau_e: second derivative of the elastic torque.
+            ddstiffness: that of the stiffness, which counts where it is commanded.
+        """
+        wanted = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
+        parts = [
+            part.motor_accelerations(dphi, *of_part)
+            for (part, dphi), of_part in zip(self._parts, wanted, strict=True)
+        ]
+        return self._drivetrain.of_springs(parts, self._theta)

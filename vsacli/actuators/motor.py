@@ -69,6 +69,12 @@ class Motor:
             problems.append(FieldProblem(("gear_ratio",), reason))
         check_fields(self, *problems)
 
+    @staticmethod
+    def example(joint_type: str) -> dict[str, float]:
+        """Plausible values of its fields, as a new robot file shows them."""
+        revolute = joint_type == "revolute"
+        return {"inertia": 0.5, "damping": 0.01} if revolute else {"inertia": 10, "damping": 0.1}
+
     @cached_property
     def at_joint(self) -> JointMotor:
         """What its joint has of it: inertia and damping times the ratio squared, torque times the ratio."""

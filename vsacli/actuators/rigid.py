@@ -3,34 +3,56 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from vsacli.actuators.motor import Motor
+from vsacli.actuators.actuator import Actuator, Placeholders
+from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.transmission import Command, Transmission, single_motor
+from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import Record, check_fields, value
 
 
 @dataclass(frozen=True)
-class Rigid:
+class Rigid(Actuator):
     """One motor that moves the link directly."""
 
     motor: Motor = value(Record(Motor), "the motor")
 
-    no_choice = "its actuator is rigid and has no stiffness"
-
-    commanded: ClassVar[tuple[str, ...]] = ()
-    """Signals that the actuator takes, by their keys in `COMMANDED`."""
+    sprung = False
+    uncommanded: ClassVar[Mapping[str, str]] = {"stiffness": "its actuator is rigid and has no stiffness"}
 
     def __post_init__(self) -> None:
         check_fields(self)
 
+    @classmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:
+        """A motor."""
+        return {"motor": Motor.example(joint_type)}
 
-def transmit(command: Command) -> Transmission:
-    """No deflection; there is no stiffness, and so no derivative of one."""
-    still = np.zeros_like(command.q)
-    return single_motor(
-        command, stiffness=math.nan, stiffness_rates=math.nan, phi=still, dphi=still, ddtheta=command.ddq
-    )
+    @classmethod
+    def placeholder(cls, constants: Placeholders, effort: float | None) -> Self:
+        """One motor, which bears the effort of the joint."""
+        return cls(motor=Motor(inertia=constants.motor_inertia, max_torque=effort or math.inf))
+
+    @property
+    def motors(self) -> tuple[JointMotor, ...]:
+        """The one motor."""
+        return (self.motor.at_joint,)
+
+    def transmit(
+        self, command: Command, _near_singular: float, _integrated: FloatArray | None
+    ) -> Transmission:
+        """No deflection; there is no stiffness, and so no derivative of one."""
+        still = np.zeros_like(command.q)
+        return single_motor(
+            command, stiffness=math.nan, stiffness_rates=math.nan, phi=still, dphi=still, ddtheta=command.ddq
+        )
+
+    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
+        """What lies in place of a spring carries tau_e."""
+        return of_joint["dtau_e"][None]

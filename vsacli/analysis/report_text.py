@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
+from vsacli.actuators import ACTUATORS
+from vsacli.actuators.actuator import Actuator
 from vsacli.analysis.joint_report import JointDrift, JointReport, Worst
 from vsacli.analysis.self_check import LADDER_BOUND, SelfCheck
 from vsacli.base.flags import Flag
@@ -56,17 +58,22 @@ def _row(joint: JointReport) -> tuple[str, ...]:
         f"{_number(joint.peak_tau_e)} {torque}",
         f"{motors} {torque}",
         _span(joint.stiffness_min, joint.stiffness_max),
-        *((_corridor(*joint.reachable), _percent(joint.margin)) if _is_antagonistic(joint) else ("-", "-")),
+        *(
+            (_corridor(*joint.reachable), _percent(joint.margin))
+            if "stiffness" in _kind(joint).commanded
+            else ("-", "-")
+        ),
     )
 
 
-def _is_antagonistic(joint: JointReport) -> bool:
-    return joint.actuator == "antagonistic"
+def _kind(joint: JointReport) -> type[Actuator]:
+    kind: type[Actuator] = ACTUATORS[joint.actuator]
+    return kind
 
 
 def _of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
     """Of a pair of numbers those of the motors that the joint has."""
-    return pair if _is_antagonistic(joint) else pair[:1]
+    return pair[: _kind(joint).motor_count]
 
 
 def _corridor(lower: float, upper: float) -> str:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
 from vsacli.analysis.summaries import DriftSummary, JointSummary
@@ -180,9 +179,9 @@ def _integrated(
 def _drift_summaries(robot: Robot, deflections: IntegratedDeflections) -> list[DriftSummary]:
     pairs = zip(robot.joints, deflections.stops, strict=True)
     return [
-        DriftSummary(joint, joint.actuator, index, stop)
+        DriftSummary(joint, index, stop)
         for index, (joint, stop) in enumerate(pairs)
-        if isinstance(joint.actuator, Antagonistic)
+        if joint.actuator.integrable
     ]
 
 

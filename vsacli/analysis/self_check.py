@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.drivetrain import SIDES, motors_and_springs
+from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
@@ -101,17 +101,14 @@ def spring_residual(robot: Robot, block: Block) -> float:
     """
     errors = []
     for index, joint in enumerate(robot.joints):
-        laws = [law for _, law in motors_and_springs(joint.actuator) if law is not None]
-        if not laws:
+        if not joint.actuator.sprung:
             continue
         regular = ~has(block.flags[:, index], Flag.INFEASIBLE | Flag.SINGULAR)
         phi, tau_e = block.phi[regular, index], block.tau_e[regular, index]
         stiffness = block.stiffness[regular, index]
-        tau = np.stack([law.torque(phi[:, side]) for side, law in enumerate(laws)])
-        sigma = np.stack([law.stiffness(phi[:, side]) for side, law in enumerate(laws)])
-        torque_error = np.abs(tau.sum(axis=0) - tau_e)
-        size = np.maximum(np.abs(tau).sum(axis=0), np.finfo(float).tiny)
-        errors += [torque_error / size, np.abs(sigma.sum(axis=0) - stiffness) / stiffness]
+        carried = joint.actuator.carried(phi.T)
+        size = np.maximum(carried.size, np.finfo(float).tiny)
+        errors += [np.abs(carried.tau_e - tau_e) / size, np.abs(carried.stiffness - stiffness) / stiffness]
     return float(np.max(np.concatenate([np.zeros(1), *errors])))
 
 
@@ -134,7 +131,7 @@ def _ladder(robot: Robot, trajectory: Trajectory, engine: Engine, scales: FloatA
     grid = times + steps[:, None, :] * np.arange(-3, 4)[None, :, None]
     block = compute_block(robot, trajectory.at(grid.ravel()), engine=engine)
     smooth = _motors_move_smoothly(block, grid.shape)
-    motors = np.array([len(motors_and_springs(joint.actuator)) for joint in robot.joints])
+    motors = np.array([joint.actuator.motor_count for joint in robot.joints])
     absent = np.arange(SIDES) >= motors[:, None]
 
     def on_grid(name: str) -> FloatArray:

@@ -7,9 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic, other_preload_would_do, solve_deflections
 from vsacli.actuators.reach import margin
-from vsacli.actuators.rigid import Rigid
 from vsacli.analysis.joint_report import COUNTED, JointDrift, JointReport, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, has
@@ -47,15 +45,15 @@ class JointSummary:
         if self._start is None:
             self._start = np.stack((block.theta[0, index], self._torque_step(block)))
         self._count(flags, block.time)
-        if isinstance(self._joint.actuator, Antagonistic):
-            self._add_reach(self._joint.actuator, flags, block)
+        if "stiffness" in self._joint.actuator.commanded:
+            self._add_reach(flags, block)
         self._record_limits(flags, block)
         least, most = self._stiffness
         self._stiffness = np.fmin(least, stiffness.min()), np.fmax(most, stiffness.max())
         peaks = np.abs(block.tau_e[:, index]), *np.abs(block.tau_motor[:, index]).T
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(values) for values in peaks])
 
-    def _add_reach(self, actuator: Antagonistic, flags: FlagArray, block: Block) -> None:
+    def _add_reach(self, flags: FlagArray, block: Block) -> None:
         """Merge what there is to say about the corridor."""
         index = self._index
         stiffness = block.stiffness[:, index]
@@ -67,7 +65,7 @@ class JointSummary:
         outside = gap < -SINGULAR_MARGIN
         if self._other_preload and outside.any():
             demand = block.tau_e[outside, index], stiffness[outside]
-            self._other_preload = bool(other_preload_would_do(actuator, *demand).all())
+            self._other_preload = bool(self._joint.actuator.other_preload(*demand).all())
 
     def report(self, energy: JointEnergy) -> JointReport:
         """What was found so far, besides the energy; at least one block must have been added."""
@@ -140,7 +138,7 @@ class JointSummary:
 
     def _torque_step(self, block: Block) -> FloatArray:
         """Of motors behind springs, whose torques do not jump."""
-        if isinstance(self._joint.actuator, Rigid):
+        if not self._joint.actuator.sprung:
             return np.full(len(MOTORS), np.nan)
         step: FloatArray = np.abs(block.tau_motor[0, self._index] - block.tau_spring[0, self._index])
         return step
@@ -151,14 +149,13 @@ class JointSummary:
 
 
 class DriftSummary:
-    """How far integrated deflections of one antagonistic joint drift from the root of (14).
+    """How far integrated deflections of one joint drift from the root of (14).
 
     `add` blocks in order, then ask for the `report`.
     """
 
-    def __init__(self, joint: Joint, actuator: Antagonistic, index: int, stop: Stop | None) -> None:
+    def __init__(self, joint: Joint, index: int, stop: Stop | None) -> None:
         self._joint = joint
-        self._actuator = actuator
         self._index = index
         self._stop = stop
         self._largest, self._time = math.nan, math.nan
@@ -166,7 +163,7 @@ class DriftSummary:
     def add(self, block: Block) -> None:
         """Merge a block of steps; those without deflections do not count."""
         tau_e, stiffness = block.tau_e[:, self._index], block.stiffness[:, self._index]
-        root = solve_deflections(self._actuator, tau_e, stiffness).deflections
+        root = self._joint.actuator.solve(tau_e, stiffness).deflections
         drift = np.abs(block.phi[:, self._index].T - root).max(axis=0)
         followed = np.flatnonzero(~np.isnan(drift))
         if followed.size:

@@ -21,6 +21,18 @@ class OnDemand(Mapping[str, Any]):
         module, _, thing = self.homes[name].partition(":")
         return getattr(importlib.import_module(module), thing)
 
+    def name_of(self, cls: type) -> str:
+        """The name of a class that is one of the things; imports nothing.
+
+        Raises:
+            KeyError: it is none of them.
+        """
+        home = f"{cls.__module__}:{cls.__qualname__}"
+        for name, other in self.homes.items():
+            if other == home:
+                return name
+        raise KeyError(home)
+
     def __contains__(self, name: object) -> bool:
         return name in self.homes
 

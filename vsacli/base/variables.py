@@ -17,9 +17,8 @@ from vsacli.base.units import Quantity
 from vsacli.base.wrench import wrench_columns
 
 MOTORS = (1, 2)
-VARIABLE_STIFFNESS = ("antagonistic",)
-COMPLIANT = (*VARIABLE_STIFFNESS, "elastic")
-EVERY_ACTUATOR = (*COMPLIANT, "rigid")
+SPRINGS, COMMANDED_STIFFNESS = "springs", "commanded stiffness"
+"""What a joint must have to have a variable."""
 
 
 class Variable(NamedTuple):
@@ -31,7 +30,7 @@ class Variable(NamedTuple):
         quantity: unit at revolute and prismatic joints, or of moments and forces.
         long_name: a few words.
         equation: number in Buondonno & De Luca (2016), or where the value comes from.
-        actuators: the types of actuator whose joints have it; at the others it is NaN.
+        requires: what a joint must have to have it, `SPRINGS` or `COMMANDED_STIFFNESS`; else it is NaN.
         geared: the power of a motor's gear ratio by which the value is larger on the motor's shaft.
     """
 
@@ -40,20 +39,20 @@ class Variable(NamedTuple):
     quantity: Quantity
     long_name: str
     equation: str
-    actuators: tuple[str, ...] = EVERY_ACTUATOR
+    requires: str | None = None
     geared: int = 0
 
 
-def _of_signal(signal: Signal, dim: str, actuators: tuple[str, ...] = EVERY_ACTUATOR) -> Iterator[Variable]:
+def _of_signal(signal: Signal, dim: str, requires: str | None = None) -> Iterator[Variable]:
     for name, quantity, long_name in zip(signal.names, signal.quantities, signal.long_names, strict=True):
-        yield Variable(name, (dim,), quantity, long_name, "given", actuators)
+        yield Variable(name, (dim,), quantity, long_name, "given", requires)
 
 
 def _given() -> Iterator[Variable]:
     yield Variable("time", (), units.TIME, "time", "given")
     yield from _of_signal(POSITION, "joint")
     for signal in COMMANDED.values():
-        yield from _of_signal(signal, "joint", COMPLIANT)
+        yield from _of_signal(signal, "joint", SPRINGS)
     yield from _of_signal(WRENCH, "wrench_axis")
 
 
@@ -96,7 +95,7 @@ _COMPUTED = (
         units.DECOUPLING,
         "determinant of the decoupling block of the joint",
         "(67)",
-        VARIABLE_STIFFNESS,
+        COMMANDED_STIFFNESS,
     ),
     Variable(
         "stiffness_lower",
@@ -104,7 +103,7 @@ _COMPUTED = (
         units.STIFFNESS,
         "smallest stiffness reachable at this elastic torque on the joint's branch",
         "(14)",
-        VARIABLE_STIFFNESS,
+        COMMANDED_STIFFNESS,
     ),
     Variable(
         "stiffness_upper",
@@ -112,7 +111,7 @@ _COMPUTED = (
         units.STIFFNESS,
         "largest stiffness reachable at this elastic torque on the joint's branch",
         "(14)",
-        VARIABLE_STIFFNESS,
+        COMMANDED_STIFFNESS,
     ),
     Variable(
         "flags",
@@ -172,18 +171,6 @@ def select_variables(
             for name in unknown
         )
     return tuple(variable for name, variable in declared.items() if name in wanted and variable.dims)
-
-
-def existing(variable: Variable, actuators: Iterable[str]) -> list[list[bool]]:
-    """Which columns of a variable of joints exist, for each joint with one of these types of actuator."""
-    motors = MOTORS if "motor" in variable.dims else MOTORS[:1]
-    return [
-        [
-            actuator in variable.actuators and (motor == MOTORS[0] or actuator in VARIABLE_STIFFNESS)
-            for motor in motors
-        ]
-        for actuator in actuators
-    ]
 
 
 def column_names(variable: Variable, joint_names: Iterable[str]) -> list[str]:

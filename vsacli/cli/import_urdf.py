@@ -6,10 +6,9 @@ from pathlib import Path
 
 import click
 
+from vsacli.actuators import ACTUATORS
 from vsacli.cli.command_parts import example, overwrite_option, refuse_input_as_output
 from vsacli.cli.console import Talk, talk_options
-
-ACTUATOR_TYPES = ("antagonistic", "elastic", "rigid")
 
 
 def _spring(_context: click.Context, _parameter: click.Parameter, written: str) -> tuple[float, float]:
@@ -31,7 +30,7 @@ def _spring(_context: click.Context, _parameter: click.Parameter, written: str) 
 @click.option("-o", "--output", metavar="FILE", help="Robot file; by default URDF.yaml in this folder.")
 @click.option(
     "--actuator",
-    type=click.Choice(ACTUATOR_TYPES),
+    type=click.Choice(tuple(ACTUATORS)),
     default="antagonistic",
     show_default=True,
     help="Placeholder: what drives every joint.",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from vsacli.actuators import ACTUATORS
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 
@@ -34,7 +35,7 @@ def new() -> None:
 )
 @click.option(
     "--actuator",
-    type=click.Choice(["antagonistic", "elastic", "rigid"]),
+    type=click.Choice(tuple(ACTUATORS)),
     default="antagonistic",
     show_default=True,
     help="What drives the joints.",

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from vsacli.actuators.laws.state import SpringState
-from vsacli.actuators.pairs.decoupling_matrix import beta, determinant, solve
+from vsacli.actuators.drivetrain import DrivetrainState
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.wrench import Wrench
@@ -51,8 +48,9 @@ class Decoupling:
         integral: Integral,
     ) -> FloatArray:
         """Motor torques, (..., motors); NaN at a joint whose A is singular."""
-        springs, dphi = self._springs(q, dq, theta, dtheta)
-        link = self._link_motion(q, dq, springs, dphi, reference.wrench)
+        drivetrain = self._plant.drivetrain
+        springs = drivetrain.state(q, theta, dq, dtheta)
+        link = self._link_motion(q, dq, springs, reference.wrench)
         v_q = linear_control(  # (32a)
             (reference.q, reference.dq, reference.ddq, reference.d3q, reference.d4q),
             (q, dq, link.ddq, link.d3q),
@@ -66,60 +64,20 @@ class Decoupling:
         ddtau_e = self._plant.chain.torque_acceleration(  # (60)
             q, dq, link.ddq, link.d3q, v_q, reference.wrench
         )
-        ddtheta = self._motor_acceleration(springs, dphi, link, ddtau_e, v_sigma)
-        drivetrain = self._plant.drivetrain
-        return drivetrain.inertia * ddtheta + drivetrain.damping * dtheta + springs.tau  # (73)-(74)
+        ddtheta = springs.motor_accelerations(link.ddq, ddtau_e, v_sigma)
+        return drivetrain.inertia * ddtheta + drivetrain.damping * dtheta + springs.tau_spring  # (73)-(74)
 
     def link_motion(
         self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray, wrench: Wrench | None
     ) -> LinkMotion:
         """What the state says about the links."""
-        return self._link_motion(q, dq, *self._springs(q, dq, theta, dtheta), wrench)
-
-    def _springs(
-        self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray
-    ) -> tuple[SpringState, FloatArray]:
-        """The springs, and phi' by (69)."""
-        springs = self._plant.drivetrain.springs(self._plant.deflections(q, theta))
-        return springs, self._plant.deflections(dq, dtheta)
+        return self._link_motion(q, dq, self._plant.drivetrain.state(q, theta, dq, dtheta), wrench)
 
     def _link_motion(
-        self, q: FloatArray, dq: FloatArray, springs: SpringState, dphi: FloatArray, wrench: Wrench | None
+        self, q: FloatArray, dq: FloatArray, springs: DrivetrainState, wrench: Wrench | None
     ) -> LinkMotion:
-        chain, total = self._plant.chain, self._plant.drivetrain.joint_sum
-        tau_e, dtau_e = total(springs.tau), total(springs.sigma * dphi)  # (6), (17)
+        chain, tau_e, dtau_e = self._plant.chain, springs.tau_e, springs.dtau_e
         matrix = chain.mass_matrix(q)
         ddq = chain.solve(matrix, tau_e - chain.bias(q, dq, wrench))  # (34)
         d3q = chain.solve(matrix, dtau_e - chain.torque_rate(q, dq, ddq, wrench))  # (35)
-        return LinkMotion(
-            tau_e, dtau_e, ddq, d3q, total(springs.sigma), total(springs.zeta * dphi)
-        )  # (11), (18)
-
-    def _motor_acceleration(
-        self,
-        springs: SpringState,
-        dphi: FloatArray,
-        link: LinkMotion,
-        ddtau_e: FloatArray,
-        ddsigma: FloatArray,
-    ) -> FloatArray:
-        """Motor accelerations by (70)-(72), (..., springs); of a single, linear spring by (70) alone."""
-        drivetrain = self._plant.drivetrain
-        first, second, single = drivetrain.first, drivetrain.second, drivetrain.single
-        of_pair, of_single = drivetrain.spring_joint[first], drivetrain.spring_joint[single]
-        one, two, alone = springs.take(first), springs.take(second), springs.take(single)
-
-        det_a = determinant(one, two)  # (67)
-        divisor = np.where(det_a == 0, np.nan, det_a)
-        accelerating = beta(
-            one,
-            two,
-            (dphi[..., first], dphi[..., second]),
-            ddtau_e[..., of_pair],
-            ddsigma[..., of_pair],
-            link.ddq[..., of_pair],
-        )
-        ddtheta = np.empty_like(dphi)
-        ddtheta[..., first], ddtheta[..., second] = solve(one, two, divisor, *accelerating)  # (72)
-        ddtheta[..., single] = ddtau_e[..., of_single] / alone.sigma + link.ddq[..., of_single]
-        return ddtheta
+        return LinkMotion(tau_e, dtau_e, ddq, d3q, springs.stiffness, springs.dstiffness)

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, STIFFNESS_ORDER, Gains, check_stable
@@ -99,7 +98,8 @@ def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) ->
 
 
 def _gains(robot: Robot, position: Sequence[Poles], stiffness: Sequence[Poles], integral: bool) -> Gains:
-    order = POSITION_ORDER if Drivetrain(robot.actuators).sprung.any() else RIGID_ORDER
+    sprung = any(actuator.sprung for actuator in robot.actuators)
+    order = POSITION_ORDER if sprung else RIGID_ORDER
     return Gains.from_poles(
         [_counted("position", poles, order, integral) for poles in position],
         [_counted("stiffness", poles, STIFFNESS_ORDER, integral) for poles in stiffness],

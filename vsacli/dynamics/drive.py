@@ -7,12 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators import antagonistic, elastic, rigid
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.drivetrain import SIDES, motors_and_springs
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.rigid import Rigid
-from vsacli.actuators.transmission import Command, Transmission
+from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FlagArray, FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.dynamics.limits import limit_flags
@@ -60,9 +56,9 @@ def drive(
         followed: deflections of an antagonistic joint to use instead of the root of (14), (2, samples); a
             step where they are NaN is infeasible.
     """
-    transmission = _transmit(joint, command, near_singular, followed)
+    transmission = joint.actuator.transmit(command, near_singular, followed)
     dtheta = transmission.dphi + command.dq  # (69)
-    motors = [motor for motor, _ in motors_and_springs(joint.actuator)]
+    motors = joint.actuator.motors
     inertia = _by_motor([motor.inertia for motor in motors])
     damping = _by_motor([motor.damping for motor in motors])
     tau_motor = inertia * transmission.ddtheta + damping * dtheta + transmission.tau_spring  # (73)-(74)
@@ -76,18 +72,6 @@ def drive(
     of_joint = {**command.arrays(), **driven._asdict()}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
     return driven._replace(flags=driven.flags | exceeded)
-
-
-def _transmit(
-    joint: Joint, command: Command, near_singular: float, followed: FloatArray | None
-) -> Transmission:
-    match joint.actuator:
-        case Antagonistic() as actuator:
-            return antagonistic.transmit(actuator, command, near_singular, followed)
-        case Elastic() as actuator:
-            return elastic.transmit(actuator, command)
-        case Rigid():
-            return rigid.transmit(command)
 
 
 def _by_motor(values: list[float]) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.drivetrain import SIDES, motors_and_springs
+from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray, by_joint, over_time
 from vsacli.base.json_records import Stored, named
 from vsacli.base.variables import Block
@@ -91,13 +91,14 @@ class EnergyMeter:
 
     def report(self, robot: Robot) -> list[JointEnergy]:
         """What was found of each joint of a robot; something must have been added."""
-        there = [
-            [side < len(motors_and_springs(joint.actuator)) for side in range(SIDES)]
-            for joint in robot.joints
-        ]
+        there = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
         work, spent = (np.sum(total.value, axis=1, where=there) for total in (self._work, self._spent))
         duration = float(self._duration.value)
-        efforts = [_mean_root(total.value, duration) for total in (self._co_contraction, self._load)]
+        shared = [joint.actuator.co_contracts for joint in robot.joints]
+        efforts = [
+            np.where(shared, _mean_root(total.value, duration), np.nan)
+            for total in (self._co_contraction, self._load)
+        ]
         found = np.array((self._peak, spent, spent - work, *efforts))
         return [JointEnergy(*of_joint) for of_joint in found.T.tolist()]
 
@@ -168,13 +169,10 @@ class _Rows(NamedTuple):
 
 
 def spring_rates(robot: Robot, block: Block) -> FloatArray:
-    """Rates of tau_spring, (joints, 2, samples): sigma_k phi_k', or tau_e' where there is no spring."""
-    phi, dphi, dtau_e = map(by_joint, (block.phi, block.dphi, block.dtau_e))
-    rates = np.full_like(phi, np.nan)
+    """Rates of tau_spring, (joints, 2, samples), NaN where there is no motor."""
+    rates = np.full((len(robot.joints), SIDES, len(block.time)), np.nan)
     for index, joint in enumerate(robot.joints):
-        for side, (_, law) in enumerate(motors_and_springs(joint.actuator)):
-            motor = index, side
-            rates[motor] = dtau_e[index] if law is None else law.stiffness(phi[motor]) * dphi[motor]
+        rates[index, : joint.actuator.motor_count] = joint.actuator.spring_rates(block.of_joint(index))
     return rates
 
 
@@ -229,7 +227,7 @@ def _motor_constants(robot: Robot) -> FloatArray:
     """Inertia and damping of the motors, (2, joints, 2, 1), NaN where there is none."""
     constants = np.full((2, len(robot.joints), SIDES, 1), np.nan)
     for index, joint in enumerate(robot.joints):
-        for side, (motor, _) in enumerate(motors_and_springs(joint.actuator)):
+        for side, motor in enumerate(joint.actuator.motors):
             constants[:, index, side, 0] = motor.inertia, motor.damping
     return constants
 

@@ -98,8 +98,8 @@ class Plant:
     def __init__(self, robot: Robot, frame: str | None = None) -> None:
         self.drivetrain = Drivetrain(robot.actuators)
         self.chain = chain_of(robot, frame)
-        self._rigid_inertia = self.drivetrain.rigid_sum(self.drivetrain.inertia)
-        self._rigid_damping = self.drivetrain.rigid_sum(self.drivetrain.damping)
+        self._rigid_inertia = self.drivetrain.direct(self.drivetrain.inertia)
+        self._rigid_damping = self.drivetrain.direct(self.drivetrain.damping)
         self._inertia = self.drivetrain.inertia[self.drivetrain.sprung]
         self._damping = self.drivetrain.damping[self.drivetrain.sprung]
 
@@ -120,10 +120,6 @@ class Plant:
             raise InputError.one("q, dq, theta, dtheta must have the same number of samples")
         return q, dq, theta, dtheta
 
-    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
-        """Deflection theta - q of each spring, or its rate from the rates."""
-        return theta - q[..., self.drivetrain.spring_joint]
-
     def accelerations(
         self,
         q: FloatArray,
@@ -143,23 +139,23 @@ class Plant:
             torque: of all motors, (..., motors).
             wrench: what the environment exerts, if the plant was made for one.
         """
-        spring = self.drivetrain.torque(self.deflections(q, theta))
+        tau_e, spring = self.drivetrain.torques(q, theta)
         matrix = self.chain.mass_matrix(q) + np.diag(self._rigid_inertia)
-        drive = self.drivetrain.joint_sum(spring) + self.drivetrain.rigid_sum(torque)
+        drive = tau_e + self.drivetrain.direct(torque)
         ddq = self.chain.solve(matrix, drive - self.chain.bias(q, dq, wrench) - self._rigid_damping * dq)
         ddtheta = (torque[..., self.drivetrain.sprung] - self._damping * dtheta - spring) / self._inertia
         return ddq, ddtheta
 
     def link_torque(
-        self, dq: FloatArray, ddq: FloatArray, spring: FloatArray, torque: FloatArray
+        self, dq: FloatArray, ddq: FloatArray, tau_e: FloatArray, torque: FloatArray
     ) -> FloatArray:
         """tau_e (6), (..., joints); of a rigid drive what its motor leaves after moving itself.
 
         Args:
             dq: velocity of the joints, (..., joints).
             ddq: their acceleration.
-            spring: torque of the springs, (..., springs).
+            tau_e: of the springs, (..., joints), 0 where there are none.
             torque: of all motors, (..., motors).
         """
         of_rotors = self._rigid_inertia * ddq + self._rigid_damping * dq
-        return self.drivetrain.joint_sum(spring) + self.drivetrain.rigid_sum(torque) - of_rotors
+        return tau_e + self.drivetrain.direct(torque) - of_rotors

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from vsacli.actuators.drivetrain import motors_and_springs
-from vsacli.actuators.limit_check import LimitCheck, OfJoint, within
+from vsacli.actuators.limit_check import LimitCheck, OfJoint
 from vsacli.base.arrays import FlagArray
 from vsacli.base.flags import Flag
 from vsacli.robot.model import Joint
@@ -21,13 +18,7 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
         LimitCheck(Flag.VELOCITY_LIMIT, "dq", None, limits.velocity),
         LimitCheck(Flag.STIFFNESS_LIMIT, "stiffness", None, limits.stiffness),
     ]
-    for motor, (drive, spring) in enumerate(motors_and_springs(joint.actuator), start=1):
-        deflection = math.inf if spring is None else spring.max_deflection
-        checks += [
-            LimitCheck(Flag.DEFLECTION_LIMIT, "phi", motor, within(deflection)),
-            LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", motor, within(drive.max_velocity)),
-            LimitCheck(Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor, within(drive.max_torque)),
-        ]
+    checks += joint.actuator.limits()
     return [check for check in checks if np.isfinite(check.range).any()]
 
 

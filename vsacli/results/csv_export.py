@@ -12,10 +12,11 @@ from typing import Any, Literal, TextIO, TypeAlias
 
 import numpy as np
 
+from vsacli.actuators import existing
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.atomic_files import AtomicFile, reporting_storage_errors
 from vsacli.base.errors import InputError, VsacliError
-from vsacli.base.variables import VARIABLES, Variable, column_names, existing, select_variables
+from vsacli.base.variables import VARIABLES, Variable, column_names, select_variables
 from vsacli.results.store.reader import StoredResult
 
 DEFAULT_VARIABLES = {

@@ -9,10 +9,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.kinds import ACTUATORS, Actuator
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.rigid import Rigid
+from vsacli.actuators import ACTUATORS
+from vsacli.actuators.actuator import Actuator
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, check_type
@@ -163,8 +161,8 @@ class Joint:
 
     def __post_init__(self) -> None:
         problems = []
-        if isinstance(self.actuator, Rigid) and self.limits.stiffness != UNBOUNDED:
-            reason = "a joint with a rigid actuator has no stiffness to limit; leave it out"
+        if not self.actuator.sprung and self.limits.stiffness != UNBOUNDED:
+            reason = f"a joint with a {self.actuator_type} actuator has no stiffness to limit; leave it out"
             problems.append(FieldProblem(("limits", "stiffness"), reason))
         check_fields(self, *problems)
 
@@ -176,19 +174,12 @@ class Joint:
     @property
     def actuator_type(self) -> str:
         """The key of its actuator in `ACTUATORS`."""
-        return next(word for word, actuator in ACTUATORS.items() if isinstance(self.actuator, actuator))
-
-    @property
-    def springs(self) -> tuple[SpringLaw, ...]:
-        """The nonlinear springs of its actuator, once if both are one."""
-        laws = self.actuator.spring if isinstance(self.actuator, Antagonistic) else ()
-        return tuple({id(law): law for law in laws}.values())
+        return ACTUATORS.name_of(type(self.actuator))
 
     def warnings(self) -> Iterator[str]:
         """What may not be what was meant, of the link and of the springs."""
         yield from (f"link of joint {self.name}: {warning}" for warning in self.link.warnings())
-        for law in self.springs:
-            yield from (f"spring of joint {self.name}: {warning}" for warning in law.warnings)
+        yield from (f"spring of joint {self.name}: {warning}" for warning in self.actuator.warnings)
 
 
 @dataclass(frozen=True, repr=False)
@@ -258,7 +249,7 @@ class Robot:
     @property
     def spring_sources(self) -> tuple[Source, ...]:
         """Files that springs were read from, each once."""
-        sources = (source for joint in self.joints for law in joint.springs for source in law.sources)
+        sources = (source for joint in self.joints for source in joint.actuator.sources)
         return tuple(dict.fromkeys(sources))
 
     @property

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Self
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.kinds import ACTUATORS, Actuator
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.signals import COMMANDED, STIFFNESS, Signal
+from vsacli.actuators import ACTUATORS
+from vsacli.base.signals import COMMANDED, Signal
 from vsacli.robot.model import Robot
 
 
@@ -32,13 +30,13 @@ class CommandedJoints:
         """Those of a robot."""
         exempt = {
             key: {
-                joint.name: _reason(joint.actuator, key)
+                joint.name: joint.actuator.uncommanded.get(key, f"its actuator takes no {key}")
                 for joint in robot.joints
                 if key not in joint.actuator.commanded
             }
             for key in COMMANDED
         }
-        rigid = all(isinstance(joint.actuator, Rigid) for joint in robot.joints)
+        rigid = not any(joint.actuator.sprung for joint in robot.joints)
         return cls(dict(zip(robot.joint_names, robot.joint_types, strict=True)), exempt, rigid)
 
     @property
@@ -60,10 +58,3 @@ class CommandedJoints:
 def takers(key: str) -> str:
     """The kinds of actuator that take a signal, as words before "joint"."""
     return " or ".join(kind for kind, actuator in ACTUATORS.items() if key in actuator.commanded)
-
-
-def _reason(actuator: Actuator, key: str) -> str:
-    """Why an actuator does not take a signal, a clause."""
-    if key == STIFFNESS.key and not isinstance(actuator, Antagonistic):
-        return actuator.no_choice
-    return f"its actuator takes no {key}"

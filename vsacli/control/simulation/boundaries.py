@@ -32,8 +32,8 @@ class Boundary(ABC):
         self._packing = loop.packing
 
     @abstractmethod
-    def distances(self, phi: FloatArray) -> FloatArray:
-        """What must stay positive, one number for each of `joints`, from the deflections of all springs."""
+    def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """What must stay positive, one number for each of `joints`, at positions of joints and motors."""
 
     def __call__(self, _time: float, vector: FloatArray) -> float:
         """The smallest distance."""
@@ -45,7 +45,7 @@ class Boundary(ABC):
 
     def _distances(self, vector: FloatArray) -> FloatArray:
         phase = self._packing.unpack(vector)
-        return self.distances(self._plant.deflections(phase.q, phase.theta))
+        return self.distances(phase.q, phase.theta)
 
 
 class Singularity(Boundary):
@@ -56,18 +56,17 @@ class Singularity(Boundary):
 
     def __init__(self, loop: ClosedLoop, start: FloatArray) -> None:
         super().__init__(loop)
-        drivetrain = loop.plant.drivetrain
-        self.joints = drivetrain.spring_joint[drivetrain.first]
-        self._first_value = self._determinant(loop.plant.deflections(*loop.packing.unpack(start)[:3:2]))
+        self.joints = loop.plant.drivetrain.chosen
+        phase = loop.packing.unpack(start)
+        self._first_value = self._determinant(phase.q, phase.theta)
 
-    def distances(self, phi: FloatArray) -> FloatArray:
+    def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Det A as a share of its first value, above `NEARLY_SINGULAR`."""
-        shares: FloatArray = self._determinant(phi) / self._first_value - NEARLY_SINGULAR
+        shares: FloatArray = self._determinant(q, theta) / self._first_value - NEARLY_SINGULAR
         return shares
 
-    def _determinant(self, phi: FloatArray) -> FloatArray:
-        drivetrain = self._plant.drivetrain
-        return drivetrain.decoupling_determinant(drivetrain.springs(phi))
+    def _determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        return self._plant.drivetrain.determinant(q, theta)[..., self.joints]
 
 
 class SpringRange(Boundary):
@@ -81,8 +80,9 @@ class SpringRange(Boundary):
         self._lowest, self._highest = loop.plant.drivetrain.domain
         self.joints = loop.plant.drivetrain.spring_joint
 
-    def distances(self, phi: FloatArray) -> FloatArray:
+    def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Deflection to the nearer end of the law."""
+        phi = self._plant.drivetrain.deflections(q, theta)
         distances: FloatArray = np.fmin(phi - self._lowest, self._highest - phi)
         return distances
 
@@ -90,7 +90,7 @@ class SpringRange(Boundary):
 def boundaries(loop: ClosedLoop, start: FloatArray) -> Iterator[Boundary]:
     """Those that a robot can reach; `start` is the first state vector."""
     drivetrain = loop.plant.drivetrain
-    if drivetrain.first.size:
+    if drivetrain.chosen.size:
         yield Singularity(loop, start)
     if np.isfinite(drivetrain.domain).any():
         yield SpringRange(loop)

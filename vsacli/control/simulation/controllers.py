@@ -72,7 +72,6 @@ class LinearizingFeedback:
         self._reference = reference
         self.ending: Ending | None = None
         self._integrates = gains.integrates
-        self._paired = self._feedback.plant.drivetrain.present.all(axis=1)
 
     def torque(self, time: float | FloatArray, phase: Phase) -> FloatArray:
         """Motor torques, ([samples,] motors)."""
@@ -85,6 +84,7 @@ class LinearizingFeedback:
         if not self._integrates:
             return Integral(np.zeros_like(phase.q), np.zeros_like(phase.q))
         reference, plant = self._reference(time), self._feedback.plant
-        springs = plant.drivetrain.springs(plant.deflections(phase.q, phase.theta))
-        error = reference.commanded["stiffness"] - plant.drivetrain.joint_sum(springs.sigma)
-        return Integral(reference.q - phase.q, np.where(self._paired, error, 0.0))
+        error, chosen = np.zeros_like(phase.q), plant.drivetrain.chosen
+        stiffness = plant.drivetrain.stiffness(phase.q, phase.theta)
+        error[..., chosen] = (reference.commanded["stiffness"] - stiffness)[..., chosen]
+        return Integral(reference.q - phase.q, error)

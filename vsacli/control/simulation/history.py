@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FlagArray, FloatArray, of_joint
 from vsacli.base.simulation_variables import COMMANDED, ERRORS, actual, error
 from vsacli.control.simulation.closed_loop import ClosedLoop
@@ -58,9 +57,9 @@ def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory) -> Hist
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in COMMANDED}
     found = _actual(loop, integrated)
-    paired = loop.plant.drivetrain.present.all(axis=1)
+    chosen = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)
     for name in ("stiffness", "dstiffness"):  # elsewhere there is none to command
-        commanded[name] = np.where(paired, commanded[name], found[name])
+        commanded[name] = np.where(chosen, commanded[name], found[name])
     demand = loop.plant.drivetrain.of_joints(integrated.demand)
     return History(
         time=integrated.time,
@@ -76,9 +75,9 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
     plant, drivetrain = loop.plant, loop.plant.drivetrain
     phase, torque = loop.packing.unpack(integrated.states), loop.applied(integrated.demand)
     ddq, _ = loop.accelerations(integrated.time, phase, integrated.demand)
-    phi, dphi = plant.deflections(phase.q, phase.theta), plant.deflections(phase.dq, phase.dtheta)
-    springs = drivetrain.springs(phi)
-    tau_e = plant.link_torque(phase.dq, ddq, springs.tau, torque)
+    phi, dphi = drivetrain.deflections(phase.q, phase.theta), drivetrain.deflections(phase.dq, phase.dtheta)
+    springs = drivetrain.state(phase.q, phase.theta, phase.dq, phase.dtheta)
+    tau_e = plant.link_torque(phase.dq, ddq, springs.tau_e, torque)
     still = np.zeros_like(phase.q)
     theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)
     tau_motor = drivetrain.of_joints(torque)
@@ -86,19 +85,19 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
         "q": phase.q,
         "dq": phase.dq,
         "ddq": ddq,
-        "stiffness": np.where(drivetrain.rigid, np.nan, drivetrain.joint_sum(springs.sigma)),  # (11)
-        "dstiffness": np.where(drivetrain.rigid, np.nan, drivetrain.joint_sum(springs.zeta * dphi)),  # (18)
+        "stiffness": np.where(drivetrain.rigid, np.nan, springs.stiffness),  # (11)
+        "dstiffness": np.where(drivetrain.rigid, np.nan, springs.dstiffness),  # (18)
         "tau_e": tau_e,
         "phi": drivetrain.merged(phi, still),
         "dphi": drivetrain.merged(dphi, still),
         "theta": theta,
         "dtheta": dtheta,
-        "tau_spring": drivetrain.merged(springs.tau, tau_e),
+        "tau_spring": drivetrain.merged(springs.tau_spring, tau_e),
         "tau_motor": tau_motor,
-        "elastic_energy": drivetrain.energy(phi),
+        "elastic_energy": drivetrain.energy(phase.q, phase.theta),
         "motor_power": tau_motor * dtheta,
         "motor_energy": _work(theta, tau_motor, held=integrated.held),
-        "det_A": _by_joint(drivetrain, drivetrain.decoupling_determinant(springs)),
+        "det_A": drivetrain.determinant(phase.q, phase.theta),
     }
 
 
@@ -106,13 +105,6 @@ def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
     """Of motors up to each step, (samples, ...); the torque is held between steps, or linear."""
     given = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
     return np.cumsum(np.concatenate((0 * torque[:1], given * np.diff(theta, axis=0))), axis=0)
-
-
-def _by_joint(drivetrain: Drivetrain, of_pairs: FloatArray) -> FloatArray:
-    """(samples, joints) from (samples, pairs), NaN at joints that are none."""
-    values = np.full((len(of_pairs), len(drivetrain.present)), np.nan)
-    values[:, drivetrain.spring_joint[drivetrain.first]] = of_pairs
-    return values
 
 
 def _flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:

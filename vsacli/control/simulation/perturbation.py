@@ -7,13 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
 from vsacli.base.errors import InputError
-from vsacli.documents.fields import Number, declared
+from vsacli.documents.fields import Kind, Number, OneOf, Pair, Record, declared
 from vsacli.robot.model import Inertia, Joint, Link, Robot
 
 
@@ -65,17 +62,24 @@ class _Wrong:
         return replace(inertia, **{name: factor * getattr(inertia, name) for name in declared(Inertia)})
 
     def _actuator(self, actuator: Any) -> Any:
-        match actuator:
-            case Antagonistic(motor=(motor_1, motor_2), spring=(spring_1, spring_2)):
-                motors = self._motor(motor_1), self._motor(motor_2)
-                return replace(
-                    actuator, motor=motors, spring=(self._spring(spring_1), self._spring(spring_2))
-                )
-            case Elastic(motor=motor, stiffness=stiffness):
-                return replace(actuator, motor=self._motor(motor), stiffness=self._number(stiffness))
-            case Rigid(motor=motor):
-                return replace(actuator, motor=self._motor(motor))
-        raise TypeError(f"{type(actuator).__name__} is no actuator")
+        """Motors, springs and numbers, in the order in which they are declared."""
+        wrong = {
+            name: self._value(field.kind, getattr(actuator, name))
+            for name, (field, _) in declared(type(actuator)).items()
+        }
+        return replace(actuator, **wrong)
+
+    def _value(self, kind: Kind, value: Any) -> Any:
+        match kind:
+            case Pair(item):
+                return tuple(self._value(item, side) for side in value)
+            case Record(cls) if cls is Motor:
+                return self._motor(value)
+            case OneOf(variants) if variants is LAWS:
+                return self._spring(value)
+            case Number():
+                return self._number(value)
+        return value
 
     def _motor(self, motor: Motor) -> Motor:
         return replace(motor, inertia=self._number(motor.inertia), damping=self._number(motor.damping))

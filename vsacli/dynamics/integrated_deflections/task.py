@@ -7,12 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.actuators.antagonistic import (
-    Antagonistic,
-    decoupling_determinant,
-    deflection_rates,
-    solve_deflections,
-)
+from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.reach import reach_flags
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
@@ -42,9 +37,7 @@ class Task:
         self.trajectory = trajectory
         self._robot = robot
         self._actuators = {
-            index: joint.actuator
-            for index, joint in enumerate(robot.joints)
-            if isinstance(joint.actuator, Antagonistic)
+            index: joint.actuator for index, joint in enumerate(robot.joints) if joint.actuator.integrable
         }
         self.joints = tuple(self._actuators)
 
@@ -52,7 +45,7 @@ class Task:
         """Roots of (14) of some joints."""
         return np.stack(
             [
-                solve_deflections(actuator, command.tau_e, command.commanded["stiffness"]).deflections
+                actuator.solve(command.tau_e, command.commanded["stiffness"]).deflections
                 for actuator, command in self._commands(joints, time)
             ]
         )
@@ -61,7 +54,7 @@ class Task:
         """Rates of the deflections of some joints, (19)."""
         return np.stack(
             [
-                deflection_rates(actuator, of_joint, command.dtau_e, command.commanded["dstiffness"])
+                actuator.deflection_rates(of_joint, command.dtau_e, command.commanded["dstiffness"])
                 for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
             ]
         )
@@ -75,7 +68,7 @@ class Task:
             ]
         )
 
-    def _commands(self, joints: tuple[int, ...], time: FloatArray) -> Iterator[tuple[Antagonistic, Command]]:
+    def _commands(self, joints: tuple[int, ...], time: FloatArray) -> Iterator[tuple[Actuator, Command]]:
         """What is asked of some joints, from one pass of the recursion."""
         motion = self.trajectory.at(time)
         commanded = {**motion.variables(), **elastic_torques(self._robot, motion)}
@@ -83,12 +76,10 @@ class Task:
             yield self._actuators[joint], command_of(joint, commanded)
 
 
-def _hindrances(actuator: Antagonistic, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
+def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
     """Singular is, too, where det A has another sign than on the joint's branch: it was zero on the way."""
-    solution = solve_deflections(actuator, command.tau_e, command.commanded["stiffness"])
+    solution = actuator.solve(command.tau_e, command.commanded["stiffness"])
     flags = reach_flags(command.commanded["stiffness"], solution)
-    here, on_branch = (
-        np.sign(decoupling_determinant(actuator, each)) for each in (phi, solution.deflections)
-    )
+    here, on_branch = (np.sign(actuator.determinant(each)) for each in (phi, solution.deflections))
     singular = has(flags, Flag.SINGULAR) | (here != on_branch)
     return np.where(has(flags, Flag.INFEASIBLE), UNREACHABLE, np.where(singular, SINGULAR, FOLLOWED))

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic, solve_deflections
 from vsacli.base.arrays import FloatArray
 from vsacli.files.info.extremes import Extremes, free_range, largest_sizes, unlimited
 from vsacli.files.info.record import plain
@@ -64,13 +63,13 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
 def stiffness_ranges(joint: Joint, load: float) -> dict[str, list[float]]:
     """The stiffness reachable `unloaded`, and `loaded` by a torque in either direction, N m/rad (N/m).
 
-    Empty if the joint is not antagonistic.
+    Empty if its stiffness is not commanded.
     """
-    if not isinstance(joint.actuator, Antagonistic):
+    if "stiffness" not in joint.actuator.commanded:
         return {}
     tau_e = np.array([0.0, load, -load])
     with np.errstate(all="ignore"):  # a load may be beyond all numbers
-        solution = solve_deflections(joint.actuator, tau_e, np.ones(3))
+        solution = joint.actuator.solve(tau_e, np.ones(3))
     return {
         "unloaded": [float(solution.lower[0]), float(solution.upper[0])],
         "loaded": [float(solution.lower.max()), float(solution.upper.min())],

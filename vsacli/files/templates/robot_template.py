@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from vsacli.actuators import ACTUATORS
 from vsacli.base.errors import InputError
 from vsacli.files.templates.commented import document
 from vsacli.robot.file import FORMAT, RobotFile
@@ -18,24 +18,8 @@ HEAD = (
 
 Values = dict[str, Any]
 
-_REVOLUTE_SPRING = {"type": "cubic", "k": 400, "k_c": 2000}
-_PRISMATIC_SPRING = {"type": "cubic", "k": 4000, "k_c": 200000}
 
-_ACTUATORS: dict[str, Callable[[str], Values]] = {
-    "antagonistic": lambda joint_type: {
-        "motor": _motor(joint_type),
-        "spring": _by_type(joint_type, _REVOLUTE_SPRING, _PRISMATIC_SPRING),
-    },
-    "elastic": lambda joint_type: {
-        "motor": _motor(joint_type),
-        "stiffness": _by_type(joint_type, 1000, 10000),
-    },
-    "rigid": lambda joint_type: {"motor": _motor(joint_type)},
-}
-ACTUATORS = tuple(_ACTUATORS)
-
-
-def robot_template(joints: str, actuator: str = ACTUATORS[0], name: str = "my-robot") -> str:
+def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-robot") -> str:
     """The text of a robot file.
 
     Args:
@@ -72,13 +56,8 @@ def _joint(number: int, joint_type: str, actuator: str) -> Values:
         "type": joint_type,
         **geometry,
         "damping": _by_type(joint_type, 0.1, 1.0),
-        "actuator": {"type": actuator, **_ACTUATORS[actuator](joint_type)},
+        "actuator": {"type": actuator, **ACTUATORS[actuator].example(joint_type)},
     }
-
-
-def _motor(joint_type: str) -> Values:
-    inertia, damping = _by_type(joint_type, (0.5, 0.01), (10, 0.1))
-    return {"inertia": inertia, "damping": damping}
 
 
 def _by_type(joint_type: str, revolute: Any, prismatic: Any) -> Any:

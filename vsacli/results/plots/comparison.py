@@ -15,10 +15,11 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vsacli.actuators import existing
 from vsacli.base.arrays import BoolArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import POSITION, TORQUE
-from vsacli.base.variables import MOTORS, existing
+from vsacli.base.variables import MOTORS
 from vsacli.results.plots.curves import Failures, read_curves
 from vsacli.results.plots.drawing import draw_bands, draw_curve, house_style, line_handle, line_style
 from vsacli.results.plots.panels import (

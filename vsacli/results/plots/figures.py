@@ -10,9 +10,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from matplotlib.figure import Figure
 
+from vsacli.actuators import existing
 from vsacli.base.errors import InputError
 from vsacli.base.units import ENERGY, POSITION, STIFFNESS, TORQUE
-from vsacli.base.variables import MOTORS, existing
+from vsacli.base.variables import MOTORS
 from vsacli.results.plots.corridor_figure import MOST_ROWS, compliant_joints, draw_corridors
 from vsacli.results.plots.curves import Failures
 from vsacli.results.plots.drawing import house_style

@@ -14,9 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
+from vsacli.actuators import existing
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.units import TIME, TORQUE
-from vsacli.base.variables import MOTORS, existing
+from vsacli.base.variables import MOTORS
 from vsacli.results.plots.curves import Failures, read_curves
 from vsacli.results.plots.drawing import draw_bands, draw_curve, line_handle, line_style, shortened
 from vsacli.results.store.reader import StoredResult

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import os
 import re
 from collections.abc import Iterable, Sequence
@@ -11,12 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.kinds import ACTUATORS, Actuator
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
+from vsacli.actuators import ACTUATORS
+from vsacli.actuators.actuator import Placeholders
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError
 from vsacli.documents.problems import Problems
@@ -33,37 +28,6 @@ STANDARD_GRAVITY = 9.81
 
 NEGLIGIBLE_INERTIA = 1e-15
 """Inertia, over mass times the arm's size squared, that is rounding of a zero in the file."""
-
-
-@dataclass(frozen=True)
-class Placeholders:
-    """What a URDF does not say: the actuator of every joint and its constants, in SI units of the joint.
-
-    Attributes:
-        actuator: a key of `vsacli.actuators.kinds.ACTUATORS`.
-        motor_inertia: of each motor, joint side of the gear.
-        stiffness: of an elastic transmission.
-        spring: k and k_c of the cubic springs of an antagonistic one.
-    """
-
-    actuator: str = "antagonistic"
-    motor_inertia: float = 1.0
-    stiffness: float = 1000.0
-    spring: tuple[float, float] = (400.0, 2000.0)
-
-    def of_joint(self, effort: float | None) -> Actuator:
-        """The actuator of a joint that bears this effort; with two motors that bounds neither of them.
-
-        Raises:
-            InvalidRecordError: a constant is not positive.
-        """
-        if ACTUATORS[self.actuator] is Antagonistic:
-            motor, spring = Motor(inertia=self.motor_inertia), Cubic(k=self.spring[0], k_c=self.spring[1])
-            return Antagonistic(motor=(motor, motor), spring=(spring, spring))
-        motor = Motor(inertia=self.motor_inertia, max_torque=effort or math.inf)
-        if ACTUATORS[self.actuator] is Elastic:
-            return Elastic(motor=motor, stiffness=self.stiffness)
-        return Rigid(motor=motor)
 
 
 @dataclass(frozen=True)
@@ -142,7 +106,9 @@ def _robot(path: str, chain: SerialChain, frames: Frames, placeholders: Placehol
     )
 
 
-def _joint(name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, drives: Placeholders) -> Joint:
+def _joint(
+    name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, placeholders: Placeholders
+) -> Joint:
     limit = joint.urdf.limit
     speed = limit.velocity
     return Joint(
@@ -151,7 +117,7 @@ def _joint(name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, driv
         dh=dh,
         link=link,
         damping=joint.urdf.damping,
-        actuator=drives.of_joint(limit.effort),
+        actuator=ACTUATORS[placeholders.actuator].placeholder(placeholders, limit.effort),
         limits=Limits(
             position=limit.position or UNBOUNDED,
             velocity=UNBOUNDED if speed is None else (-speed, speed),

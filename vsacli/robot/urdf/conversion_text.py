@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.kinds import Actuator
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
+from vsacli.actuators.actuator import Actuator
+from vsacli.documents.fields import Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
 from vsacli.robot.file import FORMAT
 from vsacli.robot.model import UNBOUNDED, DenavitHartenberg, Joint, Limits, Link, Pose
 from vsacli.robot.urdf.conversion import Conversion
@@ -99,7 +96,7 @@ def _joint_lines(joint: Joint, origin: ChainJoint) -> Iterator[str]:
     yield from _link_lines(joint.link)
     if joint.damping:
         yield f"    damping: {_number(joint.damping)}"
-    yield from _actuator_lines(joint.actuator, origin.urdf.limit.effort)
+    yield from _actuator_lines(joint, origin.urdf.limit.effort)
     if joint.limits != Limits():
         yield f"    limits: {_limits(joint.limits)}"
 
@@ -122,31 +119,52 @@ def _link_lines(link: Link) -> Iterator[str]:
     yield f"      inertia: {{{', '.join(entries)}}}"
 
 
-def _actuator_lines(actuator: Actuator, effort: float | None) -> Iterator[str]:
+def _actuator_lines(joint: Joint, effort: float | None) -> Iterator[str]:
+    actuator = joint.actuator
     yield "    actuator:"
-    match actuator:
-        case Antagonistic(motor=(motor, _), spring=(Cubic() as spring, _)):
-            bound = "" if effort is None else f"; the joint's effort limit there is {_number(effort)}"
-            yield "      type: antagonistic"
-            yield _commented(f"      motor: {_motor(motor)}", PLACEHOLDER + bound)
-            law = f"{{type: cubic, k: {_number(spring.k)}, k_c: {_number(spring.k_c)}}}"
-            yield _commented(f"      spring: {law}", PLACEHOLDER)
-        case Elastic(motor=motor, stiffness=stiffness):
-            yield "      type: elastic"
-            yield _commented(f"      motor: {_motor(motor)}", _motor_comment(motor))
-            yield _commented(f"      stiffness: {_number(stiffness)}", PLACEHOLDER)
-        case Rigid(motor=motor):
-            yield "      type: rigid"
-            yield _commented(f"      motor: {_motor(motor)}", _motor_comment(motor))
+    yield f"      type: {joint.actuator_type}"
+    for name, written in _written(actuator).items():
+        comment = _motor_comment(actuator, effort) if name == "motor" else ""
+        yield _commented(f"      {name}: {written}", PLACEHOLDER + comment)
 
 
-def _motor(motor: Motor) -> str:
-    bound = f", max_torque: {_number(motor.max_torque)}" if math.isfinite(motor.max_torque) else ""
-    return f"{{inertia: {_number(motor.inertia)}{bound}}}"
+def _motor_comment(actuator: Actuator, effort: float | None) -> str:
+    if any(math.isfinite(motor.max_torque) for motor in actuator.motors):
+        return ", but for the effort limit"
+    if effort is None or actuator.motor_count == 1:
+        return ""
+    return f"; the joint's effort limit there is {_number(effort)}"
 
 
-def _motor_comment(motor: Motor) -> str:
-    return PLACEHOLDER + (", but for the effort limit" if math.isfinite(motor.max_torque) else "")
+def _written(record: Any) -> dict[str, str]:
+    """The fields of a record as they are written on one line, but for those that have their default."""
+    values = {name: getattr(record, name) for name in declared(type(record))}
+    return {
+        name: _value(field.kind, values[name])
+        for name, (field, default) in declared(type(record)).items()
+        if values[name] != default
+    }
+
+
+def _value(kind: Kind, content: Any) -> str:
+    match kind:
+        case Pair(item):
+            sides = [_value(item, side) for side in content]
+            return sides[0] if sides[0] == sides[1] else f"[{', '.join(sides)}]"
+        case Record():
+            return _mapping(_written(content))
+        case OneOf(variants):
+            word = next(word for word, variant in variants.items() if type(content) is variant)
+            return _mapping({"type": word, **_written(content)})
+        case Number():
+            return _number(content)
+        case Interval() | Vector():
+            return _numbers(content)
+    return json.dumps(content)
+
+
+def _mapping(written: Mapping[str, str]) -> str:
+    return f"{{{', '.join(f'{name}: {value}' for name, value in written.items())}}}"
 
 
 def _limits(limits: Limits) -> str:

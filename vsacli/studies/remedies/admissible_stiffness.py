@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic, solve_deflections
+from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.signals import STIFFNESS
@@ -96,13 +96,13 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
     return admissible
 
 
-def variable_stiffness_actuator(joint: Joint) -> Antagonistic:
+def variable_stiffness_actuator(joint: Joint) -> Actuator:
     """The actuator of a joint, if its stiffness can be chosen.
 
     Raises:
         ImpossibleError: the actuator has none to choose.
     """
-    if not isinstance(joint.actuator, Antagonistic):
+    if "stiffness" not in joint.actuator.commanded:
         raise ImpossibleError(f"the actuator of {joint.name} has no stiffness to choose")
     return joint.actuator
 
@@ -118,27 +118,27 @@ def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -
         near_singular: the margin m.
     """
     actuator = variable_stiffness_actuator(joint)
-    corridor = solve_deflections(actuator, command.tau_e, command.commanded["stiffness"])
+    corridor = actuator.solve(command.tau_e, command.commanded["stiffness"])
     least, most = joint.limits.stiffness
     low = np.maximum(corridor.lower / (1 - near_singular), least)
     high = np.minimum(corridor.upper / (1 + near_singular), most)
-    if all(np.isinf(spring.max_deflection) for spring in actuator.spring):
+    if np.isinf(actuator.max_deflections).all():
         return Range(low, high)
     return Range(low, np.minimum(high, _deflection_ceiling(actuator, command, corridor.lower)))
 
 
-def _deflection_ceiling(actuator: Antagonistic, command: Command, lower: FloatArray) -> FloatArray:
+def _deflection_ceiling(actuator: Actuator, command: Command, lower: FloatArray) -> FloatArray:
     """The stiffness from `lower` on up to which both deflections keep their limit.
 
     With the stiffness grows the preload: phi_1 increases and phi_2 decreases, or the other way round. What is
     halved is a share x of 0 to 1, which maps to all stiffness above `lower`.
     """
-    limits = np.array([[spring.max_deflection] for spring in actuator.spring])
+    limits = np.array(actuator.max_deflections)[:, None]
     kept, broken = np.zeros_like(lower), np.ones_like(lower)
     for _ in range(BISECTIONS):
         share = (kept + broken) / 2
         stiffness = lower + command.commanded["stiffness"] * share / (1 - share)
-        solution = solve_deflections(actuator, command.tau_e, stiffness)
-        within = np.all(np.abs([solution.phi_1, solution.phi_2]) <= limits, axis=0)
+        solution = actuator.solve(command.tau_e, stiffness)
+        within = np.all(np.abs(solution.deflections) <= limits, axis=0)
         kept, broken = np.where(within, share, kept), np.where(within, broken, share)
     return lower + command.commanded["stiffness"] * kept / (1 - kept)

@@ -7,7 +7,6 @@ from typing import TypeVar
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
 from vsacli.base.units import STIFFNESS
@@ -102,7 +101,7 @@ def _stiffness_offset(
         tuple(
             Offset(joint.name, found.get(index, 0.0), STIFFNESS.unit(joint.type))
             for index, joint in enumerate(acceptance.robot.joints)
-            if isinstance(joint.actuator, Antagonistic)
+            if "stiffness" in joint.actuator.commanded
         )
     )
 

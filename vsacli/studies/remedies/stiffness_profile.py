@@ -130,7 +130,7 @@ def _narrowed(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
 
 def _smoothing_time(joint: Joint, load: Load) -> float:
     """sqrt(B/sigma): the motors follow slower changes with little torque of inertia; at least three steps."""
-    inertia = max(motor.at_joint.inertia for motor in variable_stiffness_actuator(joint).motor)
+    inertia = max(motor.inertia for motor in variable_stiffness_actuator(joint).motors)
     resonance = math.sqrt(inertia / float(load.command.commanded["stiffness"].min()))
     step = float(np.median(np.diff(load.time[::2])))
     return min(max(resonance, 3 * step), float(load.time[-1] - load.time[0]))

@@ -1,0 +1,167 @@
+"""What the program asks of an actuator, whatever its kind."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+
+from vsacli.actuators.elasticity import Elasticity
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.limit_check import LimitCheck, OfJoint, within
+from vsacli.actuators.motor import JointMotor
+from vsacli.actuators.transmission import Command, Transmission
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.flags import Flag
+from vsacli.base.variables import COMMANDED_STIFFNESS, MOTORS, SPRINGS, Variable
+from vsacli.documents.source import Source
+
+
+class Placeholders(NamedTuple):
+    """The actuator of every joint as long as nothing is known of it, and its constants, in SI units.
+
+    Attributes:
+        actuator: a key of `vsacli.actuators.ACTUATORS`.
+        motor_inertia: of each motor, joint side of the gear.
+        stiffness: of an elastic transmission.
+        spring: k and k_c of the cubic springs of an antagonistic one.
+    """
+
+    actuator: str = "antagonistic"
+    motor_inertia: float = 1.0
+    stiffness: float = 1000.0
+    spring: tuple[float, float] = (400.0, 2000.0)
+
+
+class Carried(NamedTuple):
+    """What springs carry at given deflections, by their laws; arrays (samples,).
+
+    Attributes:
+        tau_e: torque on the link.
+        size: of the torques that it is the sum of.
+        stiffness: of the joint.
+    """
+
+    tau_e: FloatArray
+    size: FloatArray
+    stiffness: FloatArray
+
+
+class Actuator(ABC):
+    """What drives a joint: motors, and springs between them and the link.
+
+    A kind is a frozen dataclass of declared fields that derives from this class, and a line in `ACTUATORS`.
+    Below, phi (2, samples) is what describes the springs: the deflection of each of them, or whatever the
+    kind solves for, one number for each motor.
+
+    Attributes:
+        motor_count: motors of the joint, 1 or 2.
+        commanded: variables that a trajectory commands besides the motion of the joint.
+        uncommanded: why a trajectory does not command others, by key of the signal, clauses.
+        sprung: whether springs lie between its motors and the link; else its motor moves with the joint.
+        co_contracts: whether both motors carry the load, and so can work against each other.
+    """
+
+    motor_count: ClassVar[int] = 1
+    commanded: ClassVar[tuple[str, ...]] = ()
+    uncommanded: ClassVar[Mapping[str, str]] = {}
+    sprung: ClassVar[bool] = True
+    co_contracts: ClassVar[bool] = False
+
+    @classmethod
+    def has(cls, variable: Variable) -> list[bool]:
+        """Which columns of a result variable its joints have: of motors 1 and 2, or of the joint."""
+        of_kind = {None: True, SPRINGS: cls.sprung, COMMANDED_STIFFNESS: "stiffness" in cls.commanded}
+        there = of_kind[variable.requires]
+        if "motor" not in variable.dims:
+            return [there]
+        return [there and motor <= cls.motor_count for motor in MOTORS]
+
+    @classmethod
+    @abstractmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:
+        """Plausible values of its fields, as a new robot file shows them."""
+
+    @classmethod
+    @abstractmethod
+    def placeholder(cls, constants: Placeholders, effort: float | None) -> Self:
+        """An actuator of which nothing else is known; None or 0 leave the effort of the joint without bound.
+
+        Raises:
+            InvalidRecordError: a constant is not positive.
+        """
+
+    @property
+    @abstractmethod
+    def motors(self) -> tuple[JointMotor, ...]:
+        """Its motors as the joint has them."""
+
+    @property
+    def max_deflections(self) -> tuple[float, ...]:
+        """Largest admissible |phi| at each motor; a limit that is flagged."""
+        return (math.inf,) * self.motor_count
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the user should know about its springs."""
+        return ()
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Files that its springs were read from."""
+        return ()
+
+    def limits(self) -> Iterator[LimitCheck]:
+        """Its limits, finite or not."""
+        for number, (motor, deflection) in enumerate(zip(self.motors, self.max_deflections, strict=True), 1):
+            yield LimitCheck(Flag.DEFLECTION_LIMIT, "phi", number, within(deflection))
+            yield LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", number, within(motor.max_velocity))
+            yield LimitCheck(Flag.MOTOR_TORQUE_LIMIT, "tau_motor", number, within(motor.max_torque))
+
+    @abstractmethod
+    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
+        """What a command asks of springs and motors.
+
+        Args:
+            command: what the joint is asked to do; arrays (samples,).
+            near_singular: margin below which a step is near-singular.
+            integrated: deflections phi to use instead of those that `solve` finds, NaN where there are none;
+                given only if the kind has `deflection_rates`.
+        """
+
+    @abstractmethod
+    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
+        """Rate of tau_spring of each motor, (motors, samples), from the other variables of the joint."""
+
+    def carried(self, phi: FloatArray) -> Carried:
+        """What the springs carry at phi, for the self-check."""
+        raise NotImplementedError(f"{type(self).__name__} has no springs")
+
+    @classmethod
+    def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
+        """The springs of several actuators of the kind, at any state of their joints and motors."""
+        raise NotImplementedError(f"{cls.__name__} has no springs")
+
+    # Of kinds that take a stiffness
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+        """Phi at which the springs carry the torque with the stiffness (14), on the actuator's branch."""
+        raise NotImplementedError(f"{type(self).__name__} takes no stiffness")
+
+    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:  # noqa: ARG002
+        """Where another choice of the preload would reach the stiffness, (samples,)."""
+        return np.zeros(tau_e.shape, dtype=bool)
+
+    integrable: ClassVar[bool] = False
+    """Whether phi can be integrated along a trajectory, by the two methods below."""
+
+    def deflection_rates(self, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray) -> FloatArray:
+        """Rates of phi, (2, samples), that give tau_e and the stiffness these rates, (19)-(20)."""
+        raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")
+
+    def determinant(self, phi: FloatArray) -> FloatArray:
+        """Determinant of the decoupling matrix A at phi, (67)."""
+        raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")

@@ -1,0 +1,91 @@
+"""Springs of joints as the equations of motion meet them: at any state of the joints and their motors.
+
+Arrays of joints are (..., joints), those of motors (..., joints, motors), whatever stands before: one
+instant, or samples.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+
+UNBOUNDED = np.array([-np.inf, np.inf]).reshape(2, 1, 1)
+
+
+class Torques(NamedTuple):
+    """What springs exert: on the link of each joint (6), and against each motor (62)."""
+
+    tau_e: FloatArray
+    tau_spring: FloatArray
+
+
+class Elasticity(ABC):
+    """The springs of joints whose actuators are of one kind: a potential of q and theta, and its derivatives.
+
+    Springs are described by phi, one number for each motor, which depends linearly on q and theta.
+
+    Attributes:
+        domain: lowest and highest phi for which the laws hold, (2, joints, motors) or to be spread so.
+    """
+
+    domain: FloatArray = UNBOUNDED
+
+    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Phi from positions, or its rates from velocities: theta - q unless the kind says otherwise."""
+        return theta - q[..., None]
+
+    @abstractmethod
+    def torques(self, phi: FloatArray) -> Torques:
+        """The torques of the springs."""
+
+    @abstractmethod
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Elastic energy of each joint, J."""
+
+    @abstractmethod
+    def state(self, phi: FloatArray) -> ElasticState:
+        """The springs with their derivatives."""
+
+
+class ElasticState(ABC):
+    """The springs of joints at given phi: elastic torque and stiffness, and how motions change them."""
+
+    @property
+    @abstractmethod
+    def tau_e(self) -> FloatArray:
+        """Elastic torque (6), (..., joints)."""
+
+    @property
+    @abstractmethod
+    def stiffness(self) -> FloatArray:
+        """Stiffness of the joint (11), (..., joints)."""
+
+    @property
+    @abstractmethod
+    def tau_spring(self) -> FloatArray:
+        """Torque against each motor (62), (..., joints, motors)."""
+
+    @abstractmethod
+    def torque_rate(self, dphi: FloatArray) -> FloatArray:
+        """Rate of the elastic torque (17), (..., joints)."""
+
+    @abstractmethod
+    def stiffness_rate(self, dphi: FloatArray) -> FloatArray:
+        """Rate of the stiffness (18), (..., joints)."""
+
+    @abstractmethod
+    def motor_accelerations(
+        self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> FloatArray:
+        """Accelerations of the motors that give torque and stiffness these second derivatives, (70)-(72).
+
+        NaN where there are none, because the decoupling matrix is singular.
+        """
+
+    def determinant(self) -> FloatArray:
+        """Det A (67) over (theta_1, theta_2), zero where A is singular; NaN if no stiffness is commanded."""
+        return np.full_like(self.tau_e, np.nan)
