@@ -6,7 +6,7 @@ before the motors of joints that have any; values of them have one entry for eac
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -146,14 +146,16 @@ class Drivetrain:
             result[..., group.springs] = part
         return result
 
-    def at(self, q: FloatArray, theta: FloatArray) -> Iterator[tuple[Elasticity, FloatArray]]:
+    def at(self, q: FloatArray, theta: FloatArray) -> list[tuple[Elasticity, FloatArray]]:
         """The springs of each kind with their phi, (..., joints, motors)."""
+        parts = []
         for group, of_joints in zip(self._groups, self.of_groups(q), strict=True):
             if self._alone:
                 of_motors = theta.reshape(*theta.shape[:-1], *group.springs.shape)
             else:
                 of_motors = theta[..., group.springs]
-            yield group.elasticity, group.elasticity.deflections(of_joints, of_motors)
+            parts.append((group.elasticity, group.elasticity.deflections(of_joints, of_motors)))
+        return parts
 
 
 class DrivetrainState:

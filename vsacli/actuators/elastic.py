@@ -106,23 +106,24 @@ class _State(ElasticState):
     """Springs of constant stiffness, (joints, 1), at phi."""
 
     def __init__(self, phi: FloatArray, stiffness: FloatArray) -> None:
-        self._phi, self._stiffness = phi, stiffness
+        self._stiffness = stiffness
+        self._torque = phi * stiffness
 
     @property
     def tau_e(self) -> FloatArray:
         """K phi."""
-        tau_e: FloatArray = self.tau_spring[..., 0]
+        tau_e: FloatArray = self._torque[..., 0]
         return tau_e
 
     @property
     def stiffness(self) -> FloatArray:
         """K."""
-        return np.broadcast_to(self._stiffness[:, 0], self._phi.shape[:-1])
+        return np.broadcast_to(self._stiffness[:, 0], self._torque.shape[:-1])
 
     @property
     def tau_spring(self) -> FloatArray:
         """K phi."""
-        return self._phi * self._stiffness
+        return self._torque
 
     def torque_rate(self, dphi: FloatArray) -> FloatArray:
         """K phi'."""
