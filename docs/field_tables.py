@@ -8,26 +8,9 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from vsacli.base.units import DIMENSIONLESS, Quantity
-from vsacli.documents.fields import (
-    FINITE,
-    REQUIRED,
-    Choice,
-    Field,
-    Integer,
-    Interval,
-    Items,
-    Kind,
-    Number,
-    OneOf,
-    Pair,
-    PerJoint,
-    Record,
-    TableFile,
-    Text,
-    Vector,
-    declared,
-)
+from vsacli.documents.fields import FINITE, REQUIRED, declared
+from vsacli.documents.kinds.nested import refused_in
+from vsacli.documents.records import Field
 
 Variants = Mapping[str, type]
 
@@ -45,7 +28,7 @@ class Choices(NamedTuple):
     """A field whose key `type` selects a record class."""
 
     key: str
-    kind: OneOf
+    variants: Variants
 
 
 def table(header: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -65,10 +48,10 @@ def record_sections(cls: type, elsewhere: Collection[Variants] = (), prefix: str
     parts = [_field_table(row for row in fields if isinstance(row, Row))]
     parts += _not_supported(cls)
     for choices in (field for field in fields if isinstance(field, Choices)):
-        key, kind = f"{prefix}{choices.key}", choices.kind
-        if kind.variants in elsewhere:
+        if choices.variants in elsewhere:
             continue
-        for name, variant in kind.variants.items():
+        key = f"{prefix}{choices.key}"
+        for name, variant in choices.variants.items():
             title = f"### `{key}` of `type: {name}`\n\n{_summary(variant)}\n"
             parts.append(f"{title}\n{record_sections(variant, elsewhere, f'{key}.')}")
     return "\n".join(parts)
@@ -87,21 +70,9 @@ def _field_table(rows: Iterable[Row]) -> str:
 
 
 def _not_supported(cls: type) -> Iterator[str]:
-    refused = [f"`{word}`" for word in _refused(cls)]
+    refused = [f"`{word}`" for word in refused_in(cls)]
     if refused:
         yield f"Part of the format, but not supported yet, so refused: {', '.join(refused)}.\n"
-
-
-def _refused(cls: type) -> Iterator[str]:
-    yield from getattr(cls, "not_yet", ())
-    for name, (field, _) in declared(cls).items():
-        match field.kind:
-            case OneOf(not_yet=words):
-                yield from (f"{name}: {{type: {word}}}" for word in words)
-            case Choice(not_yet=words):
-                yield from (f"{name}: {word}" for word in words)
-            case Record(inner) | Items(Record(inner)) | Pair(Record(inner)):
-                yield from (f"{name}.{word}" for word in _refused(inner))
 
 
 def _summary(cls: type) -> str:
@@ -110,66 +81,19 @@ def _summary(cls: type) -> str:
 
 def _fields(cls: type, prefix: str) -> Iterator[Row | Choices]:
     for name, (field, default) in declared(cls).items():
-        key = f"{prefix}{name}"
-        yield Row(key, _value(field), _default(default), field.doc)
-        match field.kind:
-            case Record(inner) | Pair(Record(inner)):
-                yield from _fields(inner, f"{key}.")
-            case Items(Record(inner)):
-                yield from _fields(inner, f"{key}[].")
-            case OneOf() as kind:
-                yield Choices(key, kind)
-            case Pair(OneOf() as kind):
-                yield Choices(key, kind)
-            case Items(OneOf() as kind):
-                yield Choices(f"{key}[]", kind)
+        key = f"{prefix}{name}{field.kind.marks}"
+        yield Row(f"{prefix}{name}", _value(field), _default(default), field.doc)
+        records = field.kind.records
+        if "" in records:
+            yield from _fields(records[""], f"{key}.")
+        elif records:
+            yield Choices(key, records)
 
 
 def _value(field: Field) -> str:
-    words = _kind(field.kind)
+    words = field.kind.words
     check = field.check
     return words if check is None or check is FINITE else f"{words}; {check.requirement}"
-
-
-def _kind(kind: Kind) -> str:
-    match kind:
-        case Number(unit):
-            return _unit(unit)
-        case Integer():
-            return "whole number"
-        case Text(identifier):
-            return "text of letters, digits, `_` and `-`" if identifier else "text"
-        case Choice(options):
-            return " or ".join(f"`{option}`" for option in options)
-        case Vector(length, unit):
-            return f"{length} numbers, {_unit(unit)}"
-        case Interval(unit, one_sided):
-            alone = "upper" if one_sided else "-x to x"
-            return f"[lower, upper], or one number x ({alone}), {_unit(unit)}"
-        case PerJoint(unit):
-            return f"per joint, {_unit(unit)}"
-        case TableFile(columns):
-            return f"CSV file with the columns {', '.join(f'`{column}`' for column in columns)}"
-    return _nested(kind)
-
-
-def _nested(kind: Kind) -> str:
-    match kind:
-        case Record():
-            return "mapping"
-        case OneOf(variants):
-            return f"mapping; `type`: {' or '.join(f'`{name}`' for name in variants)}"
-        case Pair(item):
-            return f"{_kind(item)}; or a list of two"
-        case Items(Record() | OneOf()):
-            return "list"
-        case Items(item):
-            return f"list, each {_kind(item)}"
-    raise TypeError(f"no words for the kind {kind}")
-
-
-def _unit(unit: Quantity) -> str:
-    return "number" if unit == DIMENSIONLESS else str(unit)
 
 
 def _default(default: Any) -> str:

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from vsacli.base.errors import InputError
-from vsacli.documents.problems import Problems
+from vsacli.documents.source import Problems
 from vsacli.documents.tree import Mapping, Scalar, Sequence
 from vsacli.documents.yaml_tree import MAX_LEVELS, MAX_NODES, parse_yaml
 

@@ -24,8 +24,8 @@ from vsacli.base.units import POSITION
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import number
 from vsacli.documents.source import Source
+from vsacli.results.store.layout import resolve
 from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.resolved import resolve
 from vsacli.results.store.writer import ResultWriter
 
 SAMPLES = 250

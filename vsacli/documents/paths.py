@@ -13,21 +13,11 @@ from typing import Any, NamedTuple, TypeVar
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.documents import tree
-from vsacli.documents.fields import (
-    Interval,
-    Items,
-    Kind,
-    Number,
-    OneOf,
-    Pair,
-    PerJoint,
-    Record,
-    Vector,
-    declared,
-)
-from vsacli.documents.problems import Problems
-from vsacli.documents.reading import read_value
-from vsacli.documents.values import Scope
+from vsacli.documents.kinds.lists import Pair
+from vsacli.documents.kinds.nested import scope_inside
+from vsacli.documents.records import Kind, declared
+from vsacli.documents.source import Problems
+from vsacli.documents.tree import Scope
 
 ALL = "*"
 SIDES = ("0", "1")
@@ -142,7 +132,7 @@ class _Replacement(NamedTuple):
         if word not in fields:
             raise _nowhere(word, fields, place)
         kind = fields[word][0].kind
-        inside = self._replace(scope=self.scope.inside(type(record), _written(record)))
+        inside = self._replace(scope=scope_inside(self.scope, type(record), _written(record)))
         content = inside.in_value(kind, getattr(record, word), rest, (*place, word))
         try:
             return dataclasses.replace(record, **{word: content})
@@ -156,26 +146,20 @@ class _Replacement(NamedTuple):
             return self._read(kind, place)
         if content is None:
             raise InputError.one(f"there is nothing at {_joined(place)}; replace it as a whole")
-        match kind:
-            case OneOf() if words == ["type"]:
-                reason = f"decides which keys stand beside it; replace {_joined(place)} as a whole"
-                raise InputError.one(f"{_joined(place)}.type: {reason}")
-            case Record() | OneOf():
-                return self.in_record(content, words, place)
-            case Pair(item):
-                return self._in_pair(item, content, words, place)
-            case Items(item):
-                names = [getattr(entry, "name", "") for entry in content]
-                return self._in_list(item, names, content, words, place)
-            case Vector(unit=unit) | Interval(unit=unit):
-                return self._in_list(Number(unit), [""] * len(content), content, words, place)
-            case PerJoint(unit):
-                return self._in_list(Number(unit), list(self.scope.members), content, words, place)
+        if isinstance(kind, Pair) and words[0] not in SIDES:
+            return self._in_pair(kind, content, words, place)
+        if kind.each is not None:
+            return self._in_list(kind, kind.each, content, words, place)
+        if words == ["type"] and "" not in kind.records:
+            reason = f"decides which keys stand beside it; replace {_joined(place)} as a whole"
+            raise InputError.one(f"{_joined(place)}.type: {reason}")
+        if kind.records:
+            return self.in_record(content, words, place)
         raise _nowhere(words[0], (), place)
 
     def _read(self, kind: Kind, place: tuple[str, ...]) -> Any:
         label, problems = _joined(place), Problems("")
-        content = read_value(kind, self.node, label, self.scope._replace(problems=problems))
+        content = kind.read(self.node, label, self.scope._replace(problems=problems))
         try:
             problems.check()
         except InputError as error:
@@ -183,31 +167,29 @@ class _Replacement(NamedTuple):
             raise InputError(Problem("", 0, f"{label}: {message}") for message in messages) from None
         return content
 
-    def _in_pair(self, item: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    def _in_pair(self, kind: Pair, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Both sides of a joint; where they are the same they stay one."""
         word, *rest = words
-        if word not in SIDES and _same(*content):
-            both = self.in_value(item, content[0], rest if word == ALL else words, place)
+        if _same(*content):
+            both = self.in_value(kind.item, content[0], rest if word == ALL else words, place)
             return both, both
-        if word not in (*SIDES, ALL):
+        if word != ALL:
             choices = f"0, 1 or {ALL}, as in {_joined((*place, '0', *words))}"
             raise InputError.one(f"{_joined(place)}: its two sides differ; say which by {choices}")
-        return self._in_list(item, ["", ""], content, words, place)
+        return self._in_list(kind, kind.item, content, words, place)
 
-    def _in_list(
-        self, item: Kind, names: list[str], content: Any, words: list[str], place: tuple[str, ...]
-    ) -> Any:
+    def _in_list(self, kind: Kind, each: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """The entry of a list that a word names, or all of them."""
         word, *rest = words
+        names = kind.names(content, self.scope.members)
         indices = _indices(names)
         if word != ALL and word not in indices:
             raise _nowhere(word, indices, place)
         entries = list(content)
         for index in range(len(entries)) if word == ALL else [indices[word]]:
             inside = self._replace(scope=self.scope.of_member(names[index]))
-            entries[index] = inside.in_value(
-                item, content[index], rest, (*place, str(index) if word == ALL else word)
-            )
+            here = (*place, str(index) if word == ALL else word)
+            entries[index] = inside.in_value(each, content[index], rest, here)
         return tuple(entries)
 
 

@@ -1,4 +1,4 @@
-"""Input files as they were read, kept for the provenance of a result."""
+"""Input files: as they were read, for the provenance of a result, and everything that is wrong with them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from vsacli.base.did_you_mean import nearest
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, Problem
 
 MAX_DOCUMENT_BYTES = 1_000_000
 """Size up to which a text document is read, and up to which the text of any input is kept."""
 
+
+MAX_PROBLEMS = 50
+"""A document with more problems is given up on: the reader would drown, and so would the user."""
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """How an HDF5 file begins, which is what results are."""
@@ -118,3 +121,49 @@ def _sibling(name: str) -> str:
 
 def _too_large(name: str, size: int, max_bytes: int) -> InputError:
     return InputError.one(f"the file has {size:,} bytes, more than the {max_bytes:,} allowed here", name)
+
+
+class Problems:
+    """What is wrong with one file.
+
+    Every problem of a document is added here while reading goes on; `check` raises them all.
+    """
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self._found: list[Problem] = []
+
+    def add(self, line: int, message: str) -> None:
+        """Note a problem.
+
+        Raises:
+            InputError: there are now more than MAX_PROBLEMS.
+        """
+        if len(self._found) == MAX_PROBLEMS:
+            self._found.append(
+                Problem(self.file, line, f"more than {MAX_PROBLEMS} problems; reading stopped here")
+            )
+            self.check()
+        self._found.append(Problem(self.file, line, message))
+
+    def include(self, error: InputError) -> None:
+        """Note the problems of another file that this one names."""
+        self._found.extend(error.problems)
+
+    def fail(self, line: int, message: str) -> NoReturn:
+        """Raise everything found so far and this problem, behind which nothing can be read."""
+        raise InputError(self._in_order(Problem(self.file, line, message)))
+
+    def check(self) -> None:
+        """Raise what was found.
+
+        Raises:
+            InputError: with every problem once, in the order of the lines.
+        """
+        if self._found:
+            raise InputError(self._in_order())
+
+    def _in_order(self, *last: Problem) -> list[Problem]:
+        return sorted(
+            dict.fromkeys([*self._found, *last]), key=lambda problem: (problem.file != self.file, problem)
+        )

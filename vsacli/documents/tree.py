@@ -1,9 +1,13 @@
-"""The tree of a document: texts, lists and mappings, each with the line it stands on."""
+"""The tree of a document: texts, lists and mappings, each with its line; what their meaning depends on."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from collections.abc import Mapping as AbstractMapping
-from typing import NamedTuple, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
+
+from vsacli.base.units import Quantity
+from vsacli.documents.source import Problems
 
 MAX_SHOWN = 40
 
@@ -52,3 +56,44 @@ class Mapping(NamedTuple):
 
 Node: TypeAlias = Scalar | Sequence | Mapping
 """Each prints as what was found, for "expected ..., found ...". Nodes behind aliases are shared."""
+
+INVALID: Final = object()
+"""In place of a value that cannot be used; its problem is noted already."""
+
+
+class Scope(NamedTuple):
+    """What the meaning of a value depends on besides its own text.
+
+    Attributes:
+        problems: receives everything that is wrong.
+        members: name and unit variant of every joint, for PerJoint values.
+        exempt: for a purpose of PerJoint values the joints that have none, each with the reason.
+        variant: the choice on which units depend here, None while it is unknown.
+        survey: collects the quantity and the node of each PerJoint value, which is then not read; None to
+            read them.
+    """
+
+    problems: Problems
+    members: AbstractMapping[str, str]
+    exempt: AbstractMapping[str, AbstractMapping[str, str]]
+    variant: str | None = None
+    survey: list[tuple[Quantity, Node]] | None = None
+
+    def unit(self, quantity: Quantity) -> str:
+        """Unit of a quantity here; an unknown variant is a problem of its own and must not make others."""
+        return quantity.unit(self.variant or "revolute")
+
+    def of_member(self, name: str) -> Scope:
+        """The scope of the value of one joint; the same if none is called so."""
+        return self._replace(variant=self.members.get(name, self.variant))
+
+    def unexpected(self, node: Node, expected: str, label: str, reason: str = "") -> Any:
+        """Note that something else was found, and return INVALID."""
+        self.problems.add(node.line, f"{label}: expected {expected}, found {node}{reason}")
+        return INVALID
+
+
+def all_valid(values: Iterable[Any]) -> Any:
+    """The values as a tuple, or INVALID if one is; each is read, so each problem is noted."""
+    everything = tuple(values)
+    return INVALID if INVALID in everything else everything

@@ -11,7 +11,7 @@ from typing import NamedTuple, NoReturn, TypeAlias
 
 import yaml
 
-from vsacli.documents.problems import Problems
+from vsacli.documents.source import Problems
 from vsacli.documents.tree import Mapping, Node, Scalar, Sequence
 
 MAX_LEVELS = 20

@@ -16,8 +16,7 @@ from vsacli.base.errors import InputError
 from vsacli.control import poles
 from vsacli.documents import tree
 from vsacli.documents.json_schema import json_schema
-from vsacli.documents.problems import Problems
-from vsacli.documents.source import HDF5_SIGNATURE, check_input_file, read_source
+from vsacli.documents.source import HDF5_SIGNATURE, Problems, check_input_file, read_source
 from vsacli.documents.yaml_tree import parse_yaml
 from vsacli.robot import file as robot_file
 from vsacli.trajectory import file as trajectory_file

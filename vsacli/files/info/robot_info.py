@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.documents.fields import declared
 from vsacli.files.info.extremes import Extremes, free_range, largest_sizes, unlimited
-from vsacli.files.info.record import plain
 from vsacli.robot.kinematics import base_gravity, frames, tip_position
 from vsacli.robot.model import Joint, Robot
 
@@ -28,12 +28,20 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     """
     return {
         "kind": "robot",
-        **plain(robot),
+        **_plain(robot),
         "mass": sum(joint.link.mass for joint in robot.joints),
         "reach": _described_reach(robot),
         "joints": _joints(robot),
         "held_at_zero": held_at_zero(robot),
         "warnings": list(robot.warnings),
+    }
+
+
+def _plain(record: Any) -> dict[str, Any]:
+    """The declared fields of a record."""
+    return {
+        name: None if (content := getattr(record, name)) is None else field.kind.plain(content, _plain)
+        for name, (field, _) in declared(type(record)).items()
     }
 
 
@@ -52,7 +60,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
     values = np.where(loads.values <= least, 0.0, loads.values)
     return [
         {
-            **plain(joint),
+            **_plain(joint),
             "static_load": {"torque": float(value), "at": configuration.tolist()},
             "stiffness_range": stiffness_ranges(joint, float(value)),
         }

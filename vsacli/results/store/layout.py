@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 import math
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
+from typing import Any
 
 import h5py
 import numpy as np
 
 from vsacli import __version__
+from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.base.wrench import WRENCH_AXES
+from vsacli.documents.arrays import ResolvedField
+from vsacli.documents.fields import declared
 from vsacli.documents.source import Source
-from vsacli.results.store.resolved import LABELS, ResolvedField, resolve
 from vsacli.results.store.schema import (
     TEXT,
     chunk_rows,
@@ -28,6 +31,9 @@ from vsacli.results.store.schema import (
 )
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
+
+LABELS = {"axis": ("x", "y", "z"), "bound": ("lower", "upper")}
+"""Dimensions that only the robot's arrays have."""
 
 GZIP_LEVEL = 4
 
@@ -150,6 +156,20 @@ def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5p
         name = "_".join(field.path[1:] if of_joints else field.path)
         dataset = _write_field(joints if of_joints else group, name, field, robot.joint_types)
         _attach_scales(dataset, [scales[dim] for dim in field.dims])
+
+
+def resolve(robot: Robot) -> list[ResolvedField]:
+    """Every declared field of a robot, defaults included, in SI units, motors as they act on their joint."""
+    return list(_resolved(robot))
+
+
+def _resolved(record: Any) -> Iterator[ResolvedField]:
+    record = record.at_joint if isinstance(record, Motor) else record
+    for name, (field, _) in declared(type(record)).items():
+        content = getattr(record, name)
+        if content is not None:
+            for part in field.kind.arrays(content, _resolved):
+                yield part._replace(path=(name, *part.path), doc=part.doc or field.doc)
 
 
 def _write_field(

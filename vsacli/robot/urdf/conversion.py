@@ -14,7 +14,7 @@ from vsacli.actuators import ACTUATORS
 from vsacli.actuators.actuator import Placeholders
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError
-from vsacli.documents.problems import Problems
+from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
 from vsacli.robot.model import UNBOUNDED, DenavitHartenberg, Inertia, Joint, Limits, Link, Pose, Robot
 from vsacli.robot.urdf.dh import SNAP_ANGLE, Frames, Snap, dh_frames, tidy, tidy_angle

@@ -11,8 +11,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
-from vsacli.documents.problems import Problems
-from vsacli.documents.source import read_source
+from vsacli.documents.source import Problems, read_source
 from vsacli.documents.tree import quoted
 from vsacli.robot.urdf.link_tree import MOVING, TYPES, Urdf, UrdfJoint, UrdfLimit, UrdfLink, below
 from vsacli.robot.urdf.rigid_motion import Body, pose_matrix

@@ -15,7 +15,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.documents.problems import Problems
+from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
 from vsacli.robot.urdf.link_tree import MOVING, ROTATING, Urdf, UrdfJoint, UrdfLink, below
 from vsacli.robot.urdf.rigid_motion import Body, inverse, welded

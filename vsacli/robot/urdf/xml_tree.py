@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from vsacli.documents.problems import Problems
+from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
 
 MAX_LEVELS = 100

@@ -1,0 +1,1 @@
+"""Kinds of declared values, with all that is done with each: reading, checks, schema, lines, arrays."""
