@@ -22,11 +22,15 @@ def _interrupts() -> None:
 
 
 @pytest.fixture
-def vsacli(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> Callable[..., Outcome]:
-    """Run a command line in `tmp_path`, as the command `vsacli` does."""
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """`tmp_path`, in which the test runs."""
     monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def vsacli(own_folder: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:  # noqa: ARG001
+    """Run a command line in `own_folder`, as the command `vsacli` does."""
 
     def run_in_folder(*arguments: object) -> Outcome:
         capsys.readouterr()

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from samples.command_line import REPOSITORY
+from samples.shipped import shipped_robot
 
-from vsacli import load_robot
 from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.choice import TRACE_FROM
 from vsacli.compute.engine.engines import TracedEngine, kernel_program
@@ -17,10 +16,6 @@ from vsacli.robot.model import Robot
 
 CLOSED = ("vsa_3r", "lwr_7r_vsa", "rp_2", "mixed_3r", "tendon_1r", "qbmove_arm_gazebo")
 """Robots whose springs need no iteration."""
-
-
-def robot_named(name: str) -> Robot:
-    return load_robot(REPOSITORY / "robots" / f"{name}.yaml")
 
 
 def demands(robot: Robot, samples: int) -> list[np.ndarray]:
@@ -34,7 +29,7 @@ def demands(robot: Robot, samples: int) -> list[np.ndarray]:
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_inverse_dynamics_to_the_last_bit(name):
-    robot = robot_named(name)
+    robot = shipped_robot(name)
     kernel, rows = InverseDynamics(robot), demands(robot, 5000)
     expected, found = NUMPY.run(kernel, rows), TracedEngine().run(kernel, rows)
     assert np.isnan(expected).any()  # infeasible steps, or variables that an actuator does not have
@@ -42,7 +37,7 @@ def test_inverse_dynamics_to_the_last_bit(name):
 
 
 def test_any_number_of_samples_at_a_time():
-    robot = robot_named("vsa_3r")
+    robot = shipped_robot("vsa_3r")
     kernel, rows = LinkTorques(robot), demands(robot, 9000)[:15]
     expected = NUMPY.run(kernel, rows)
     engine = TracedEngine()
@@ -52,14 +47,14 @@ def test_any_number_of_samples_at_a_time():
 
 
 def test_rows_are_used_again():
-    program = kernel_program(LinkTorques(robot_named("lwr_7r_vsa")))
+    program = kernel_program(LinkTorques(shipped_robot("lwr_7r_vsa")))
     function = RowFunction(program)
     # The forward pass leaves some thirty numbers a joint for the backward pass, and the rest is short-lived.
     assert sum(function.rows.values()) < len(program.operations) / 10
 
 
 def test_a_kernel_with_loops_runs_as_it_is():
-    robot = robot_named("measured_1r")
+    robot = shipped_robot("measured_1r")
     kernel, rows = InverseDynamics(robot), demands(robot, 50)
     with pytest.raises(NotImplementedError, match="has no form on rows"):
         RowFunction(kernel_program(kernel))
@@ -67,6 +62,6 @@ def test_a_kernel_with_loops_runs_as_it_is():
 
 
 def test_tracing_has_to_repay():
-    kernel = LinkTorques(robot_named("vsa_3r"))
+    kernel = LinkTorques(shipped_robot("vsa_3r"))
     assert choose("numpy", kernel, TRACE_FROM - 1).engine is NUMPY
     assert isinstance(choose("numpy", kernel, TRACE_FROM).engine, TracedEngine)

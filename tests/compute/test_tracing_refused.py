@@ -6,9 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from samples.codegen import commands, motion_of, shipped
+from samples.codegen import commands, motion_of
 from samples.drives import joint_with, springs, with_joint
 from samples.marks import needs_compiler
+from samples.shipped import shipped_robot
 
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.law import SpringLaw
@@ -37,7 +38,7 @@ class Masked(Cubic):
 @pytest.fixture
 def robot() -> Robot:
     masked = Masked(k=400, k_c=2000)
-    return with_joint(shipped("vsa_3r"), 1, joint_with(springs(masked, masked)))
+    return with_joint(shipped_robot("vsa_3r"), 1, joint_with(springs(masked, masked)))
 
 
 REASON = "what is known only when the program runs cannot decide what is recorded"

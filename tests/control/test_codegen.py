@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from samples.codegen import clear, commands, motion_of, shipped, with_springs
+from samples.codegen import clear, commands, motion_of, with_springs
 from samples.generated_code import STRICT, compile_c, compiled_robot, write_files
 from samples.marks import COMPILERS, needs, needs_compiler, slow, slow_but
 from samples.robots import random_robot
+from samples.shipped import shipped_robot
 from samples.springs import SPRINGS
 
 from vsacli.base.flags import Flag
@@ -24,9 +25,9 @@ from vsacli.robot.model import Robot
 
 ROBOTS: dict[str, Robot] = {
     "one joint": random_robot("R", seed=1),
-    "3R": shipped("vsa_3r"),
-    "prismatic": shipped("rp_2"),
-    "mixed": shipped("mixed_3r"),
+    "3R": shipped_robot("vsa_3r"),
+    "prismatic": shipped_robot("rp_2"),
+    "mixed": shipped_robot("mixed_3r"),
     **{law: with_springs(law) for law in SPRINGS},
 }
 
@@ -206,7 +207,7 @@ Springs whose stiffness grows tenfold over their range multiply what rounding do
 @needs_compiler
 @pytest.mark.parametrize("name", slow_but({"rp_2"}, FLOAT_BOUND))
 def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
-    robot = shipped(name)
+    robot = shipped_robot(name)
     function, command = inverse_dynamics_function(robot), commands(robot, 200, seed=9)
     command = {key: values.astype(np.float32).astype(float) for key, values in command.items()}
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "float")(function, command)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from samples.codegen import CLOSE, clear, commands, motion_of, shipped, with_springs
+from samples.codegen import CLOSE, clear, commands, motion_of, with_springs
 from samples.generated_code import compiled_robot
 from samples.marks import needs_compiler, slow, slow_but
 from samples.plants import all_rigid, elastic, random_state, with_actuators
 from samples.robots import random_robot
+from samples.shipped import shipped_robot
 from samples.springs import SPRINGS
 
 from vsacli.base.arrays import FloatArray
@@ -67,11 +68,11 @@ def test_inverse_dynamics_with_springs_of_each_law(law: str, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "mixed_3r", slow("lwr_7r_vsa"), "tendon_1r"])
 def test_inverse_dynamics_of_arms(name: str, tmp_path: Path) -> None:
-    check_inverse_dynamics(shipped(name), tmp_path)
+    check_inverse_dynamics(shipped_robot(name), tmp_path)
 
 
 def test_border_steps_are_singular_or_nearly_so(tmp_path: Path) -> None:
-    block = check_inverse_dynamics(shipped("vsa_3r"), tmp_path)
+    block = check_inverse_dynamics(shipped_robot("vsa_3r"), tmp_path)
     assert np.all(block.flags[:2] & Flag.SINGULAR)
     assert np.all(block.flags[4:6] & Flag.NEAR_SINGULAR)
     assert np.isnan(block.tau_motor[0]).all()
@@ -80,7 +81,7 @@ def test_border_steps_are_singular_or_nearly_so(tmp_path: Path) -> None:
 
 def test_inverse_dynamics_of_what_is_no_number(tmp_path: Path) -> None:
     """A sensor that fails must not look like a torque."""
-    robot = shipped("vsa_3r")
+    robot = shipped_robot("vsa_3r")
     function, command = inverse_dynamics_function(robot), commands(robot, 8, seed=4)
     command["q"][:, 2] = [np.nan, np.inf, -np.inf, 1e300, -1e300, np.nan, 0, 0]
     command["stiffness"][6:, 2] = np.nan, np.inf
@@ -143,8 +144,8 @@ def call(
 
 
 CONTROLLED = {
-    "antagonistic": (shipped("vsa_3r"), 4),
-    "prismatic": (shipped("rp_2"), 4),
+    "antagonistic": (shipped_robot("vsa_3r"), 4),
+    "prismatic": (shipped_robot("rp_2"), 4),
     "sinh": (with_springs("sinh"), 4),
     "elastic among antagonistic": (with_actuators(random_robot("RPR", 4), {1: elastic()}), 4),
     "rigid": (all_rigid("RPR", 5), 2),
@@ -169,7 +170,7 @@ def test_feedback_linearization(name: str, tmp_path: Path) -> None:
 
 def test_a_singular_joint_is_flagged_and_the_others_are_not(tmp_path: Path) -> None:
     """Springs alike and deflected alike: det A is zero."""
-    robot = shipped("vsa_3r")
+    robot = shipped_robot("vsa_3r")
     state, *others = loop_inputs(robot, 4)
     state.theta[:, 1] = state.q[:, 1, None] + 0.1
     found, returned = call(robot, tmp_path, state, *others)

@@ -13,14 +13,11 @@ from vsacli.documents.source import HDF5_SIGNATURE, MAX_DOCUMENT_BYTES, check_in
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 ROOT = Path(__file__).parents[2]
 EXAMPLE = (ROOT / "robots" / "rp_2.yaml").read_text()
 TRAJECTORY = (ROOT / "trajectories" / "rp_2.yaml").read_text()
-
-
-@pytest.fixture(autouse=True)
-def _in_own_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
 
 
 def only_problem(path):

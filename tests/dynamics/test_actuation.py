@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from oracles.scalar_vsa import Actuation, Curve, Side, actuation
 from samples.marks import slow_but
+from samples.shipped import shipped_run
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
+from vsacli import inverse_dynamics
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
@@ -41,14 +42,9 @@ AGREEMENT = 1e-9
 """Of a variable's peak: what is asked for. The margins stay above 1 %, where eps/margin is 2e-14."""
 
 
-def example(robot: str, trajectory: str) -> tuple[Robot, Trajectory]:
-    loaded = load_robot(ROOT / "robots" / f"{robot}.yaml")
-    return loaded, load_trajectory(ROOT / "trajectories" / f"{trajectory}.yaml", loaded)
-
-
 def unlike(preloads: tuple[str, ...]) -> tuple[Robot, Trajectory]:
     """The 3R arm with springs and motors that differ between the sides, more from joint to joint."""
-    robot, trajectory = example("vsa_3r", "rest_to_rest")
+    robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
     actuators = [
         Antagonistic(
             motor=(Motor(inertia=3.2, damping=0.1), Motor(inertia=2.5 - 0.5 * index, damping=0.3)),
@@ -65,10 +61,10 @@ def unlike(preloads: tuple[str, ...]) -> tuple[Robot, Trajectory]:
 
 
 CASES = {
-    "3R": lambda: example("vsa_3r", "rest_to_rest"),
-    "3R soft": lambda: example("vsa_3r", "rest_to_rest_soft"),
-    "7R": lambda: example("lwr_7r_vsa", "lwr_7r"),
-    "R-P": lambda: example("rp_2", "rp_2"),
+    "3R": lambda: shipped_run("vsa_3r", "rest_to_rest"),
+    "3R soft": lambda: shipped_run("vsa_3r", "rest_to_rest_soft"),
+    "7R": lambda: shipped_run("lwr_7r_vsa", "lwr_7r"),
+    "R-P": lambda: shipped_run("rp_2", "rp_2"),
     "sides differ": lambda: unlike(("positive", "positive", "positive")),
     "preload negative": lambda: unlike(("negative", "positive", "negative")),
 }
@@ -123,7 +119,7 @@ def test_preload_selects_the_side_that_is_stretched():
 
 
 def test_opposite_preload_of_alike_sides_swaps_the_motors():
-    robot, trajectory = example("vsa_3r", "rest_to_rest")
+    robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
     joints = tuple(
         dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, preload="negative"))
         for joint in robot.joints

@@ -13,10 +13,11 @@ from oracles.lagrange import chain_of
 from samples.drives import motion
 from samples.plants import all_rigid, elastic, rigid, with_actuators
 from samples.robots import random_robot, vsa_3r, with_gravity
+from samples.shipped import shipped_run
 from samples.simulated import short_motion
 from scipy.interpolate import make_interp_spline
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
+from vsacli import inverse_dynamics
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.analysis.result import Result
 from vsacli.analysis.run import Run
@@ -32,11 +33,6 @@ ROUNDING = 1e-8
 """Of the largest energy: Hermite's rule at 1 kHz leaves about 1e-10, rounding of 1000 terms less."""
 
 
-def shipped(robot: str, trajectory: str) -> tuple[Robot, Trajectory]:
-    loaded = load_robot(REPOSITORY / "robots" / f"{robot}.yaml")
-    return loaded, load_trajectory(REPOSITORY / "trajectories" / f"{trajectory}.yaml", loaded)
-
-
 def stiff(robot: Robot, wrench: str | None = None) -> tuple[Robot, Trajectory]:
     """Stiff enough for random links."""
     return robot, short_motion(len(robot.joints), rate=1000, stiffness=(1900, 2100), wrench=wrench)
@@ -48,10 +44,10 @@ def mixed(types: str, seed: int) -> Robot:
 
 
 CASES = {
-    "3R": lambda: shipped("vsa_3r", "rest_to_rest"),
-    "arm with a slide": lambda: shipped("rp_2", "rp_2"),
-    "7R": lambda: shipped("lwr_7r_vsa", "lwr_7r"),
-    "tendons": lambda: shipped("tendon_1r", "tendon_1r"),
+    "3R": lambda: shipped_run("vsa_3r", "rest_to_rest"),
+    "arm with a slide": lambda: shipped_run("rp_2", "rp_2"),
+    "7R": lambda: shipped_run("lwr_7r_vsa", "lwr_7r"),
+    "tendons": lambda: shipped_run("tendon_1r", "tendon_1r"),
     "damped RPR": lambda: stiff(random_robot("RPR", seed=3)),
     "mixed": lambda: stiff(mixed("RPR", seed=5)),
     "rigid": lambda: stiff(all_rigid("RP", seed=4)),
@@ -196,7 +192,7 @@ def test_holding_still_costs_torque_but_no_work():
 
 
 def test_squared_torques_split_into_load_and_co_contraction():
-    robot, trajectory = shipped("vsa_3r", "rest_to_rest")
+    robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
     result = inverse_dynamics(robot, trajectory)
     squared = integral(result.time, (result.tau_spring**2).sum(axis=2))[-1]
     between = integral(result.time, np.diff(result.tau_spring, axis=2)[..., 0] ** 2 / 2)[-1]
@@ -207,7 +203,7 @@ def test_squared_torques_split_into_load_and_co_contraction():
 
 
 def test_what_is_spent_less_what_is_recovered_is_the_work():
-    result = inverse_dynamics(*shipped("mixed_3r", "mixed_3r"))
+    result = inverse_dynamics(*shipped_run("mixed_3r", "mixed_3r"))
     for index, joint in enumerate(result.report.joints):
         work = np.nansum(result.motor_energy[-1, index])
         assert joint.energy.spent - joint.energy.recovered == pytest.approx(work, abs=1e-10)

@@ -8,10 +8,10 @@ from samples.deflections import (
     ARM,
     COARSE,
     drifts,
-    example,
     integrated,
     motion,
 )
+from samples.shipped import shipped_run
 
 from vsacli import inverse_dynamics
 
@@ -48,7 +48,7 @@ def test_report_as_json():
 
 
 def test_drift_of_a_sliding_joint_is_in_metres():
-    robot, trajectory = example("rp_2", "rp_2")
+    robot, trajectory = shipped_run("rp_2", "rp_2")
     assert [drift.unit for drift in integrated(robot, trajectory, COARSE).report.drifts] == ["rad", "m"]
 
 

@@ -13,6 +13,7 @@ from oracles import pinocchio
 from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
 from samples.robots import at_rest, random_motion
+from samples.shipped import shipped_robot
 
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
@@ -31,11 +32,6 @@ PANDA_JOINTS = [f"panda_joint{number}" for number in range(1, 8)]
 UR_JOINTS = [
     f"{name}_joint" for name in ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 ]
-
-
-def shipped(name: str) -> Robot:
-    [example] = examples([name])
-    return example.robot
 
 
 def static_load(robot: Robot, *q: float) -> FloatArray:
@@ -75,12 +71,12 @@ def test_the_static_load_of_the_puma_is_the_published_one(
     pose: tuple[float, ...], torques: tuple[float, ...]
 ):
     """As the Robotics Toolbox computes it (P. Corke, Robotics, Vision and Control, 2011)."""
-    assert static_load(shipped("puma_560"), *pose) == pytest.approx(torques, abs=PRINTED)
+    assert static_load(shipped_robot("puma_560"), *pose) == pytest.approx(torques, abs=PRINTED)
 
 
 def test_the_mass_matrix_of_the_puma_with_its_rotors_is_the_published_one():
     """At the nominal pose, as printed in P. Corke, Robotics, Vision and Control, 2011."""
-    robot = shipped("puma_560")
+    robot = shipped_robot("puma_560")
     drivetrain = Drivetrain(robot.actuators)
     rotors = np.array([drivetrain.inertia[drivetrain.joint == joint][0] for joint in range(6)])
     q = np.array([0, math.pi / 4, math.pi, 0, math.pi / 4, 0])
@@ -98,7 +94,7 @@ def test_the_mass_matrix_of_the_puma_with_its_rotors_is_the_published_one():
 
 def test_the_planar_arm_obeys_the_equations_of_the_textbook():
     """Siciliano et al. (2009), section 7.3.2, but for the rotors, and with two motors of 5 kg at joint 2."""
-    robot = shipped("planar_2r")
+    robot = shipped_robot("planar_2r")
     q, dq, ddq, *_ = motion = random_motion(robot, 20, seed=7)
     length, middle, mass, inertia, motors, g = 1.0, 0.5, 50.0, 10.0, 10.0, 9.81
     (c1, c2), c12, s2 = np.cos(q).T, np.cos(q.sum(axis=1)), np.sin(q[:, 1])
@@ -129,7 +125,7 @@ def test_the_panda_is_that_of_its_robot_description(tmp_path: Path):
             root.remove(element)
     document.write(tmp_path / "arm.urdf")
     oracle = UrdfOracle(tmp_path / "arm.urdf")
-    robot = shipped("panda_7r")
+    robot = shipped_robot("panda_7r")
     motion = random_motion(robot, 10, seed=2)
     poses = [tool_pose(robot, q).real for q in motion[0]]
     expected = [oracle.tip_pose(PANDA_JOINTS, "panda_link0", "panda_link8", q) for q in motion[0]]
@@ -141,7 +137,7 @@ def test_the_panda_is_that_of_its_robot_description(tmp_path: Path):
 
 def test_the_ur5_has_the_kinematics_of_its_robot_description():
     oracle = UrdfOracle(urdf("ur_description", "ur5_robot.urdf"))
-    robot = shipped("ur5_6r")
+    robot = shipped_robot("ur5_6r")
     for q in random_motion(robot, 10, seed=2)[0]:
         # The description prints some right angles with nine decimals.
         expected = oracle.tip_pose(UR_JOINTS, "base", "tool0", q)
@@ -150,7 +146,7 @@ def test_the_ur5_has_the_kinematics_of_its_robot_description():
 
 def test_the_slide_of_the_scara_points_down_and_carries_its_load():
     """1.2 kg and 0.8 kg hang from the screw, wherever the arm stands; nothing else feels their weight."""
-    robot = shipped("scara_4")
+    robot = shipped_robot("scara_4")
     q = (0.3, -1.1, 0.12, 2.0)
     assert static_load(robot, *q) == pytest.approx([0, 0, -2.0 * 9.81, 0], abs=1e-12)  # rounding of 20 N
     tip = tool_pose(robot, np.array(q)).real

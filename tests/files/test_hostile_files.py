@@ -20,6 +20,8 @@ from vsacli.files.info.text import render
 from vsacli.files.validation import check_files
 from vsacli.robot.urdf.reader import read_urdf
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 TIMES = np.linspace(0, 1, 12)
 RECORDING = "time,base.q,shoulder.q,elbow.q,base.stiffness,shoulder.stiffness,elbow.stiffness\n" + "".join(
     f"{t:.4g},{np.sin(t):.6g},{t * t:.6g},0.5,1000,{1000 + t:.6g},1000\n" for t in TIMES
@@ -38,11 +40,6 @@ URDF = """<robot name="arm">
 TRAJECTORIES = sorted((REPOSITORY / "trajectories").glob("*.yaml"))
 LONGEST = 10_000
 """Characters of all messages on one small file."""
-
-
-@pytest.fixture(autouse=True)
-def _in_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def look_at(name: str, text: str) -> None:

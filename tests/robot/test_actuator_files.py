@@ -20,6 +20,8 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 ROOT = Path(__file__).parents[2]
 ROBOT = ROOT / "robots" / "mixed_3r.yaml"
 TRAJECTORY = ROOT / "trajectories" / "mixed_3r.yaml"
@@ -37,11 +39,6 @@ ELASTIC = "{type: elastic, motor: {inertia: 3, max_torque: 50}, stiffness: 1e3}"
 ANTAGONISTIC = "{type: antagonistic, motor: {inertia: 3}, spring: {type: cubic, k: 400, k_c: 2000}}"
 POSITION = "position: {type: polynomial, degree: 7, start: 0, end: 0.4}\n"
 FEW = "on so few knots, derivatives are doubtful far into the record from both ends"
-
-
-@pytest.fixture(autouse=True)
-def _in_own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def robot(*actuators: str) -> Robot:

@@ -6,10 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from samples.command_line import REPOSITORY
 from samples.robots import random_robot
 from samples.springs import SPRINGS
-from vsacli import load_robot
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
@@ -41,10 +39,6 @@ def with_springs(law: str) -> Robot:
         for joint, springs in zip(robot.joints, ((one, one), (one, other)), strict=True)
     )
     return dataclasses.replace(robot, name=f"two {law}", joints=joints)
-
-
-def shipped(name: str) -> Robot:
-    return load_robot(REPOSITORY / "robots" / f"{name}.yaml")
 
 
 def commands(robot: Robot, samples: int, seed: int) -> dict[str, FloatArray]:

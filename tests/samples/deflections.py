@@ -8,10 +8,9 @@ from functools import cache
 
 import numpy as np
 
-from samples.command_line import REPOSITORY
 from samples.drives import motion as arm_motion
 from samples.robots import vsa_3r
-from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
+from vsacli import Trajectory, inverse_dynamics
 from vsacli.analysis.result import Result
 from vsacli.base.arrays import FloatArray
 from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integrate_deflections
@@ -27,11 +26,6 @@ COARSE = 1e-8
 """Tolerance where only the course of things matters, to save time."""
 
 MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "det_A")
-
-
-def example(robot: str, trajectory: str) -> tuple[Robot, Trajectory]:
-    loaded = load_robot(REPOSITORY / "robots" / f"{robot}.yaml")
-    return loaded, load_trajectory(REPOSITORY / "trajectories" / f"{trajectory}.yaml", loaded)
 
 
 def motion(

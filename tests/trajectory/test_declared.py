@@ -32,10 +32,7 @@ from samples.trajectories import (
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.base.errors import InputError
 
-
-@pytest.fixture(autouse=True)
-def _in_own_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("own_folder")
 
 
 def test_via_points_are_passed_at_their_times_and_give_the_duration():

@@ -22,10 +22,7 @@ from samples.trajectories import (
     problems,
 )
 
-
-@pytest.fixture(autouse=True)
-def _in_own_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+pytestmark = pytest.mark.usefixtures("own_folder")
 
 
 CASES = {

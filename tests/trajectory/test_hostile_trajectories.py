@@ -15,6 +15,8 @@ from vsacli import load_robot, load_trajectory
 from vsacli.base.errors import InputError
 from vsacli.trajectory.trajectory import Trajectory
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 ROBOT = load_robot(ROOT / "robots" / "vsa_3r.yaml")
 TEXTS = [
     (ROOT / "trajectories" / f"vsa_3r_{name}.yaml").read_text(encoding="utf-8")
@@ -32,11 +34,6 @@ def with_odd_numbers(draw: st.DrawFn) -> str:
         number = draw(st.sampled_from(list(NUMBER.finditer(text))))
         text = text[: number.start()] + draw(st.sampled_from(ODD)) + text[number.end() :]
     return text
-
-
-@pytest.fixture(autouse=True)
-def _in_own_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
 
 
 def loaded(name: str) -> Trajectory | None:

@@ -15,6 +15,8 @@ from vsacli.trajectory.joints import CommandedJoints
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 ROOT = Path(__file__).parents[2]
 JOINTS = CommandedJoints({"arm": "revolute", "slide": "prismatic"}, exempt={})
 TIME = np.arange(2001) / 1000
@@ -43,11 +45,6 @@ def write(path, header, *columns, separator=","):
 def robot():
     """A revolute joint `arm` and a prismatic joint `slide`."""
     return load_robot(ROOT / "robots" / "rp_2.yaml")
-
-
-@pytest.fixture(autouse=True)
-def _in_own_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])

@@ -10,6 +10,8 @@ from vsacli.base.errors import InputError
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
 
+pytestmark = pytest.mark.usefixtures("own_folder")
+
 ROOT = Path(__file__).parents[2]
 
 TEXT = """\
@@ -39,11 +41,6 @@ RECORDED_STIFFNESS = "stiffness: {type: csv, file: motion.csv}\n"
 def robot():
     """A revolute joint `arm` and a prismatic joint `slide`."""
     return load_robot(ROOT / "robots" / "rp_2.yaml")
-
-
-@pytest.fixture(autouse=True)
-def _in_own_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture
