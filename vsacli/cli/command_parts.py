@@ -160,6 +160,6 @@ def show_report(report: Report, as_json: bool, suggestions: Suggestions | None =
         extra = {} if suggestions is None else {"suggestions": suggestions.as_json()}
         click.echo(json.dumps({**report.as_json(), **extra}, indent=1))
     else:
-        extra_lines = [] if suggestions is None else suggestions.lines()
-        click.echo("\n".join([str(report), *extra_lines]))
+        texts = [str(report)] if suggestions is None else [str(report), str(suggestions)]
+        click.echo("\n".join(texts))
     return EXIT_OF_VERDICT[report.verdict]

@@ -145,9 +145,9 @@ class Suggestions(Published):
     }
 
     def __str__(self) -> str:
-        return "\n".join(self.lines())
+        return "\n".join(self._lines())
 
-    def lines(self) -> Iterator[str]:
+    def _lines(self) -> Iterator[str]:
         """One sentence for each kind, under a heading."""
         margin = f"a margin of at least {100 * self.near_singular:.6g} %"
         if self.slow_down is None:
