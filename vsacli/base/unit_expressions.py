@@ -77,11 +77,11 @@ def _parsed(text: str) -> Unit:
     Raises:
         ValueError: it stands for none.
     """
-    plain = text.translate(_SPELLINGS)
-    if len(plain) > MAX_LENGTH:
-        raise ValueError(plain)
-    tokens = _TOKENS.findall(plain)
-    if "".join(tokens) != "".join(plain.split()):
+    spelled = text.translate(_SPELLINGS)
+    if len(spelled) > MAX_LENGTH:
+        raise ValueError(spelled)
+    tokens = _TOKENS.findall(spelled)
+    if "".join(tokens) != "".join(spelled.split()):
         raise ValueError(text)
     unit = _quotient(tokens)
     if tokens:

@@ -82,9 +82,9 @@ def _safeguarded(
         halley, error, spring = _halley_step(law, torque, phi)
         low, high = np.where(error <= 0, phi, low), np.where(error >= 0, phi, high)
         inside = (halley >= low) & (halley <= high)
-        following = np.where(inside, halley, (low + high) / 2)
+        next_phi = np.where(inside, halley, (low + high) / 2)
         converged = inside & _converges(torque, error)
-        return (following, low, high, *spring.after(following - phi)), converged | ~(low < high)
+        return (next_phi, low, high, *spring.after(next_phi - phi)), converged | ~(low < high)
 
     low = np.where(np.isfinite(torque), low, np.nan)
     phi, _, _, *spring = repeat(step, (start, low, high, *[start] * 4), (torque,), MAX_HALLEY_STEPS)

@@ -175,8 +175,8 @@ def _safeguarded(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Values:
         springs = balance.state(phi_1, phi_2)
         step_1, step_2 = _newton_step(springs, springs.rho, tau_e)
         change = (np.abs(step_1) + np.abs(step_2)) / (np.abs(phi_1) + np.abs(phi_2))
-        following = np.clip(phi_1 + step_1, low_1, high_1), np.clip(phi_2 + step_2, low_2, high_2)
-        return (*following, change), ~(change > NEWTON_RTOL)
+        next_point = np.clip(phi_1 + step_1, low_1, high_1), np.clip(phi_2 + step_2, low_2, high_2)
+        return (*next_point, change), ~(change > NEWTON_RTOL)
 
     corners = look_up((*folds.phi_1, *folds.phi_2), folds.cell(tau_e))
     low_1, high_1, low_2, high_2 = box = (*_sorted(*corners[:2]), *_sorted(*corners[2:]))

@@ -151,13 +151,13 @@ def _step(balance: Balance, state: Values, constants: Values) -> tuple[Values, B
     tau_e, demand, sign, inner_stiffness, *bounds = constants
     step_1, step_2, error = third_order_step(balance.state(phi_1, phi_2), tau_e, demand, sign)
     target = phi_1 + step_1, phi_2 + step_2
-    *following, error = where_needed(
+    *next_point, error = where_needed(
         (demand == inner_stiffness) | ~_Box(*bounds).holds(*target),
         _confined_step,
         (demand, inner_stiffness, error, phi_1, phi_2, *target, *bounds),
         (*target, error),
     )
-    return (*following, error), ~(error > ERROR_RTOL)
+    return (*next_point, error), ~(error > ERROR_RTOL)
 
 
 def _confined_step(

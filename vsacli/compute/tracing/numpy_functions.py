@@ -50,8 +50,8 @@ def _one(tape: Tape, ufunc: np.ufunc, *operands: Operand) -> Operand:
     """A function of symbols or constants."""
     if not any(isinstance(operand, Symbol) for operand in operands):
         with np.errstate(all="ignore"):
-            plain: Operand = ufunc(*operands).item()
-        return plain
+            number: Operand = ufunc(*operands).item()
+        return number
     name = ufunc.__name__
     if name in _BY_OTHERS:
         return _BY_OTHERS[name](tape, *operands)

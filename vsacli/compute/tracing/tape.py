@@ -43,12 +43,12 @@ class Tape:
 
         Beyond these there are `bits(truth, mask)`, the mask where true, else 0; and `take(table, index)`.
         """
-        plain = tuple(map(_plain, operands))
-        known = folded(operation, plain)
+        arguments = tuple(map(_python_number, operands))
+        known = folded(operation, arguments)
         if known is not None:
             return known
-        common = self._symbols.get(_key(operation, plain))
-        return common or self._new(operation, plain, result_kind(operation, plain))
+        common = self._symbols.get(_key(operation, arguments))
+        return common or self._new(operation, arguments, result_kind(operation, arguments))
 
     def emit_loop(
         self, body: Program, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
@@ -84,7 +84,7 @@ class Tape:
         return without_dead_code(self._inputs, operations, outputs)
 
 
-def _plain(operand: Any) -> Any:
+def _python_number(operand: Any) -> Any:
     """Constants as Python's own numbers."""
     return operand if isinstance(operand, Symbol | Table | int) else float(operand)
 

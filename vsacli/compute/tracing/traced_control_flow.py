@@ -23,8 +23,8 @@ def repeat_traced(
     count = len(state)
 
     def body(rows: Sequence[Any]) -> Sequence[Any]:
-        following, done = step(tuple(rows[:count]), tuple(rows[count:]))
-        return [*following, done]
+        next_state, done = step(tuple(rows[:count]), tuple(rows[count:]))
+        return [*next_state, done]
 
     def loop(*entries: Operand) -> Sequence[Operand]:
         program = trace(body, list(map(kind_of, entries)))

@@ -142,7 +142,7 @@ def _all(way: Way) -> list[str]:
 
 
 def _strangers(header: Sequence[str], expected: Sequence[str], known: Collection[str]) -> Iterator[str]:
-    meant = [column for column in expected if column not in header]
+    missing = [column for column in expected if column not in header]
     for column in header:
         if column in known:
             continue
@@ -150,7 +150,7 @@ def _strangers(header: Sequence[str], expected: Sequence[str], known: Collection
         if unit is not None and unit["name"] in known:
             yield f"{column!r}: units are written in square brackets, {unit['name']} [{unit['unit']}]"
         else:
-            yield f"unknown column {column!r}{did_you_mean(column, meant)}"
+            yield f"unknown column {column!r}{did_you_mean(column, missing)}"
 
 
 def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[str]:
