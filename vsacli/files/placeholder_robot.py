@@ -15,6 +15,7 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
+from vsacli.base.signals import COMMANDED
 from vsacli.documents import tree
 from vsacli.documents.fields import IDENTIFIER
 from vsacli.documents.reading import survey_document
@@ -70,7 +71,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
 def _tables(root: tree.Mapping) -> Iterator[str]:
     """Names of the CSV files of a document, each once."""
     files = {}
-    for key in ("position", "stiffness"):
+    for key in ("position", *COMMANDED):
         match root.entries.get(key):
             case tree.Mapping(entries={"type": tree.Scalar(text="csv"), "file": tree.Scalar(text=file)}):
                 files[file] = key

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import POSITION
+from vsacli.base.signals import POSITION, orders_of_derivation
 from vsacli.control.codegen.interface import Function
 from vsacli.control.gains import STIFFNESS_ORDER
 from vsacli.dynamics.inverse import compute_block
@@ -18,7 +18,7 @@ CASES = 6
 """Samples; the last one asks for half of the smallest stiffness that can be reached."""
 
 SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness": 100.0, "ddstiffness": 500.0}
-"""Half-widths of what is drawn, SI units."""
+"""Half-widths of what is drawn, SI units; 1 for further signals."""
 
 MISSED = {"q": 0.01, "dq": 0.1, "theta": 0.01, "dtheta": 0.1}
 """By how much the measured state misses the command."""
@@ -76,7 +76,8 @@ class Reference:
         return self._rng.uniform(-scale, scale, (CASES, len(self._robot.joints)))
 
     def _command(self) -> Arrays:
-        drawn = {name: self._drawn(scale) for name, scale in SCALES.items()}
+        names = [name for name in orders_of_derivation() if name != "stiffness"]
+        drawn = {name: self._drawn(SCALES.get(name, 1.0)) for name in names}
         block = compute_block(self._robot, self._motion(drawn, np.ones_like(drawn["q"])))
         lower = np.nan_to_num(block.stiffness_lower)
         upper = np.minimum(np.nan_to_num(block.stiffness_upper, nan=0.0), 4 * lower)

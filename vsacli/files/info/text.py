@@ -8,6 +8,7 @@ from typing import Any
 
 from vsacli.analysis import report_text
 from vsacli.analysis.report import Report
+from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE
 
@@ -76,18 +77,19 @@ def _trajectory(trajectory: Description) -> Iterator[str]:
         f"trajectory {trajectory['name']}: {trajectory['samples']} steps, {_short(trajectory['duration'])} s"
         f" from t = {_short(trajectory['start'])} s"
     )
-    rows = [("joint", "q", *(f"peak {name}" for name in MOTION), "stiffness")]
+    rows = [("joint", "q", *(f"peak {name}" for name in MOTION), *COMMANDED)]
     rows += [
         (
             joint["name"],
             _range(joint["q"]),
             *(_short(joint[name]["peak"]) for name in MOTION),
-            _range(joint["stiffness"]),
+            *(_range(joint[key]) for key in COMMANDED),
         )
         for joint in trajectory["joints"]
     ]
     yield from aligned(rows)
-    yield f"units: q {POSITION}, its k-th derivative per s^k; stiffness {STIFFNESS}"
+    units = (f"; {key} {signal.quantities[0]}" for key, signal in COMMANDED.items())
+    yield f"units: q {POSITION}, its k-th derivative per s^k{''.join(units)}"
     if "wrench" in trajectory:
         yield from _wrench(trajectory["wrench"])
     yield from report_text.warnings_and_notes(trajectory["warnings"], trajectory["notes"])

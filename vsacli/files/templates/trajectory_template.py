@@ -9,6 +9,7 @@ from vsacli.files.info.robot_info import static_load, stiffness_ranges
 from vsacli.files.templates.commented import document
 from vsacli.robot.model import Joint, Robot
 from vsacli.trajectory.file import DEFAULT_RATE, FORMAT, OF_ANY_ROBOT
+from vsacli.trajectory.joints import CommandedJoints
 
 DURATION = 4.0
 """s"""
@@ -59,6 +60,8 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
     }
     if stiffness:
         values["stiffness"] = {"type": "polynomial", "degree": STIFFNESS_DEGREE, **stiffness}
+    further = [] if robot is None else sorted(CommandedJoints.of(robot).taken - {"stiffness"})
+    values |= {key: {"type": "constant", "value": 1} for key in further}
     return document(FORMAT, OF_ANY_ROBOT, values, HEAD)
 
 
