@@ -12,10 +12,10 @@ import h5py
 import numpy as np
 import pytest
 from samples import second_signal
-from samples.command_line import REPOSITORY
+from samples.command_line import REPOSITORY, edited
 
 NAMES = second_signal.PRETENSION.names
-ARM, MIXED = (str(REPOSITORY / "robots" / f"{name}.yaml") for name in ("vsa_3r", "mixed_3r"))
+ARM, MIXED = "vsa_3r.yaml", "mixed_3r.yaml"
 
 MOTION = """\
 format: vsacli-trajectory/1
@@ -50,6 +50,7 @@ LINES = {
     "check": ["check-feasibility", ARM, "soft.yaml", "--write-fixed", "fixed.yaml"],
     "fixed": ["invdyn", ARM, "fixed.yaml", "-o", "fixed.h5"],
     "mixed": ["invdyn", MIXED, "mixed.yaml", "-o", "mixed.h5"],
+    "columns": ["export", "mixed.h5", "--variables", "stiffness,pretension"],
     "simulate": ["simulate", ARM, "arm.yaml", "-o", "simulated.h5"],
     "codegen": ["codegen", ARM, "-o", "code"],
     "new": ["new", "trajectory", "--robot", ARM, "-o", "new.yaml"],
@@ -68,6 +69,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("second")
     for name, commanded in FILES.items():
         (folder / f"{name}.yaml").write_text(MOTION + commanded)
+    for name in (ARM, MIXED):
+        edited(REPOSITORY / "robots" / name, folder / name, ("type: antagonistic", "type: pretensioned"))
     return folder
 
 
@@ -114,6 +117,7 @@ def test_joints_that_do_not_take_it_have_none(outcomes: dict[str, tuple[int, str
     pretension = stored(folder / "mixed.h5", "pretension")
     assert np.isnan(pretension[:, :2]).all()
     np.testing.assert_array_equal(pretension[[0, -1], 2], [0.1, 0.2])
+    assert outcomes["columns"][1].startswith("time,shoulder.stiffness,elbow.stiffness,elbow.pretension\n")
 
 
 def test_a_file_that_mends_the_stiffness_keeps_it(outcomes: dict[str, tuple[int, str]], folder: Path) -> None:

@@ -1,7 +1,7 @@
-"""Command lines of a vsacli whose antagonistic joints are commanded by a pretension as well.
+"""Command lines of a vsacli that knows a kind of actuator which is commanded by a pretension as well.
 
-Run as a script: it registers the signal before anything else is imported, as a further signal would be, runs
-the command lines of a JSON list and prints a list of exit codes and outputs.
+Run as a script: it registers the signal before anything else is imported, as a further signal would be, then
+the kind; runs the command lines of a JSON list and prints a list of exit codes and outputs.
 """
 
 from __future__ import annotations
@@ -25,19 +25,20 @@ PRETENSION = Signal(
 )
 
 
-def run(lines: list[list[str]]) -> list[tuple[int, str]]:
-    """Exit code and output of each command line."""
-    COMMANDED[PRETENSION.key] = PRETENSION
-    from vsacli.actuators.antagonistic import Antagonistic
-    from vsacli.cli.main import run as vsacli
-
-    Antagonistic.commanded = ("stiffness", PRETENSION.key)
-    outcomes = []
-    for line in lines:
-        with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(out):
-            outcomes.append((int(vsacli(line)), out.getvalue()))
-    return outcomes
-
-
 if __name__ == "__main__":
-    json.dump(run(json.load(sys.stdin)), sys.stdout)
+    COMMANDED[PRETENSION.key] = PRETENSION
+    from vsacli.actuators import ACTUATORS
+    from vsacli.actuators.antagonistic import Antagonistic
+    from vsacli.cli.main import run
+
+    class Pretensioned(Antagonistic):
+        """Two motors behind nonlinear springs, commanded by a pretension that changes nothing."""
+
+        commanded = (*Antagonistic.commanded, PRETENSION.key)
+
+    ACTUATORS.homes["pretensioned"] = "__main__:Pretensioned"
+    outcomes = []
+    for line in json.load(sys.stdin):
+        with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(out):
+            outcomes.append((int(run(line)), out.getvalue()))
+    json.dump(outcomes, sys.stdout)

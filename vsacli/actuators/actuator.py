@@ -16,7 +16,7 @@ from vsacli.actuators.motor import JointMotor
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag
-from vsacli.base.variables import COMMANDED_STIFFNESS, MOTORS, SPRINGS, Variable
+from vsacli.base.variables import MOTORS, SPRINGS, Variable
 from vsacli.documents.source import Source
 
 
@@ -59,7 +59,7 @@ class Actuator(ABC):
 
     Attributes:
         motor_count: motors of the joint, 1 or 2.
-        commanded: variables that a trajectory commands besides the motion of the joint.
+        commanded: keys of the signals that a trajectory commands besides the motion of the joint.
         uncommanded: why a trajectory does not command others, by key of the signal, clauses.
         sprung: whether springs lie between its motors and the link; else its motor moves with the joint.
         co_contracts: whether both motors carry the load, and so can work against each other.
@@ -74,8 +74,8 @@ class Actuator(ABC):
     @classmethod
     def has(cls, variable: Variable) -> list[bool]:
         """Which columns of a result variable its joints have: of motors 1 and 2, or of the joint."""
-        of_kind = {None: True, SPRINGS: cls.sprung, COMMANDED_STIFFNESS: "stiffness" in cls.commanded}
-        there = of_kind[variable.requires]
+        of_kind = {None: True, SPRINGS: cls.sprung}
+        there = of_kind.get(variable.requires, variable.requires in cls.commanded)
         if "motor" not in variable.dims:
             return [there]
         return [there and motor <= cls.motor_count for motor in MOTORS]

@@ -12,13 +12,13 @@ from vsacli.base import units
 from vsacli.base.arrays import AnyArray, of_joint
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import wrench_columns
 
 MOTORS = (1, 2)
-SPRINGS, COMMANDED_STIFFNESS = "springs", "commanded stiffness"
-"""What a joint must have to have a variable."""
+SPRINGS = "springs"
+"""What a joint must have to have a variable, unless that is to take a commanded signal."""
 
 
 class Variable(NamedTuple):
@@ -30,7 +30,7 @@ class Variable(NamedTuple):
         quantity: unit at revolute and prismatic joints, or of moments and forces.
         long_name: a few words.
         equation: number in Buondonno & De Luca (2016), or where the value comes from.
-        requires: what a joint must have to have it, `SPRINGS` or `COMMANDED_STIFFNESS`; else it is NaN.
+        requires: what a joint must have to have it, `SPRINGS` or a commanded signal by key; else it is NaN.
         geared: the power of a motor's gear ratio by which the value is larger on the motor's shaft.
     """
 
@@ -52,7 +52,8 @@ def _given() -> Iterator[Variable]:
     yield Variable("time", (), units.TIME, "time", "given")
     yield from _of_signal(POSITION, "joint")
     for signal in COMMANDED.values():
-        yield from _of_signal(signal, "joint", SPRINGS)
+        # springs whose stiffness is not commanded have one of their own
+        yield from _of_signal(signal, "joint", SPRINGS if signal is STIFFNESS else signal.key)
     yield from _of_signal(WRENCH, "wrench_axis")
 
 
@@ -95,7 +96,7 @@ _COMPUTED = (
         units.DECOUPLING,
         "determinant of the decoupling block of the joint",
         "(67)",
-        COMMANDED_STIFFNESS,
+        STIFFNESS.key,
     ),
     Variable(
         "stiffness_lower",
@@ -103,7 +104,7 @@ _COMPUTED = (
         units.STIFFNESS,
         "smallest stiffness reachable at this elastic torque on the joint's branch",
         "(14)",
-        COMMANDED_STIFFNESS,
+        STIFFNESS.key,
     ),
     Variable(
         "stiffness_upper",
@@ -111,7 +112,7 @@ _COMPUTED = (
         units.STIFFNESS,
         "largest stiffness reachable at this elastic torque on the joint's branch",
         "(14)",
-        COMMANDED_STIFFNESS,
+        STIFFNESS.key,
     ),
     Variable(
         "flags",
