@@ -127,6 +127,11 @@ def test_robots_trajectories_and_results_show_what_they_are_in_a_few_lines(
     assert [line.split()[0] for line in shown[1:]] == ["joint", "base", "shoulder", "elbow"]
 
 
+def test_a_simulation_shows_its_report() -> None:
+    simulation = simulate(vsa_3r(), short_motion(3))
+    assert repr(simulation) == f"Simulation of {simulation.report}"
+
+
 def test_notebooks_get_html_in_which_names_are_text(robot: Robot, trajectory: Trajectory) -> None:
     bold = robot.replace("joints.0.name", "base")
     bold = Robot(name="<b>bold</b>", joints=bold.joints)
@@ -289,8 +294,11 @@ class TestSlips:
     def test_arguments_of_files_swapped(self, robot: Robot) -> None:
         with pytest.raises(TypeError, match=r"load_trajectory\(path, robot\)"):
             load_trajectory(robot, MOTION)
-        with pytest.raises(TypeError, match="path must be a path, not a Robot"):
-            load_robot(robot)
+        for call in (load_robot, open_result):
+            with pytest.raises(
+                TypeError, match=rf"path must be a path, not a Robot; call {call.__name__}"
+            ):
+                call(robot)
 
     def test_arrays_for_records(self, robot: Robot) -> None:
         q = np.zeros(3)
@@ -300,6 +308,8 @@ class TestSlips:
             TypeError, match=r"state must be a State, not a numpy.ndarray; make one by State\("
         ):
             state_derivative(robot, q, self.TORQUES)
+        with pytest.raises(TypeError, match=r"state must be a State, not a list; make one by State\("):
+            feedback_linearization(robot, [q, q], short_motion(3).at(0.0), Gains.from_poles([-20] * 4))
         state = State(q, q, self.TORQUES, self.TORQUES)
         with pytest.raises(TypeError, match=r"gains must be a Gains, not a list; Gains.from_poles"):
             feedback_linearization(robot, state, short_motion(3).at(0.0), [-20] * 4)

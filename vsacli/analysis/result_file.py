@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from vsacli.analysis.report import Report
 from vsacli.analysis.result import Shown
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, check_path
 from vsacli.base.variables import VARIABLES
 from vsacli.results.store.reader import StoredResult, open_one_of
 
@@ -88,5 +88,7 @@ def open_result(path: str | os.PathLike[str]) -> ResultFile:
     Raises:
         InputError: there is no such file, or it is not a complete file of the format this version reads.
         StorageError: the operating system refuses to read it, or another program is writing it.
+        TypeError: path is none.
     """
+    check_path(path, "open_result(path)")
     return open_one_of(Path(path), ResultFile)

@@ -72,7 +72,6 @@ def state_derivative(
         TypeError: robot or state is none.
     """
     check_robot(robot)
-    check_type("state", state, State, "make one by State(q, dq, theta, dtheta)")
     if wrench is not None:
         check_wrench(wrench)
     plant = Plant(robot, None if wrench is None else wrench.frame)
@@ -108,7 +107,9 @@ class Plant:
 
         Raises:
             InputError: a part has another shape than the robot's.
+            TypeError: state is none.
         """
+        check_type("state", state, State, "make one by State(q, dq, theta, dtheta)")
         joints = len(self.drivetrain.present)
         q, dq = checked_shape("q", state.q, joints), checked_shape("dq", state.dq, joints)
         sprung = self.drivetrain.sprung

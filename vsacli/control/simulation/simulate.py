@@ -33,12 +33,15 @@ from vsacli.trajectory.trajectory import Trajectory
 Measured = Literal["state", "positions"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Simulation:
     """What happened, and the report on it."""
 
     history: History
     report: SimulationReport
+
+    def __repr__(self) -> str:
+        return f"Simulation of {self.report}"
 
 
 def simulate(
