@@ -180,6 +180,12 @@ def test_a_spring_shared_by_an_alias(load):
             "motor: [{inertia: 10}, {inertia: 10}, ",
             "24: motor: expected one value for both",
         ),
+        (
+            "{type: cubic, k: 400, k_c: 2000}",
+            "{flexor: {type: cubic, k: 400, k_c: 2000}, extensor: {type: cubic, k: 400, k_c: 2000}}",
+            "16: spring: expected one mapping for both sides or a list of two, found the keys 'flexor', 'ext",
+        ),
+        ("{inertia: 3.2, damping: 1e-4}", "{}", "15: motor: missing key 'inertia'"),
     ],
 )
 def test_a_problem_is_named_with_its_line(problems, old, new, problem):
@@ -188,6 +194,9 @@ def test_a_problem_is_named_with_its_line(problems, old, new, problem):
 
 def test_one_mistake_is_one_line(problems):
     assert len(problems("mass: 2", "mass: on")) == 1
+    expected = "rig.yaml:15: motor: expected one mapping for both sides or a list of two, found the keys"
+    named_sides = problems("{inertia: 3.2, damping: 1e-4}", "{left: {inertia: 3}, right: {inertia: 4}}")
+    assert named_sides == [f"{expected} 'left', 'right'"]
 
 
 @pytest.mark.parametrize("joints", ["", " []", " {a: 1}", " 3"])

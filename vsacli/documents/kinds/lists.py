@@ -21,6 +21,7 @@ from vsacli.documents.records import (
     PlainOfRecord,
     Refer,
     Schema,
+    declared,
     on_one_line,
 )
 from vsacli.documents.tree import INVALID, Node, Scope, all_valid, quoted
@@ -150,12 +151,24 @@ class Pair(Kind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Both values, which are one if one was written."""
+        if isinstance(node, tree.Mapping) and self._names_sides(node):
+            keys = ", ".join(map(quoted, node.entries))
+            expected = "one mapping for both sides or a list of two"
+            scope.problems.add(node.line, f"{label}: expected {expected}, found the keys {keys}")
+            return INVALID
         if not isinstance(node, tree.Sequence):
             both = self.item.read(node, label, scope)
             return both if both is INVALID else (both, both)
         if len(node.items) != 2:
             return scope.unexpected(node, "one value for both sides or a list of 2", label)
         return all_valid([self.item.read(item, label, scope) for item in node.items])
+
+    def _names_sides(self, node: tree.Mapping) -> bool:
+        """Whether mappings stand under keys of their own, as in `{flexor: {...}, extensor: {...}}`."""
+        if not node.entries or not all(isinstance(value, tree.Mapping) for value in node.entries.values()):
+            return False
+        known = {"type", *(name for cls in self.records.values() for name in declared(cls))}
+        return known.isdisjoint(node.entries)
 
     def problems(self, path: FieldPath, check: Check | None, content: Any, /) -> Iterator[FieldProblem]:
         """What is wrong with one of them."""
