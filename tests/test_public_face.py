@@ -295,9 +295,7 @@ class TestSlips:
         with pytest.raises(TypeError, match=r"load_trajectory\(path, robot\)"):
             load_trajectory(robot, MOTION)
         for call in (load_robot, open_result):
-            with pytest.raises(
-                TypeError, match=rf"path must be a path, not a Robot; call {call.__name__}"
-            ):
+            with pytest.raises(TypeError, match=rf"path must be a path, not a Robot; call {call.__name__}"):
                 call(robot)
 
     def test_arrays_for_records(self, robot: Robot) -> None:
