@@ -16,7 +16,7 @@ from samples.robots import random_motion, vsa_3r
 
 from vsacli.compute.engine import cache, choose
 from vsacli.compute.engine.cache import (
-    ABANDONED,
+    ABANDONED_AFTER,
     CHECKSUM,
     LIBRARY,
     UNFINISHED,
@@ -141,7 +141,7 @@ def test_what_a_killed_process_left_is_swept(tmp_path: Path):
     for left in (old, new):
         left.mkdir()
         (left / LIBRARY).write_bytes(b"half")
-    then = old.stat().st_mtime - 2 * ABANDONED
+    then = old.stat().st_mtime - 2 * ABANDONED_AFTER
     os.utime(old, (then, then))
     library = tmp_path / "built.so"
     library.write_bytes(b"whole")

@@ -140,7 +140,7 @@ def test_heaps_are_found_wherever_a_piece_of_the_file_ends(
     path = tmp_path / "r.h5"
     path.write_bytes(content)
     for piece in (last + 3, 1000, 2**20):
-        monkeypatch.setattr("vsacli.results.store.damage.PIECE", piece)
+        monkeypatch.setattr("vsacli.results.store.damage.BYTES_PER_READ", piece)
         check_heaps(small_result)
         with pytest.raises(InputError, match=f"the texts at byte {last} have no end"):
             check_heaps(path)

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from vsacli.base.lazy import OnDemand
+from vsacli.base.lazy import LazyRegistry
 
 if TYPE_CHECKING:
     from vsacli.base.variables import Variable
 
-ACTUATORS = OnDemand(
+ACTUATORS = LazyRegistry(
     {
         "antagonistic": "vsacli.actuators.antagonistic:Antagonistic",
         "elastic": "vsacli.actuators.elastic:Elastic",

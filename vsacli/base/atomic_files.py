@@ -22,8 +22,8 @@ _REASON = {
 }
 
 
-SMALL = 2**24
-"""Bytes of a file that is sooner written than its disk is asked for room."""
+UNCHECKED_BYTES = 2**24
+"""Size up to which a file is sooner written than its disk is asked for room."""
 
 
 @contextlib.contextmanager
@@ -61,12 +61,12 @@ def check_target(path: str | Path, *, overwrite: bool) -> Path:
 
 
 def check_free_space(path: str | Path, size: int) -> None:
-    """Refuse a file of `size` bytes that its disk has no room for, unless it is `SMALL`.
+    """Refuse a file of `size` bytes that its disk has no room for, from `UNCHECKED_BYTES` on.
 
     Raises:
         StorageError: with both sizes in MB.
     """
-    if size < SMALL:
+    if size < UNCHECKED_BYTES:
         return
     import shutil
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 
-class OnDemand(Mapping[str, Any]):
+class LazyRegistry(Mapping[str, Any]):
     """Things by name, each imported when it is looked up; the names alone import nothing.
 
     Args:

@@ -13,7 +13,7 @@ import click
 
 from vsacli import __version__
 from vsacli.base.errors import InputError, StorageError
-from vsacli.base.lazy import OnDemand
+from vsacli.base.lazy import LazyRegistry
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, OutputClosedError, reporting_stdout_errors, tell
 
@@ -41,7 +41,7 @@ _SECTIONS = {
         "schema": "vsacli.cli.schema:schema",
     },
 }
-_COMMANDS = OnDemand({name: home for section in _SECTIONS.values() for name, home in section.items()})
+_COMMANDS = LazyRegistry({name: home for section in _SECTIONS.values() for name, home in section.items()})
 
 
 class SectionedGroup(click.Group):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from vsacli.actuators.laws.law import SpringLaw
 from vsacli.actuators.laws.pair import Pair, PairSolution
 from vsacli.actuators.laws.state import SpringState
-from vsacli.base.lazy import OnDemand
+from vsacli.base.lazy import LazyRegistry
 from vsacli.base.units import (
     CUBIC_STIFFNESS,
     DIMENSIONLESS,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from vsacli.actuators.laws.tendon import Tendon
     from vsacli.actuators.pairs import make_pair
 
-LAWS = OnDemand(
+LAWS = LazyRegistry(
     {
         "cubic": "vsacli.actuators.laws.cubic:Cubic",
         "polynomial": "vsacli.actuators.laws.polynomial:Polynomial",
@@ -47,7 +47,7 @@ LAWS = OnDemand(
 )
 """Laws by the name they have in a robot file."""
 
-_EXPORTS = OnDemand(
+_EXPORTS = LazyRegistry(
     {
         **{name.title().replace("_", ""): home for name, home in LAWS.homes.items()},
         "Tendon": "vsacli.actuators.laws.tendon:Tendon",

@@ -17,7 +17,7 @@ from vsacli.base.errors import VsacliError
 LIBRARY = "program.so"
 CHECKSUM = "program.sha256"
 UNFINISHED = "unfinished-"
-ABANDONED = 3600.0
+ABANDONED_AFTER = 3600.0
 """Age in seconds from which on an unfinished folder is that of a process that was killed."""
 
 
@@ -85,7 +85,7 @@ class Cache:
         """Remove what killed processes left."""
         for folder in self.folder.glob(f"{UNFINISHED}*"):
             with suppress(OSError):
-                if folder.stat().st_mtime < time.time() - ABANDONED:
+                if folder.stat().st_mtime < time.time() - ABANDONED_AFTER:
                     shutil.rmtree(folder)
 
 

@@ -15,8 +15,9 @@ NAMES = ("numpy", "c", "auto")
 NUMPY_SECONDS = 0.9e-9
 """What NumPy takes for an operation on a sample."""
 
-COMPILER_SECONDS = (0.25, 2.5e-8)
-"""What the compiler takes to start, and the square of the operations times this."""
+COMPILER_START_SECONDS = 0.25
+COMPILER_SECONDS_PER_SQUARE = 2.5e-8
+"""What the compiler takes to start, and for the square of the number of operations."""
 
 LOOK_FROM = 20_000
 """Samples with which it is busy for longer than it takes to see whether there is compiled code."""
@@ -86,8 +87,8 @@ def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) 
 
 def _repays(operations: int, samples: int) -> bool:
     """Whether NumPy would be busy for longer than the compiler."""
-    start, growth = COMPILER_SECONDS
-    return operations * samples * NUMPY_SECONDS > start + growth * operations**2
+    compiling = COMPILER_START_SECONDS + COMPILER_SECONDS_PER_SQUARE * operations**2
+    return operations * samples * NUMPY_SECONDS > compiling
 
 
 def _numpy(samples: int) -> Engine:

@@ -15,12 +15,11 @@ from vsacli.compute.engine.engines import Kernel, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.tracing import Program, Symbol
 
-Tell = Callable[[str], None]
-"""Receives a message for the user."""
+Warn = Callable[[str], None]
+"""Receives a warning for the user."""
 
-Build = Callable[[int], bool]
-"""Says whether code of so many operations shall be compiled."""
-
+Worthwhile = Callable[[int], bool]
+"""Whether code of so many operations shall be compiled."""
 
 USUAL_ITERATIONS = 5
 """How often a loop is usually repeated."""
@@ -39,23 +38,23 @@ class CompiledEngine:
     Args:
         compiler: what compiles.
         threads: how many run at once.
-        tell: learns what is wrong with the cache of compiled code.
+        warn: learns what is wrong with the cache of compiled code.
     """
 
-    def __init__(self, compiler: Compiler, threads: int, tell: Tell) -> None:
+    def __init__(self, compiler: Compiler, threads: int, warn: Warn) -> None:
         self._compiler = compiler
         self._threads = threads
-        self._tell = tell
+        self._warn = warn
         self._loaded: dict[Kernel, Loaded] = {}
 
-    def prepare(self, kernel: Kernel, build: Build = lambda _operations: True) -> Loaded | None:
-        """Load a kernel's code, compiled if need be and if `build` wants it; None if there is no such code.
+    def prepare(self, kernel: Kernel, worthwhile: Worthwhile = lambda _operations: True) -> Loaded | None:
+        """Load a kernel's code, compiled if need be and if that is worthwhile; None if there is no such code.
 
         Raises:
             CompilerError: it cannot be compiled.
         """
         if kernel not in self._loaded:
-            loaded = _load(kernel, self._compiler, self._tell, build)
+            loaded = _load(kernel, self._compiler, self._warn, worthwhile)
             if loaded is None:
                 return None
             self._loaded[kernel] = loaded
@@ -67,14 +66,14 @@ class CompiledEngine:
         return self._loaded[kernel].library(rows, self._threads)
 
 
-def _load(kernel: Kernel, compiler: Compiler, tell: Tell, build: Build) -> Loaded | None:
-    """The library of a kernel.
+def _load(kernel: Kernel, compiler: Compiler, warn: Warn, worthwhile: Worthwhile) -> Loaded | None:
+    """The library of a kernel; None if it is not there and not worth compiling.
 
     Args:
         kernel: what it computes.
         compiler: what compiles it.
-        tell: learns what is wrong with the cache, which is no reason to fail.
-        build: whether to compile so many operations if they are not in the cache; else there may be none.
+        warn: learns what is wrong with the cache, which is no reason to fail.
+        worthwhile: whether to compile so many operations if they are not in the cache.
 
     Raises:
         CompilerError: it cannot be compiled or loaded.
@@ -82,12 +81,12 @@ def _load(kernel: Kernel, compiler: Compiler, tell: Tell, build: Build) -> Loade
     source, count = _source(kernel)
     key = key_of(source, compiler.identity)
     if key not in _loaded:
-        cache = _opened(tell)
-        path = None if cache is None else _found(cache, key, tell)
+        cache = _opened(warn)
+        path = None if cache is None else _found(cache, key, warn)
         if path is not None:
             _loaded[key] = Loaded(Library(path, kernel.outputs), compiled=False)
-        elif build(count):
-            _loaded[key] = Loaded(_built(source, key, kernel.outputs, compiler, cache, tell), compiled=True)
+        elif worthwhile(count):
+            _loaded[key] = Loaded(_built(source, key, kernel.outputs, compiler, cache, warn), compiled=True)
     return _loaded.get(key)
 
 
@@ -113,24 +112,24 @@ def _weight(symbol: Symbol) -> int:
     return operation_count(symbol.operands[0].body) if symbol.operation == "branch" else 1
 
 
-def _opened(tell: Tell) -> Cache | None:
+def _opened(warn: Warn) -> Cache | None:
     try:
         return open_cache()
     except CacheError as error:
-        tell(f"{error}; compiled code is not kept")
+        warn(f"{error}; compiled code is not kept")
         return None
 
 
-def _found(cache: Cache, key: str, tell: Tell) -> Path | None:
+def _found(cache: Cache, key: str, warn: Warn) -> Path | None:
     try:
         return cache.find(key)
     except CacheError as error:
-        tell(str(error))
+        warn(str(error))
         return None
 
 
 def _built(
-    source: str, key: str, outputs: int, compiler: Compiler, cache: Cache | None, tell: Tell
+    source: str, key: str, outputs: int, compiler: Compiler, cache: Cache | None, warn: Warn
 ) -> Library:
     with TemporaryDirectory(prefix="vsacli-") as folder:
         text, library = Path(folder) / "program.c", Path(folder) / LIBRARY
@@ -141,5 +140,5 @@ def _built(
             try:
                 cache.store(key, library)
             except CacheError as error:
-                tell(f"{error}; compiled code is not kept")
+                warn(f"{error}; compiled code is not kept")
         return loaded

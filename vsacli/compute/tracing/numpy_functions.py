@@ -53,8 +53,8 @@ def _one(tape: Tape, ufunc: np.ufunc, *operands: Operand) -> Operand:
             number: Operand = ufunc(*operands).item()
         return number
     name = ufunc.__name__
-    if name in _BY_OTHERS:
-        return _BY_OTHERS[name](tape, *operands)
+    if name in _COMPOSED:
+        return _COMPOSED[name](tape, *operands)
     if name in BITWISE and _any_truth(operands):
         name = f"logical_{BITWISE[name]}"
     if name == "multiply" and (shifted := _scaled_bits(tape, operands)) is not None:
@@ -98,7 +98,7 @@ def _isinf(tape: Tape, a: Operand) -> Operand:
     return tape.emit("equal", tape.emit("absolute", a), float("inf"))
 
 
-_BY_OTHERS: dict[str, Callable[..., Operand]] = {
+_COMPOSED: dict[str, Callable[..., Operand]] = {
     "power": _power,
     "float_power": _power,
     "square": lambda tape, a: tape.emit("multiply", a, a),

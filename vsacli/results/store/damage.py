@@ -21,7 +21,7 @@ from vsacli.results.store.schema import CHUNK_BYTES
 
 EXPECTED = "expected a result file, as invdyn or simulate writes it"
 
-PIECE = 2**24
+BYTES_PER_READ = 2**24
 """Bytes of a file looked at in one go."""
 
 _COLLECTION = struct.Struct("<8xQ")
@@ -111,7 +111,7 @@ def check_heaps(path: str | Path) -> None:
 def _heaps(file: BinaryIO) -> Iterator[int]:
     """Offsets at which a heap collection begins."""
     start, tail = 0, b""
-    while piece := file.read(PIECE):
+    while piece := file.read(BYTES_PER_READ):
         text, found = tail + piece, -1
         position = file.tell()
         while (found := text.find(_HEAP, found + 1)) >= 0:

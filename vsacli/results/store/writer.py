@@ -25,7 +25,7 @@ from vsacli.results.store.schema import FORMAT, TEXT, storable
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
-CHUNKS_AT_HAND = 11
+CHUNK_CACHE_SLOTS = 11
 """Chunks of a variable that HDF5 finds in its cache: few, since samples are written in order."""
 
 
@@ -150,7 +150,7 @@ class ResultWriter:
                 "w",
                 libver=("earliest", "v110"),
                 track_order=True,
-                rdcc_nslots=CHUNKS_AT_HAND,
+                rdcc_nslots=CHUNK_CACHE_SLOTS,
             )
             self._file = self._cleanup.enter_context(file)
             self._stored = create_layout(

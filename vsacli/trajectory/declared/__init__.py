@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vsacli.base.lazy import OnDemand
+from vsacli.base.lazy import LazyRegistry
 from vsacli.base.signals import POSITION, WRENCH
 from vsacli.documents.fields import OneOf
 from vsacli.trajectory.declared.declaration import Declaration, Formula, Recorded, Use
@@ -27,7 +27,7 @@ TYPES = {
 """Each type with its home, and what it serves: the position, any commanded signal, the wrench."""
 
 
-class _Types(OnDemand):
+class _Types(LazyRegistry):
     """The record classes of the types that serve a use."""
 
     def __init__(self, use: Use) -> None:
