@@ -22,7 +22,17 @@ GROUPS = {
 }
 """What is exported, in the order in which one comes across it."""
 
-METHODS = ("replace", "from_samples", "at", "stretched", "save", "plot", "to_xarray", "from_poles")
+METHODS = (
+    "replace",
+    "from_samples",
+    "at",
+    "stretched",
+    "save",
+    "plot",
+    "to_xarray",
+    "constant",
+    "from_poles",
+)
 """Methods for users; other public ones are for other rooms."""
 
 

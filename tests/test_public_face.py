@@ -300,7 +300,9 @@ class TestSlips:
 
     def test_arrays_for_records(self, robot: Robot) -> None:
         q = np.zeros(3)
-        with pytest.raises(TypeError, match=r"wrench must be a Wrench, not a list; make one by Wrench\("):
+        with pytest.raises(
+            TypeError, match=r"wrench must be a Wrench, not a list; make one by Wrench.constant"
+        ):
             link_torques(robot, q, wrench=[0, 0, 1, 0, 0, 0])
         with pytest.raises(
             TypeError, match=r"state must be a State, not a numpy.ndarray; make one by State\("

@@ -115,6 +115,14 @@ def test_a_wrench_of_another_shape_is_refused(name: str, shape: tuple[int, ...])
     assert str(refusal.value) == f"{name} must have the shape (5, 6), not {shape}"
 
 
+def test_a_constant_wrench_has_derivatives_that_are_zero() -> None:
+    push = Wrench.constant([1, 2, 3, 4, 5, 6], "base")
+    np.testing.assert_array_equal(push.wrench, [1, 2, 3, 4, 5, 6])
+    assert not push.dwrench.any()
+    assert push.ddwrench.shape == (6,)
+    assert push.frame == "base"
+
+
 def test_an_unknown_frame_is_refused() -> None:
     with pytest.raises(InputError, match=r"unknown frame 'bas' of the wrench; did you mean 'base'\?"):
         Wrench(*np.zeros((3, 1, 6)), frame="bas")

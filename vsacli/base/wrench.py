@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, check_type
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 WRENCH_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Components: the force, and the moment about the origin of the tool frame."""
@@ -39,6 +45,12 @@ class Wrench:
     def __post_init__(self) -> None:
         check_frame(self.frame)
 
+    @classmethod
+    def constant(cls, wrench: ArrayLike, frame: str = "end_effector") -> Wrench:
+        """A wrench ([samples,] 6) that does not change over time: its derivatives are zero."""
+        components = np.asarray(wrench, dtype=np.float64)
+        return cls(components, np.zeros_like(components), np.zeros_like(components), frame=frame)
+
     def mapped(self, function: Callable[[FloatArray, int], FloatArray]) -> Wrench:
         """The wrench with a function applied to each array and its order of derivation."""
         arrays = (function(getattr(self, name), order) for order, name in enumerate(WRENCH_NAMES))
@@ -61,7 +73,9 @@ def check_wrench(value: object) -> None:
     Raises:
         TypeError: saying how to make one.
     """
-    check_type("wrench", value, Wrench, "make one by Wrench(wrench, dwrench, ddwrench), each ([samples,] 6)")
+    check_type(
+        "wrench", value, Wrench, "make one by Wrench.constant, or by Wrench(wrench, dwrench, ddwrench)"
+    )
 
 
 def wrench_columns(name: str) -> list[str]:
