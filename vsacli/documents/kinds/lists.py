@@ -27,7 +27,7 @@ from vsacli.documents.records import (
 from vsacli.documents.tree import INVALID, Node, Scope, all_valid, quoted
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Items(Kind):
     """A list of one or more values of a kind, read as a tuple; all differ in the text field `unique`."""
 
@@ -133,7 +133,7 @@ def _scalar_entry(node: Node, key: str) -> tree.Scalar | None:
     return entry if isinstance(entry, tree.Scalar) else None
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Pair(Kind):
     """One value for both sides of a joint, or a list of two, read as a pair."""
 

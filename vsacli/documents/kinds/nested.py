@@ -28,7 +28,7 @@ from vsacli.documents.records import (
 from vsacli.documents.tree import INVALID, Node, Scope
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Record(Kind):
     """A mapping read into the record class `cls`."""
 
@@ -76,7 +76,7 @@ def refused_in(cls: type) -> Iterator[str]:
         yield from field.kind.refused(name)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class OneOf(Kind):
     """A mapping whose key `type` selects the record class; `not_yet` as for Choice."""
 

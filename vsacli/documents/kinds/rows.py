@@ -22,7 +22,7 @@ def list_of(item: Schema, length: int) -> Schema:
     return {"type": "array", "items": item, "minItems": length, "maxItems": length}
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Vector(Kind):
     """A list of `length` numbers, read as a tuple."""
 
@@ -65,7 +65,7 @@ class Vector(Kind):
         return list(content)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Interval(Kind):
     """`[lower, upper]`, read as a pair; a scalar means [-scalar, scalar], if `one_sided` [-inf, scalar]."""
 
@@ -116,7 +116,7 @@ class Interval(Kind):
         return list(content)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class PerJoint(Kind):
     """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint.
 

@@ -31,7 +31,7 @@ ANGLE = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*(deg)?[ \t]*$"
 """How expressions look, for JSON Schema."""
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Number(Kind):
     """One number with a unit."""
 
@@ -77,7 +77,7 @@ def _expression(pattern: str) -> Schema:
     return {"type": "string", "pattern": pattern, "maxLength": MAX_LENGTH}
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Integer(Kind):
     """One whole number."""
 
@@ -96,7 +96,7 @@ class Integer(Kind):
         return {"anyOf": [{"type": "integer", **keywords}, _expression(EXPRESSION)]}
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Text(Kind):
     """A text; `identifier` restricts it to letters, digits, `_` and `-`, starting with a letter or `_`."""
 
@@ -132,7 +132,7 @@ class Text(Kind):
         yield single((), None, content)
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Choice(Kind):
     """One of a few words; `not_yet` are words of the format that this version does not act on."""
 
@@ -180,7 +180,7 @@ def unknown_word(word: str, options: Iterable[str], not_yet: tuple[str, ...]) ->
     return f"unknown word {quoted(word)}{did_you_mean(word, options)}"
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class TableFile(Kind):
     """Path of a CSV file relative to the document, read as a `Table` of these columns."""
 
