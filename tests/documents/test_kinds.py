@@ -194,9 +194,9 @@ def test_lines(kind: Kind, content: Any, expected: list[str]) -> None:
     assert lines[0].comment == "said of it"
 
 
-def plain_of(record: Any) -> dict[str, Any]:
+def json_of(record: Any) -> dict[str, Any]:
     return {
-        name: field.kind.plain(getattr(record, name), plain_of)
+        name: field.kind.json_value(getattr(record, name), json_of)
         for name, (field, _) in declared(type(record)).items()
     }
 
@@ -214,4 +214,4 @@ def plain_of(record: Any) -> dict[str, Any]:
     ],
 )
 def test_plain(kind: Kind, content: Any, expected: Any) -> None:
-    assert kind.plain(content, plain_of) == expected
+    assert kind.json_value(content, json_of) == expected

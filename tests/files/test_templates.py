@@ -15,10 +15,9 @@ from vsacli.actuators import ACTUATORS
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.cli.new import new
+from vsacli.documents.commented import WIDTH
 from vsacli.documents.fields import OneOf, Pair, Record, declared
-from vsacli.files.templates import robot_template, trajectory_template
-from vsacli.files.templates.commented import WIDTH
-from vsacli.files.templates.robot_template import MOST_JOINTS
+from vsacli.files.templates import MOST_JOINTS, robot_template, trajectory_template
 from vsacli.robot.file import RobotFile, load_robot
 from vsacli.robot.model import Joint, Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT, load_trajectory

@@ -45,11 +45,11 @@ class _Builder:
 
     def _field(self, field: Field, default: Any) -> Schema:
         schema = field.kind.schema(field.check, self._reference)
-        plain = _plain(default)
+        shown = _json_value(default)
         return {
             "description": _described(field),
             **schema,
-            **({} if plain is None else {"default": plain}),
+            **({} if shown is None else {"default": shown}),
         }
 
     def _reference(self, cls: type, word: str | None = None) -> Schema:
@@ -67,7 +67,7 @@ def _described(field: Field) -> str:
     return field.doc if field.quantity == DIMENSIONLESS else f"{field.doc}, {field.quantity}"
 
 
-def _plain(default: Any) -> Any:
+def _json_value(default: Any) -> Any:
     """A default that a document could hold, or None."""
     match default:
         case bool() | str() if default != "":

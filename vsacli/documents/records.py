@@ -77,7 +77,7 @@ class Line(NamedTuple):
 Refer: TypeAlias = Callable[[type, str | None], Schema]
 LinesOfRecord: TypeAlias = Callable[[type, Values], Iterator[Line]]
 ArraysOfRecord: TypeAlias = Callable[[Any], Iterator[ResolvedField]]
-PlainOfRecord: TypeAlias = Callable[[Any], Any]
+JsonOfRecord: TypeAlias = Callable[[Any], Any]
 
 
 class Kind(ABC):
@@ -149,7 +149,7 @@ class Kind(ABC):
         """
         raise TypeError(f"a field of the kind {self} has no array form")
 
-    def plain(self, content: Any, _of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
         """A value as JSON could hold it, but for numbers that are not finite."""
         return content
 

@@ -15,10 +15,10 @@ from vsacli.documents.records import (
     ArraysOfRecord,
     Check,
     FieldPath,
+    JsonOfRecord,
     Kind,
     Line,
     LinesOfRecord,
-    PlainOfRecord,
     Refer,
     Schema,
     declared,
@@ -113,9 +113,9 @@ class Items(Kind):
             return super().arrays(content, of_record)
         return stacked("joint", (self.item.arrays(joint, of_record) for joint in content))
 
-    def plain(self, content: Any, of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, of_record: JsonOfRecord, /) -> Any:
         """A list of the entries."""
-        return [self.item.plain(entry, of_record) for entry in content]
+        return [self.item.json_value(entry, of_record) for entry in content]
 
 
 def _repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
@@ -197,6 +197,6 @@ class Pair(Kind):
         """Those of both motors."""
         return stacked("motor", (self.item.arrays(side, of_record) for side in content))
 
-    def plain(self, content: Any, of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, of_record: JsonOfRecord, /) -> Any:
         """A list of two."""
-        return [self.item.plain(side, of_record) for side in content]
+        return [self.item.json_value(side, of_record) for side in content]

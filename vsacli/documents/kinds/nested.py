@@ -17,10 +17,10 @@ from vsacli.documents.records import (
     Check,
     Field,
     FieldPath,
+    JsonOfRecord,
     Kind,
     Line,
     LinesOfRecord,
-    PlainOfRecord,
     Refer,
     Schema,
     declared,
@@ -64,7 +64,7 @@ class Record(Kind):
         """Those of the record."""
         return of_record(content)
 
-    def plain(self, content: Any, of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, of_record: JsonOfRecord, /) -> Any:
         """A mapping by field."""
         return of_record(content)
 
@@ -138,7 +138,7 @@ class OneOf(Kind):
         yield single((), None, self._word(content))._replace(path=("type",))
         yield from of_record(content)
 
-    def plain(self, content: Any, of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, of_record: JsonOfRecord, /) -> Any:
         """A mapping that begins with the type."""
         return {"type": self._word(content), **of_record(content)}
 

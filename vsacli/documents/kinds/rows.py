@@ -13,7 +13,7 @@ from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.arrays import ResolvedField, single
 from vsacli.documents.kinds.single import IDENTIFIER, Number, read_number, unit_words
-from vsacli.documents.records import ArraysOfRecord, Check, FieldPath, Kind, PlainOfRecord, Refer, Schema
+from vsacli.documents.records import ArraysOfRecord, Check, FieldPath, JsonOfRecord, Kind, Refer, Schema
 from vsacli.documents.tree import INVALID, Node, Scope, all_valid
 
 
@@ -60,7 +60,7 @@ class Vector(Kind):
         """The numbers along the axes."""
         yield single(("axis",), self.unit, content)
 
-    def plain(self, content: Any, _of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
         """A list of the numbers."""
         return list(content)
 
@@ -111,7 +111,7 @@ class Interval(Kind):
         """Both bounds."""
         yield single(("bound",), self.unit, content)
 
-    def plain(self, content: Any, _of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
         """A list of both bounds."""
         return list(content)
 
@@ -173,7 +173,7 @@ class PerJoint(Kind):
         """Its unit."""
         return f"per joint, {unit_words(self.unit)}"
 
-    def plain(self, content: Any, _of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
         """A list of the numbers."""
         return list(content)
 

@@ -18,8 +18,8 @@ from vsacli.documents.records import (
     ArraysOfRecord,
     Check,
     FieldPath,
+    JsonOfRecord,
     Kind,
-    PlainOfRecord,
     Refer,
     Schema,
 )
@@ -217,6 +217,6 @@ class TableFile(Kind):
         """The path of the file."""
         yield single((), None, content.source.path)
 
-    def plain(self, content: Any, _of_record: PlainOfRecord, /) -> Any:
+    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
         """The path of the file."""
         return content.source.path

@@ -28,7 +28,7 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     """
     return {
         "kind": "robot",
-        **_plain(robot),
+        **_json_fields(robot),
         "mass": sum(joint.link.mass for joint in robot.joints),
         "reach": _described_reach(robot),
         "joints": _joints(robot),
@@ -37,10 +37,12 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     }
 
 
-def _plain(record: Any) -> dict[str, Any]:
+def _json_fields(record: Any) -> dict[str, Any]:
     """The declared fields of a record."""
     return {
-        name: None if (content := getattr(record, name)) is None else field.kind.plain(content, _plain)
+        name: None
+        if (content := getattr(record, name)) is None
+        else field.kind.json_value(content, _json_fields)
         for name, (field, _) in declared(type(record)).items()
     }
 
@@ -60,7 +62,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
     values = np.where(loads.values <= least, 0.0, loads.values)
     return [
         {
-            **_plain(joint),
+            **_json_fields(joint),
             "static_load": {"torque": float(value), "at": configuration.tolist()},
             "stiffness_range": stiffness_ranges(joint, float(value)),
         }

@@ -1,15 +1,27 @@
-"""A trajectory file to begin with: a motion within reach, whose torques start without a step."""
+"""Commented files to begin with: a robot of plausible numbers, a trajectory that starts without a step."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+from vsacli.actuators import ACTUATORS
+from vsacli.base.errors import InputError
+from vsacli.documents.commented import commented_document
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
-from vsacli.files.templates.commented import document
+from vsacli.robot import file as robot_file
 from vsacli.robot.model import Joint, Robot
-from vsacli.trajectory.file import DEFAULT_RATE, FORMAT, OF_ANY_ROBOT
+from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.joints import CommandedJoints
+
+Values = dict[str, Any]
+
+TYPES = {"R": "revolute", "P": "prismatic"}
+MOST_JOINTS = 100
+ROBOT_HEAD = (
+    "A robot to begin with. Replace the numbers by those of yours; what stands commented out is optional",
+    "and shown with its default. Numbers are SI; expressions such as pi/2 and 90 deg may be written.",
+)
 
 DURATION = 4.0
 """s"""
@@ -18,7 +30,7 @@ POSITION_DEGREE = 9
 STIFFNESS_DEGREE = 5
 """With these, the motors' acceleration vanishes at both ends, and so does the step of their torques."""
 
-HEAD = (
+TRAJECTORY_HEAD = (
     "A trajectory to begin with. Degrees 9 and 5 are the smallest whose motor torques start and end without",
     "a step. What stands commented out is optional.",
 )
@@ -36,7 +48,50 @@ USED_SHARE = 0.5
 START_TO_LOWEST, END_TO_LOWEST = 1.15, 1.35
 """Stiffness at both ends relative to the lowest that can be reached, where nothing bounds it from above."""
 
-Values = dict[str, Any]
+
+def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-robot") -> str:
+    """The text of a robot file.
+
+    Args:
+        joints: a letter for each joint from the base to the tip, R (revolute) or P (prismatic).
+        actuator: of every joint, one of `ACTUATORS`.
+        name: of the robot.
+
+    Raises:
+        InputError: other letters, none, or too many.
+    """
+    kinds = [TYPES.get(letter, "") for letter in joints.upper()]
+    if not all(kinds) or not 0 < len(kinds) <= MOST_JOINTS:
+        expected = f"1 to {MOST_JOINTS} letters R (revolute) and P (prismatic), e.g. RRP"
+        raise InputError.one(f"joints: expected {expected}, found {joints[:MOST_JOINTS]!r}")
+    values = {
+        "name": name,
+        "gravity": [0, 0, -9.81],
+        "joints": [_joint(number, kind, actuator) for number, kind in enumerate(kinds, 1)],
+    }
+    return commented_document(robot_file.FORMAT, robot_file.RobotFile, values, ROBOT_HEAD)
+
+
+def _joint(number: int, joint_type: str, actuator: str) -> Values:
+    """A joint whose axis is vertical if it is the first, otherwise horizontal."""
+    alpha: Any = "pi/2" if number == 1 else 0
+    link = {"mass": 2.0, "inertia": {"xx": 0.002, "yy": 0.015, "zz": 0.015}}
+    geometry = _by_type(
+        joint_type,
+        {"dh": {"a": 0.3, "alpha": alpha}, "link": {**link, "com": [-0.15, 0, 0]}},
+        {"dh": {"a": 0, "alpha": alpha, "d": 0.2}, "link": {**link, "com": [0, 0, -0.1]}},
+    )
+    return {
+        "name": f"joint_{number}",
+        "type": joint_type,
+        **geometry,
+        "damping": _by_type(joint_type, 0.1, 1.0),
+        "actuator": {"type": actuator, **ACTUATORS[actuator].example(joint_type)},
+    }
+
+
+def _by_type(joint_type: str, revolute: Any, prismatic: Any) -> Any:
+    return revolute if joint_type == TYPES["R"] else prismatic
 
 
 def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory") -> str:
@@ -55,14 +110,14 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
     values: Values = {
         "name": name,
         "duration": DURATION,
-        "rate": DEFAULT_RATE,
+        "rate": trajectory_file.DEFAULT_RATE,
         "position": {"type": "polynomial", "degree": POSITION_DEGREE, **position},
     }
     if stiffness:
         values["stiffness"] = {"type": "polynomial", "degree": STIFFNESS_DEGREE, **stiffness}
     further = [] if robot is None else sorted(CommandedJoints.of(robot).taken - {"stiffness"})
     values |= {key: {"type": "constant", "value": 1} for key in further}
-    return document(FORMAT, OF_ANY_ROBOT, values, HEAD)
+    return commented_document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, values, TRAJECTORY_HEAD)
 
 
 def _position(robot: Robot) -> Values:

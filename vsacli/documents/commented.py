@@ -16,7 +16,7 @@ COMMENT_COLUMN = 44
 WIDTH = 110
 
 
-def document(format_name: str, cls: type, values: Values, head: Iterable[str] = ()) -> str:
+def commented_document(format_name: str, cls: type, values: Values, head: Iterable[str] = ()) -> str:
     """A document of the record class `cls`.
 
     Args:
