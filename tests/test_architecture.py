@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import vsacli
@@ -62,9 +63,14 @@ def dotted(source: Path) -> str:
     return ".".join(source.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
 
 
+@cache
+def parsed(source: Path) -> ast.Module:
+    return ast.parse(source.read_text(encoding="utf-8"))
+
+
 def imports(source: Path) -> Iterator[tuple[str, int]]:
     """Every import of a source file, wherever it stands: the dotted name, and the line."""
-    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(source)):
         if isinstance(node, ast.Import):
             yield from ((alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -75,7 +81,7 @@ def imports(source: Path) -> Iterator[tuple[str, int]]:
 
 def lines_run_at_import(source: Path) -> set[int]:
     """Lines where the statements begin that run when a module is imported."""
-    waiting: list[ast.AST] = [ast.parse(source.read_text(encoding="utf-8"))]
+    waiting: list[ast.AST] = [parsed(source)]
     lines = set()
     while waiting:
         for child in ast.iter_child_nodes(waiting.pop()):
@@ -137,7 +143,7 @@ def test_only_the_command_line_prints() -> None:
         f"{source}:{node.lineno}: {ast.unparse(node)}"
         for source in SOURCES
         if part_of(source) != "cli"
-        for node in ast.walk(ast.parse(source.read_text(encoding="utf-8")))
+        for node in ast.walk(parsed(source))
         if isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in TALK
     ]
     assert strays == []
@@ -205,7 +211,7 @@ def quick_tests(source: Path) -> list[str]:
     """Tests of a file that run without being asked for, some of their cases at least."""
     return [
         node.name
-        for node in ast.parse(source.read_text(encoding="utf-8")).body
+        for node in parsed(source).body
         if isinstance(node, ast.FunctionDef)
         and node.name.startswith("test_")
         and "pytest.mark.slow" not in map(ast.unparse, node.decorator_list)

@@ -33,7 +33,10 @@ REPOSITORY = Path(__file__).parents[1]
 README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 
-LONG = ("cli.md", "energy.md", "quickstart.md", "recorded.md", "robots.md", "simulation.md", "urdf.md")
+LONG = (
+    *("cli.md", "energy.md", "python.md", "quickstart.md"),
+    *("recorded.md", "robots.md", "simulation.md", "urdf.md"),
+)
 """Pages whose examples take more than a second."""
 
 SAVED_AS = re.compile(r"Save as `(\S+)`:$")

@@ -188,6 +188,7 @@ def test_a_saved_result_is_opened_as_what_it_was(result: Result, tmp_path: Path)
             _ = opened.tau
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_the_command(result: Result, tmp_path: Path) -> None:
     names = ["motion", "motor-torque", "elastic-torque", "energy"]
     assert list(result.plot()) == names

@@ -11,6 +11,7 @@ import matplotlib
 import pytest
 from matplotlib.figure import Figure
 from samples.figures import rest_to_rest
+from samples.marks import slow_but
 from samples.results import random_block, write_result
 
 from vsacli.base.errors import StorageError
@@ -22,7 +23,7 @@ def motion() -> dict[str, Figure]:
     return {"motion": plot_stored(rest_to_rest())["motion"]}
 
 
-@pytest.mark.parametrize("file_format", FORMATS)
+@pytest.mark.parametrize("file_format", slow_but({"png"}, FORMATS))
 def test_equal_results_give_equal_files(file_format: str, tmp_path: Path) -> None:
     first = save_figures(motion(), tmp_path / "first", "run", file_format)
     with matplotlib.rc_context({"svg.hashsalt": "another", "lines.linewidth": 9, "axes.facecolor": "red"}):
