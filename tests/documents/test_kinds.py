@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from vsacli.base.units import LENGTH, POSITION
-from vsacli.documents.arrays import ResolvedField
 from vsacli.documents.fields import (
     NON_NEGATIVE,
     Choice,
@@ -35,6 +34,7 @@ from vsacli.documents.fields import (
 )
 from vsacli.documents.kinds.nested import refused_in
 from vsacli.documents.records import Line, Values
+from vsacli.documents.resolved_fields import ResolvedField
 
 
 @dataclass(frozen=True)

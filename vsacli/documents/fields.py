@@ -13,8 +13,8 @@ from typing import Any
 from vsacli.base.units import Quantity
 from vsacli.documents.kinds.lists import Items, Pair
 from vsacli.documents.kinds.nested import OneOf, Record
-from vsacli.documents.kinds.rows import Interval, PerJoint, Vector
 from vsacli.documents.kinds.single import IDENTIFIER, Choice, Integer, Number, TableFile, Text
+from vsacli.documents.kinds.vectors import Interval, PerJoint, Vector
 from vsacli.documents.records import LARGEST, REQUIRED, SMALLEST, Check, Field, Kind, check_fields, declared
 
 __all__ = [

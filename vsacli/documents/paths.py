@@ -82,10 +82,9 @@ def _joined(place: Iterable[str]) -> str:
 def replace(record: _Record, path: str, value: Any, members: Mapping[str, str] | None = None) -> _Record:
     """A record of declared fields with another value at a path; the given record stays as it is.
 
-    This is all that a method `Robot.replace(path, value)` has to call, with itself as the record:
-    `replace(robot, "joints.elbow.actuator.spring.k", 500)`. Of a pair of sides that are the same, a path
-    without side changes both; if they differ, it needs 0, 1 or `*`. Every record on the way is built anew,
-    and so checks itself.
+    `replace(robot, "joints.elbow.actuator.spring.k", 500)`, for example, which `Robot.replace` offers. Of a
+    pair of sides that are the same, a path without side changes both; if they differ, it needs 0, 1 or `*`.
+    Every record on the way is built anew, and so checks itself.
 
     Args:
         record: a robot, for example; its undeclared fields, such as the sources of a robot, are kept.

@@ -17,7 +17,7 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 from vsacli.base.errors import FieldProblem, InvalidRecordError
 from vsacli.base.units import DIMENSIONLESS, Quantity
-from vsacli.documents.arrays import ResolvedField
+from vsacli.documents.resolved_fields import ResolvedField
 from vsacli.documents.tree import Node, Scope
 
 REQUIRED = dataclasses.MISSING

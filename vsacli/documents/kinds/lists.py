@@ -8,9 +8,8 @@ from typing import Any
 
 from vsacli.base.errors import FieldProblem
 from vsacli.documents import tree
-from vsacli.documents.arrays import ResolvedField, stacked
 from vsacli.documents.kinds.nested import line_of
-from vsacli.documents.kinds.rows import list_of
+from vsacli.documents.kinds.vectors import list_of
 from vsacli.documents.records import (
     ArraysOfRecord,
     Check,
@@ -24,17 +23,14 @@ from vsacli.documents.records import (
     declared,
     on_one_line,
 )
+from vsacli.documents.resolved_fields import ResolvedField, stacked
 from vsacli.documents.tree import INVALID, Node, Scope, all_valid, quoted
 
 
-@dataclass(eq=False)
-class Items(Kind):
-    """A list of one or more values of a kind, read as a tuple; all differ in the text field `unique`."""
+class _Entries(Kind):
+    """Several values of one kind."""
 
     item: Kind
-    unique: str | None = None
-
-    marks = "[]"
 
     @property
     def each(self) -> Kind:
@@ -45,6 +41,24 @@ class Items(Kind):
     def records(self) -> Mapping[str, type]:
         """Those of an entry."""
         return self.item.records
+
+    def refused(self, name: str, /) -> Iterator[str]:
+        """As of an entry."""
+        return self.item.refused(name)
+
+    def json_value(self, content: Any, of_record: JsonOfRecord, /) -> Any:
+        """A list of the entries."""
+        return [self.item.json_value(entry, of_record) for entry in content]
+
+
+@dataclass(eq=False)
+class Items(_Entries):
+    """A list of one or more values of a kind, read as a tuple; all differ in the text field `unique`."""
+
+    item: Kind
+    unique: str | None = None
+
+    marks = "[]"
 
     @property
     def per_joint(self) -> bool:
@@ -81,10 +95,6 @@ class Items(Kind):
             for index, item in enumerate(content):
                 yield from self.item.problems((*path, index), check, item)
 
-    def refused(self, name: str, /) -> Iterator[str]:
-        """As of an entry."""
-        return self.item.refused(name)
-
     def schema(self, check: Check | None, refer: Refer, /) -> Schema:
         """A list that is not empty."""
         return {"type": "array", "minItems": 1, "items": self.item.schema(check, refer)}
@@ -113,10 +123,6 @@ class Items(Kind):
             return super().arrays(content, of_record)
         return stacked("joint", (self.item.arrays(joint, of_record) for joint in content))
 
-    def json_value(self, content: Any, of_record: JsonOfRecord, /) -> Any:
-        """A list of the entries."""
-        return [self.item.json_value(entry, of_record) for entry in content]
-
 
 def _repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
     """Index of, and message about, each word that stood before; None never counts."""
@@ -134,20 +140,10 @@ def _scalar_entry(node: Node, key: str) -> tree.Scalar | None:
 
 
 @dataclass(eq=False)
-class Pair(Kind):
+class Pair(_Entries):
     """One value for both sides of a joint, or a list of two, read as a pair."""
 
     item: Kind
-
-    @property
-    def each(self) -> Kind:
-        """The kind of both."""
-        return self.item
-
-    @property
-    def records(self) -> Mapping[str, type]:
-        """Those of a side."""
-        return self.item.records
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Both values, which are one if one was written."""
@@ -175,10 +171,6 @@ class Pair(Kind):
         for index, item in enumerate(content):
             yield from self.item.problems((*path, index), check, item)
 
-    def refused(self, name: str, /) -> Iterator[str]:
-        """As of a side."""
-        return self.item.refused(name)
-
     def schema(self, check: Check | None, refer: Refer, /) -> Schema:
         """One, or a list of two."""
         item = self.item.schema(check, refer)
@@ -196,7 +188,3 @@ class Pair(Kind):
     def arrays(self, content: Any, of_record: ArraysOfRecord, /) -> Iterator[ResolvedField]:
         """Those of both motors."""
         return stacked("motor", (self.item.arrays(side, of_record) for side in content))
-
-    def json_value(self, content: Any, of_record: JsonOfRecord, /) -> Any:
-        """A list of two."""
-        return [self.item.json_value(side, of_record) for side in content]

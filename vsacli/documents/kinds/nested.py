@@ -9,7 +9,6 @@ from typing import Any
 from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.documents import tree
-from vsacli.documents.arrays import ResolvedField, single
 from vsacli.documents.kinds.single import Choice, unknown_word
 from vsacli.documents.records import (
     REQUIRED,
@@ -25,6 +24,7 @@ from vsacli.documents.records import (
     Schema,
     declared,
 )
+from vsacli.documents.resolved_fields import ResolvedField, single
 from vsacli.documents.tree import INVALID, Node, Scope
 
 

@@ -11,7 +11,6 @@ from typing import Any
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.units import DIMENSIONLESS, Quantity
-from vsacli.documents.arrays import ResolvedField, single
 from vsacli.documents.expression import ANGLES, BOOLEANS, MAX_LENGTH, ExpressionError, evaluate
 from vsacli.documents.records import (
     LARGEST,
@@ -23,6 +22,7 @@ from vsacli.documents.records import (
     Refer,
     Schema,
 )
+from vsacli.documents.resolved_fields import ResolvedField, single
 from vsacli.documents.tree import INVALID, Node, Scalar, Scope, quoted
 
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")

@@ -17,8 +17,8 @@ from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.base.wrench import WRENCH_AXES
-from vsacli.documents.arrays import ResolvedField
 from vsacli.documents.fields import declared
+from vsacli.documents.resolved_fields import ResolvedField
 from vsacli.documents.source import Source
 from vsacli.results.store.schema import (
     TEXT,

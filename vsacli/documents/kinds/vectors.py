@@ -1,4 +1,4 @@
-"""Values that are a row of numbers: a vector, an interval, a number for each joint."""
+"""Values that are several numbers: a vector, an interval, a number for each joint."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
-from vsacli.documents.arrays import ResolvedField, single
 from vsacli.documents.kinds.single import IDENTIFIER, Number, read_number, unit_words
 from vsacli.documents.records import ArraysOfRecord, Check, FieldPath, JsonOfRecord, Kind, Refer, Schema
+from vsacli.documents.resolved_fields import ResolvedField, single
 from vsacli.documents.tree import INVALID, Node, Scope, all_valid
 
 
@@ -22,17 +22,27 @@ def list_of(item: Schema, length: int) -> Schema:
     return {"type": "array", "items": item, "minItems": length, "maxItems": length}
 
 
-@dataclass(eq=False)
-class Vector(Kind):
-    """A list of `length` numbers, read as a tuple."""
+class _Numbers(Kind):
+    """Several numbers of one unit."""
 
-    length: int
     unit: Quantity
 
     @property
     def each(self) -> Number:
         """A number of the same unit."""
         return Number(self.unit)
+
+    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
+        """A list of the numbers."""
+        return list(content)
+
+
+@dataclass(eq=False)
+class Vector(_Numbers):
+    """A list of `length` numbers, read as a tuple."""
+
+    length: int
+    unit: Quantity
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """The numbers, which may still be too many or too few."""
@@ -60,24 +70,15 @@ class Vector(Kind):
         """The numbers along the axes."""
         yield single(("axis",), self.unit, content)
 
-    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
-        """A list of the numbers."""
-        return list(content)
-
 
 @dataclass(eq=False)
-class Interval(Kind):
+class Interval(_Numbers):
     """`[lower, upper]`, read as a pair; a scalar means [-scalar, scalar], if `one_sided` [-inf, scalar]."""
 
     unit: Quantity
     one_sided: bool = False
 
     forms = " ([lower, upper] or one number)"
-
-    @property
-    def each(self) -> Number:
-        """A number of the same unit."""
-        return Number(self.unit)
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Both bounds."""
@@ -111,13 +112,9 @@ class Interval(Kind):
         """Both bounds."""
         yield single(("bound",), self.unit, content)
 
-    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
-        """A list of both bounds."""
-        return list(content)
-
 
 @dataclass(eq=False)
-class PerJoint(Kind):
+class PerJoint(_Numbers):
     """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint.
 
     Joints that are exempt from `purpose` are named in no mapping and null in a list; their entry is None.
@@ -127,11 +124,6 @@ class PerJoint(Kind):
     purpose: str = ""
 
     per_joint = True
-
-    @property
-    def each(self) -> Number:
-        """A number of the same unit."""
-        return Number(self.unit)
 
     def names(self, content: Any, members: Mapping[str, str], /) -> list[str]:
         """The names of the joints."""
@@ -172,10 +164,6 @@ class PerJoint(Kind):
     def words(self) -> str:
         """Its unit."""
         return f"per joint, {unit_words(self.unit)}"
-
-    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
-        """A list of the numbers."""
-        return list(content)
 
 
 def _no_number(node: Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:

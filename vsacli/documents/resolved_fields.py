@@ -1,4 +1,4 @@
-"""Declared values as arrays: joined over the entries of lists, whatever fields those have."""
+"""Fields of records as arrays: joined over the entries of lists, whatever fields those have."""
 
 from __future__ import annotations
 
