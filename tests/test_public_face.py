@@ -41,6 +41,7 @@ from vsacli import (
     state_derivative,
     suggest,
 )
+from vsacli.results.store.writer import ResultWriter
 
 REPOSITORY = Path(__file__).parents[1]
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
@@ -189,6 +190,28 @@ def test_a_saved_result_is_opened_as_what_it_was(result: Result, tmp_path: Path)
 
 
 @pytest.mark.slow
+def test_a_variable_that_was_not_stored_is_missed_by_name(result: Result, tmp_path: Path) -> None:
+    path = tmp_path / "part.h5"
+    with ResultWriter(path, result.robot, result.trajectory, ["q"]) as writer:
+        writer.write(result)
+        writer.finish(result.report.as_json())
+    with open_result(path) as opened:
+        assert list(opened.arrays()) == ["time", "q"]
+        assert list(opened.to_xarray().data_vars) == ["q"]
+        with pytest.raises(AttributeError, match="holds no tau_motor; run invdyn again without --variables"):
+            _ = opened.tau_motor
+
+
+def test_a_report_of_another_form_is_refused(result: Result, tmp_path: Path) -> None:
+    path = tmp_path / "result.h5"
+    result.save(path)
+    with h5py.File(path, "r+") as file:
+        file["report/json"][()] = '{"verdict": "ok"}'
+    with pytest.raises(InputError, match="its report has another form than this version writes"):
+        open_result(path)
+    path.unlink()  # it was closed
+
+
 def test_figures_are_those_of_the_command(result: Result, tmp_path: Path) -> None:
     names = ["motion", "motor-torque", "elastic-torque", "energy"]
     assert list(result.plot()) == names
