@@ -1,4 +1,5 @@
-"""Given derivatives that follow from their position, and those that do not."""
+"""Given derivatives that follow from vsacli.trajectory.recorded.arrays import samples_of_arrays
+from their position, and those that do not."""
 
 import re
 
@@ -6,6 +7,7 @@ import numpy as np
 import pytest
 
 from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 
 TIME = np.arange(4001) / 1000
@@ -22,7 +24,7 @@ def complaints(*given, q=None, noise=0.0, time=TIME, method=None):
     q = columns(0, time) if q is None else q
     q = q + noise * np.random.default_rng(0).standard_normal(q.shape)
     missing = [None] * (4 - len(given))
-    record = Samples.from_arrays(POSITION, time, q, *given, *missing)
+    record = samples_of_arrays(POSITION, time, q, *given, *missing)
     named = Samples(**{**vars(record), "labels": ("base", "elbow")})
     return [w for w in SampledProfile.of(named, method).warnings if "follow" in w]
 
@@ -100,7 +102,7 @@ def test_a_stiffness_and_a_component_without_one():
     stiffness = 1000 + 50 * columns(0)
     rate = 40 * columns(1)
     stiffness[:, 0] = rate[:, 0] = np.nan
-    profile = SampledProfile.of(Samples.from_arrays(STIFFNESS, TIME, stiffness, rate, None))
+    profile = SampledProfile.of(samples_of_arrays(STIFFNESS, TIME, stiffness, rate, None))
     (sentence,) = (w for w in profile.warnings if "follow" in w)
     assert (
         sentence

@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline, make_interp_spline, make_lsq_spline
 
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, fit_samples
 from vsacli.trajectory.fits.least_squares import BLOCK_SAMPLES, best_spans, fit_spline, most_spans
-from vsacli.trajectory.fits.noise import INTERPOLATION_GAIN, LEAST_SQUARES_GAIN, estimate
+from vsacli.trajectory.fits.selection import INTERPOLATION_GAIN, LEAST_SQUARES_GAIN, estimated_noise
 
 EPS = np.finfo(float).eps
 FREQUENCIES, AMPLITUDES = (0.3, 0.7, 1.1, 1.9), (0.8, 0.4, 0.2, 0.1)
@@ -221,8 +221,8 @@ def test_estimate_of_noise_does_not_depend_on_the_steps():
     time = np.cumsum(steps) / 1000
     for deviation in (1e-7, 1e-3):
         rows = np.array([motion(time), np.zeros_like(time)]) + noise(40000, deviation).reshape(2, -1)
-        np.testing.assert_allclose(estimate(time, rows, 8), deviation, rtol=0.05)
-    assert estimate(time[:8], rows[:, :8], 8).tolist() == [0, 0]
+        np.testing.assert_allclose(estimated_noise(time, rows, 8), deviation, rtol=0.05)
+    assert estimated_noise(time[:8], rows[:, :8], 8).tolist() == [0, 0]
 
 
 @pytest.mark.parametrize("degree", [5, 7])

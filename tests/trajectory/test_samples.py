@@ -8,13 +8,8 @@ from hypothesis import strategies as st
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES
-from vsacli.trajectory.recorded.samples import (
-    SampledProfile,
-    Samples,
-    checked_array,
-    time_problems,
-    value_problems,
-)
+from vsacli.trajectory.recorded.arrays import checked_array, samples_of_arrays, time_problems, value_problems
+from vsacli.trajectory.recorded.samples import SampledProfile
 
 EPS = np.finfo(float).eps
 
@@ -26,7 +21,7 @@ def sine(time, order):
 
 def record(signal, time, *columns):
     further = [None] * (signal.orders - len(columns))
-    return Samples.from_arrays(signal, time, *columns, *further)
+    return samples_of_arrays(signal, time, *columns, *further)
 
 
 def profile(signal, time, *columns):

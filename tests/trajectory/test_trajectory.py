@@ -11,7 +11,8 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import Constant, RestToRest
-from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.recorded.arrays import samples_of_arrays
+from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -142,7 +143,7 @@ def test_recorded_and_closed_form_parts_mix(recorded):
         "position": (POSITION, whole.q),
         "stiffness": (STIFFNESS, whole.commanded["stiffness"]),
     }[recorded]
-    record = Samples.from_arrays(signal, whole.time, values, *[None] * (signal.orders - 1))
+    record = samples_of_arrays(signal, whole.time, values, *[None] * (signal.orders - 1))
     parts[recorded] = SampledProfile.of(record)
     position, stiffness = parts.values()
     mixed = Trajectory(RecordedTimes(whole.time), position, {"stiffness": stiffness}, name="mixed")

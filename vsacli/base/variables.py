@@ -6,7 +6,7 @@ The declaration feeds the pipeline, the HDF5 attributes, the CSV headers, the pl
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from vsacli.base import units
 from vsacli.base.arrays import AnyArray, of_joint
@@ -133,27 +133,33 @@ class Block:
     A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have
     is NaN throughout. What a block does not have is None: the wrench, (samples, 6), if the trajectory has
     none, and `motor_energy`, which sums over the steps before, until the block has its place in a run.
+
+    Attributes:
+        declared: the variables that it may have, by name.
     """
 
+    declared: ClassVar[Mapping[str, Variable]] = VARIABLES
+
     def __init__(self, **arrays: AnyArray) -> None:
-        unknown = arrays.keys() - VARIABLES.keys()
+        unknown = arrays.keys() - self.declared.keys()
         if unknown:
             raise TypeError(f"no variable is called {', '.join(sorted(unknown))}")
         vars(self).update(arrays)
 
     def __getattr__(self, name: str) -> Any:
-        if name in VARIABLES:
+        if name in self.declared:
             return None
         raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}")
 
     def of_joint(self, index: int) -> dict[str, AnyArray]:
         """The variables of one joint by name, (samples,), those of its motors (2, samples)."""
-        of_joints = {name: array for name, array in self.arrays().items() if "joint" in VARIABLES[name].dims}
+        joints = (name for name, variable in self.declared.items() if "joint" in variable.dims)
+        of_joints = {name: vars(self)[name] for name in joints if name in vars(self)}
         return of_joint(of_joints, index)
 
     def arrays(self) -> dict[str, AnyArray]:
         """The variables there are, by name."""
-        return {name: vars(self)[name] for name in VARIABLES if name in vars(self)}
+        return {name: vars(self)[name] for name in self.declared if name in vars(self)}
 
 
 def select_variables(

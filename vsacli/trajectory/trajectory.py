@@ -10,19 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, over_time
-from vsacli.base.errors import InputError, Problem
+from vsacli.base.errors import InputError
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_names
 from vsacli.base.wrench import Wrench
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import Constant
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.profile import Profile, WrenchProfile
-from vsacli.trajectory.times import RecordedTimes, Times
+from vsacli.trajectory.times import Times
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-    from vsacli.trajectory.recorded.samples import Samples
 
 
 class Trajectory:
@@ -146,17 +144,8 @@ class Trajectory:
             TypeError: there is no such signal.
             InputError: `fit` is no such word; or naming each array that does not fit, by index.
         """
-        from vsacli.trajectory.fits import METHODS
-        from vsacli.trajectory.recorded.samples import (
-            SampledProfile,
-            checked_array,
-            time_problems,
-            value_problems,
-        )
+        from vsacli.trajectory.recorded.arrays import profiles_of_arrays
 
-        if fit not in (None, *METHODS):
-            raise InputError.one(f"fit must be one of {', '.join(METHODS)}, not {fit!r}")
-        times = checked_array("time", time, None)
         of_joints = {"stiffness": stiffness, **commanded}
         unknown = of_joints.keys() - set(commanded_names())
         if unknown:
@@ -166,13 +155,9 @@ class Trajectory:
             **{each: tuple(map(of_joints.get, each.names)) for each in COMMANDED.values()},
             WRENCH: (wrench, dwrench, ddwrench),
         }
-        records = [record for each, arrays in given.items() for record in _recorded(each, times, *arrays)]
-        problems = [*time_problems(times), *(found for part in records for found in value_problems(part))]
-        if problems:
-            raise InputError(Problem("", 0, str(problem)) for problem in problems)
-        profiles = {record.signal.key: SampledProfile.of(record, fit) for record in records}
+        times, profiles = profiles_of_arrays(time, given, fit)
         exerted = WrenchProfile(profiles[WRENCH.key], wrench_frame) if WRENCH.key in profiles else None
-        return cls(RecordedTimes(times), profiles[POSITION.key], profiles, wrench=exerted, name=name)
+        return cls(times, profiles[POSITION.key], profiles, wrench=exerted, name=name)
 
     @property
     def joints(self) -> int:
@@ -263,17 +248,3 @@ class Trajectory:
 def _nothing(signal: Signal, joints: int, times: Times) -> Constant:
     """The profile of a signal that is chosen for no joint."""
     return Constant(signal=signal, span=times.span, value=(math.nan,) * joints)
-
-
-def _recorded(
-    signal: Signal, times: FloatArray, values: ArrayLike | None, *derivatives: ArrayLike | None
-) -> list[Samples]:
-    """The samples of a signal, if there are any."""
-    from vsacli.trajectory.recorded.samples import Samples
-
-    if values is not None:
-        return [Samples.from_arrays(signal, times, values, *derivatives)]
-    if any(given is not None for given in derivatives):
-        name = signal.names[0]
-        raise InputError.one(f"derivatives of a {name} are given, but not the {name}")
-    return []

@@ -9,6 +9,7 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.flags import Flag, marked
+from vsacli.compute.rows import Layout
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.control.codegen.robot_functions import command_structure, variable_array
 from vsacli.control.feedback_linearization import control_law, position_order
@@ -113,14 +114,9 @@ class _Law:
 
     def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
         """The arrays of each argument by name."""
-        entries, start = np.concatenate(rows), 0
-        for _, structure in self.arguments:
-            arrays = {}
-            for array in structure.arrays:
-                size = len(list(array.entries))
-                arrays[array.name] = entries[start : start + size].reshape(*array.shape)
-                start += size
-            yield arrays
+        sizes = Layout({name: (structure.layout.size,) for name, structure in self.arguments})
+        entries = sizes.arrays(np.concatenate(rows))
+        return (structure.layout.arrays(entries[name]) for name, structure in self.arguments)
 
     def _flags(self, index: int, values: Arrays) -> Any:
         """What is wrong with a joint: no torque, or a limit that state or torque break."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+from vsacli.compute.rows import Layout
 from vsacli.compute.tracing import Kind, Program, trace
 
 Rows = Sequence[Any]
@@ -55,9 +56,9 @@ class Structure:
         return (entry for array in self.arrays for entry in array.entries)
 
     @property
-    def size(self) -> int:
-        """Number of entries."""
-        return len(list(self.entries))
+    def layout(self) -> Layout:
+        """Where the entries of each array stand among all entries."""
+        return Layout({array.name: array.shape for array in self.arrays})
 
 
 @dataclass(frozen=True)
@@ -82,4 +83,6 @@ class Function:
 
     def program(self) -> Program:
         """What the function does to one sample."""
-        return trace(self.compute, [Kind.REAL] * sum(structure.size for _, structure in self.arguments))
+        return trace(
+            self.compute, [Kind.REAL] * sum(structure.layout.size for _, structure in self.arguments)
+        )

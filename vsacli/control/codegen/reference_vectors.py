@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, over_time
 from vsacli.base.signals import POSITION, orders_of_derivation
 from vsacli.control.codegen.interface import Function
 from vsacli.control.gains import STIFFNESS_ORDER
@@ -60,12 +60,8 @@ class Reference:
         ]
         with np.errstate(all="ignore"):
             cases = [_computed(function, row) for row in np.concatenate(entries, axis=1)]
-        sizes = [len(list(array.entries)) for array in function.result.arrays]
-        parts = np.split(np.array(cases), np.cumsum(sizes)[:-1], axis=1)
-        return {
-            array.name: part.reshape(CASES, *array.shape)
-            for array, part in zip(function.result.arrays, parts, strict=True)
-        }
+        found = function.result.layout.arrays(np.array(cases).T)
+        return {name: over_time(array) for name, array in found.items()}
 
     @property
     def largest_stiffness(self) -> float:

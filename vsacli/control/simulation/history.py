@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from vsacli.base.arrays import FlagArray, FloatArray, of_joint
-from vsacli.base.simulation_variables import COMMANDED, ERRORS, actual, error
+from vsacli.base.simulation_variables import COMMANDED, ERRORS, SIMULATION_VARIABLES, actual, error
+from vsacli.base.variables import Block
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.integrator import StateTrajectory
@@ -15,41 +14,13 @@ from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot
 
 
-@dataclass(frozen=True, kw_only=True)
-class History:
-    """What happened, (samples, joints) or (samples, joints, 2); see `SIMULATION_VARIABLES`.
+class History(Block):
+    """What happened, (samples, joints[, 2]); see `SIMULATION_VARIABLES`.
 
     NaN where a joint does not have the variable: motor 2 of an elastic joint, the stiffness of a rigid one.
     """
 
-    time: FloatArray
-    q: FloatArray
-    dq: FloatArray
-    ddq: FloatArray
-    stiffness: FloatArray
-    dstiffness: FloatArray
-    tau_motor: FloatArray
-    q_actual: FloatArray
-    dq_actual: FloatArray
-    ddq_actual: FloatArray
-    stiffness_actual: FloatArray
-    dstiffness_actual: FloatArray
-    tau_e_actual: FloatArray
-    phi_actual: FloatArray
-    dphi_actual: FloatArray
-    theta_actual: FloatArray
-    dtheta_actual: FloatArray
-    tau_spring_actual: FloatArray
-    tau_motor_actual: FloatArray
-    elastic_energy_actual: FloatArray
-    motor_power_actual: FloatArray
-    motor_energy_actual: FloatArray
-    det_A_actual: FloatArray  # noqa: N815  (the published name)
-    q_error: FloatArray
-    dq_error: FloatArray
-    stiffness_error: FloatArray
-    dstiffness_error: FloatArray
-    flags: FlagArray
+    declared = SIMULATION_VARIABLES
 
 
 def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory) -> History:

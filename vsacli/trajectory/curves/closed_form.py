@@ -1,4 +1,4 @@
-"""Profiles given by a formula."""
+"""Profiles given by a formula, and the simplest of them."""
 
 from __future__ import annotations
 
@@ -15,6 +15,12 @@ from vsacli.trajectory.times import stretch
 
 SHORTEST, LONGEST = 1e-30, 1e30
 """Durations of profiles, s, of which the fourth power is still a number."""
+
+DEGREES = range(3, 16, 2)
+"""Degrees of rest-to-rest polynomials."""
+
+VIA_DEGREES = range(3, 10, 2)
+"""Degrees of splines through points; those of higher degree lose too many digits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,3 +72,21 @@ class ClosedForm(ABC):
         """The same course, slower by a factor."""
         first, last = self.span
         return replace(self, span=(first, stretch(last, first, factor)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constant(ClosedForm):
+    """The same `value`, one number a component, all the time."""
+
+    value: tuple[float, ...]
+
+    @property
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+        return len(self.value)
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        rows = np.zeros((self.signal.orders, self.components, len(time)))
+        rows[0] = np.array(self.value)[:, None]
+        return rows

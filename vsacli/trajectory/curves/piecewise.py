@@ -13,8 +13,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import Signal
-from vsacli.trajectory.curves.closed_form import ClosedForm
-from vsacli.trajectory.curves.constant import Constant
+from vsacli.trajectory.curves.closed_form import ClosedForm, Constant
 from vsacli.trajectory.curves.rest_to_rest import RestToRest
 from vsacli.trajectory.times import stretch
 

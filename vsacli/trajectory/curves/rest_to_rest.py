@@ -12,8 +12,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves.closed_form import ClosedForm
-from vsacli.trajectory.curves.curve_degrees import DEGREES
+from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,9 +12,7 @@ import numpy.typing as npt
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves.closed_form import ClosedForm
-from vsacli.trajectory.curves.curve_degrees import VIA_DEGREES
-from vsacli.trajectory.curves.taylor import taylor_series
+from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm
 
 SEAM = 1e-9
 """Largest jump between the expansions about two neighbouring points, relative to the peak of each derivative:
@@ -119,7 +117,7 @@ class ViaPoints(ClosedForm):
         piece = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
         nearest = piece + (time - knots[piece] > knots[piece + 1] - time)
         coefficients = [*self._derivatives[:-1, :, nearest], self._derivatives[-1][:, piece]]
-        series = taylor_series(coefficients, (time - knots[nearest]) / (last - first), self.signal.orders)
+        series = _taylor_series(coefficients, (time - knots[nearest]) / (last - first), self.signal.orders)
 
         rows = np.full((self.signal.orders, self.components, len(time)), np.nan)
         for order, total in enumerate(series):
@@ -181,9 +179,9 @@ def _is_smooth(rows: FloatArray, lengths: FloatArray, orders: int) -> bool:
     """
     left, right = list(rows[:, :, :-1]), [*rows[:-1, :, 1:], rows[-1, :, :-1]]
     before, after = (
-        np.array(taylor_series(*side, orders)) for side in ((left, lengths / 2), (right, -lengths / 2))
+        np.array(_taylor_series(*side, orders)) for side in ((left, lengths / 2), (right, -lengths / 2))
     )
-    quarters = [taylor_series(left, lengths / 4, orders), taylor_series(right, -lengths / 4, orders)]
+    quarters = [_taylor_series(left, lengths / 4, orders), _taylor_series(right, -lengths / 4, orders)]
     peaks = np.abs(np.concatenate([rows[:orders], before, *quarters], axis=2)).max(axis=2)
     peaks[0] = np.abs(rows[0]).max(axis=1)
     return bool(np.all(np.abs(before - after).max(axis=2) <= SEAM * peaks))
@@ -194,3 +192,23 @@ def _unfit(degree: int) -> InputError:
         f"the points are too unevenly spaced in time for a spline of degree {degree};"
         " space them more evenly, or take a lower degree"
     )
+
+
+def _taylor_series(derivatives: Sequence[FloatArray], offset: FloatArray, orders: int) -> list[FloatArray]:
+    """The polynomial of given derivatives and its own derivatives of order 0 to orders-1, by Horner's rule.
+
+    Args:
+        derivatives: at the centre of each sample, from order 0 to the degree, each (components, samples).
+        offset: from the centre, (samples,).
+        orders: how many are wanted.
+    """
+    none = np.zeros_like(derivatives[0])
+    return [_horner(derivatives[order:] or [none], offset) for order in range(orders)]
+
+
+def _horner(derivatives: Sequence[FloatArray], offset: FloatArray) -> FloatArray:
+    total = derivatives[-1].copy()
+    for power in range(len(derivatives) - 1, 0, -1):
+        total *= offset / power
+        total += derivatives[power - 1]
+    return total

@@ -10,7 +10,6 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.trajectory.fits.fit import Fit, Part, join
 from vsacli.trajectory.fits.least_squares import best_spans, fit_spline, most_spans
-from vsacli.trajectory.fits.noise import INTERPOLATION_GAIN, estimate
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -18,10 +17,22 @@ if TYPE_CHECKING:
 LEAST_SQUARES, INTERPOLATE = "lsq", "interpolate"
 METHODS = (LEAST_SQUARES, INTERPOLATE)
 
+INTERPOLATION_GAIN = {7: (1.0, 1.481, 4.628, 6.957, 37.415), 5: (1.0, 1.376, 4.798)}
+"""By degree, for each derivative k: standard deviation at the samples, times step^k, of a spline through
+equally spaced samples with independent noise of standard deviation 1."""
+
+LEAST_SQUARES_GAIN = {7: (1.0, 1.823, 4.484, 12.11, 34.37), 5: (1.0, 1.829, 4.538)}
+"""By degree, for each derivative k: root mean square over a knot span, times span^k sqrt(samples in a span),
+of a least-squares spline near many such samples, far from its ends."""
+
+
+BLOCK_SAMPLES = 16384
+"""Samples whose differences are held in memory at a time."""
+
 NOISY = 0.01
 """Share of the highest derivative of the interpolating spline that noise may make up."""
 
-SMALL = 1e-3
+SMALLEST_SHARE = 1e-3
 """Share of the largest component's derivative against which smaller ones are measured: what is below may be
 nothing but rounding of a component that rests."""
 
@@ -40,7 +51,7 @@ def fit_samples(time: FloatArray, values: FloatArray, degree: int, order: int, m
     """
     present = np.flatnonzero(~np.all(np.isnan(values), axis=1))
     noise = np.zeros(len(values))
-    noise[present] = estimate(time, values[present], degree + 1)
+    noise[present] = estimated_noise(time, values[present], degree + 1)
     parts: list[Part] = []
     if present.size and method == LEAST_SQUARES:
         spans = best_spans(time, values[present], degree)
@@ -71,7 +82,7 @@ def _noisy(
     inside = time[degree:-degree] if len(time) > 4 * degree else time
     derivative = np.sqrt(np.mean(spline(inside, nu=order) ** 2, axis=0))
     least = np.abs(rows).max(axis=1) / duration**order
-    scale = np.maximum(np.maximum(derivative, least), SMALL * derivative.max())
+    scale = np.maximum(np.maximum(derivative, least), SMALLEST_SHARE * derivative.max())
     noisy: BoolArray = INTERPOLATION_GAIN[degree][order] * noise / step**order > NOISY * scale
     return noisy
 
@@ -92,3 +103,41 @@ def _least_squares(
     for count in np.unique(spans).tolist():
         alike = members[spans == count]
         yield Part(alike, fit_spline(time, values[alike], count, degree), exact=False)
+
+
+def estimated_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArray:
+    """Standard deviation of independent noise, from divided differences of the samples.
+
+    A difference of a high order leaves next to nothing of a function that is smooth over a few samples; its
+    weights are scaled so that their squares add up to 1.
+
+    Args:
+        time: (samples,), s.
+        rows: (components, samples).
+        order: of the differences.
+
+    Returns:
+        (components,), zero if there are too few samples to tell.
+    """
+    count = len(time) - order
+    power = np.zeros(len(rows))
+    for start in range(0, count, BLOCK_SAMPLES):
+        block = slice(start, start + BLOCK_SAMPLES + order)
+        power += np.sum(_differences(time[block], rows[:, block], order) ** 2, axis=1)
+    return np.asarray(np.sqrt(power / max(1, count)))
+
+
+def _differences(time: FloatArray, rows: FloatArray, order: int) -> FloatArray:
+    """(components, samples - order)."""
+    count = len(time) - order
+    nodes = [time[i : i + count] for i in range(order + 1)]
+    span = nodes[-1] - nodes[0]
+    weights = np.ones((order + 1, count))
+    for i, node in enumerate(nodes):
+        for other in (*nodes[:i], *nodes[i + 1 :]):
+            weights[i] /= (node - other) / span
+    weights /= np.sqrt(np.sum(weights**2, axis=0))
+    total = np.zeros((len(rows), count))
+    for i, weight in enumerate(weights):
+        total += weight * rows[:, i : i + count]
+    return total

@@ -17,14 +17,9 @@ from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.trajectory.joints import CommandedJoints, takers
+from vsacli.trajectory.recorded.arrays import SampleProblem, time_problems, value_problems
 from vsacli.trajectory.recorded.columns import Column, Layout, column_layout
-from vsacli.trajectory.recorded.samples import (
-    SampledProfile,
-    SampleProblem,
-    Samples,
-    time_problems,
-    value_problems,
-)
+from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 

@@ -7,18 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from vsacli.base.arrays import BoolArray, FloatArray, by_joint
-from vsacli.base.errors import InputError
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.signals import Signal
-from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.fits import Fit, fit_samples, mismatches
 from vsacli.trajectory.fits.fit_text import describe, fit_sentences
 from vsacli.trajectory.times import stretch
-
-LARGEST = 1e100
-"""Values beyond are no motion of a robot, and their squares, which a fit takes, would overflow."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -38,24 +32,6 @@ class Samples:
     values: FloatArray = field(repr=False)
     derivatives: tuple[FloatArray | None, ...] = field(repr=False)
     labels: tuple[str, ...]
-
-    @classmethod
-    def from_arrays(
-        cls, signal: Signal, time: FloatArray, values: npt.ArrayLike, *derivatives: npt.ArrayLike | None
-    ) -> Samples:
-        """From arrays of the shape (samples, components).
-
-        Raises:
-            InputError: an array holds something else than numbers, or has another shape.
-        """
-        name, *names = signal.names
-        rows = _checked_rows(name, values, len(time), signal.components)
-        further = tuple(
-            None if array is None else _checked_rows(name, array, len(time), len(rows))
-            for name, array in zip(names, derivatives, strict=True)
-        )
-        labels = tuple(f"column {index}" for index in range(len(rows)))
-        return cls(signal=signal, time=time, values=rows, derivatives=further, labels=labels)
 
     @property
     def given(self) -> BoolArray:
@@ -184,84 +160,3 @@ class SampledProfile:
     def stretched(self, factor: float) -> SampledProfile:
         """The same course, slower by a factor; the warnings are those about the record."""
         return replace(self, record=self.record.stretched(factor), fit=self.fit.stretched(factor))
-
-
-def checked_array(name: str, array: npt.ArrayLike, *shape: int | None) -> FloatArray:
-    """The array as float64; None in the shape stands for any length.
-
-    Raises:
-        InputError: the array holds something else than numbers, or has another shape.
-    """
-    try:
-        found = np.asarray(array, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError.one(f"{name} must be an array of numbers: {error}") from None
-    if found.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, found.shape, strict=True)):
-        expected = ", ".join("any" if length is None else str(length) for length in shape)
-        raise InputError.one(f"{name} has the shape {found.shape}, expected ({expected})")
-    return found
-
-
-def _checked_rows(name: str, array: npt.ArrayLike, samples: int, components: int | None) -> FloatArray:
-    return by_joint(checked_array(name, array, samples, components))
-
-
-@dataclass(frozen=True)
-class SampleProblem:
-    """Something wrong with recorded samples: first at the index `sample` (None: concerns all)."""
-
-    quantity: str
-    message: str
-    joint: int | None = None
-    sample: int | None = None
-
-    def __str__(self) -> str:
-        index = ", ".join(str(number) for number in (self.sample, self.joint) if number is not None)
-        return f"{self.quantity}[{index}] {self.message}" if index else f"{self.quantity} {self.message}"
-
-
-def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
-    """What keeps these times, (samples,) in s, from being those of a trajectory: at most one problem."""
-    finite, rising = np.isfinite(time), time[1:] > time[:-1]
-    if not finite.all():
-        sample = int(np.argmin(finite))
-        yield SampleProblem("time", f"must be finite, not {time[sample]}", sample=sample)
-    elif not rising.all():
-        sample = int(np.argmin(rising)) + 1
-        message = f"must increase strictly, but {time[sample]} s follows {time[sample - 1]} s"
-        yield SampleProblem("time", message, sample=sample)
-    elif len(time) > 1 and not SHORTEST <= time[-1] - time[0] <= LONGEST:
-        yield SampleProblem(
-            "time", f"must go on for {SHORTEST:g} to {LONGEST:g} s, not {time[-1] - time[0]:g} s"
-        )
-
-
-def value_problems(samples: Samples) -> Iterator[SampleProblem]:
-    """What keeps these values from being used: too few, or not finite, or not positive where they must be."""
-    signal, degree = samples.signal, samples.signal.spline_degree
-    name, count = signal.names[0], len(samples.time)
-    if count <= degree:
-        yield SampleProblem(
-            name, f"needs at least {degree + 1} samples for a C{degree - 1} spline, not {count}"
-        )
-    given = np.flatnonzero(samples.given).tolist()
-    for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
-        for joint, row in () if rows is None else zip(given, rows[given], strict=True):
-            yield from _breach(column, joint, samples.time, row, np.isfinite(row), "finite")
-            small = ~(np.isfinite(row) & (np.abs(row) > LARGEST))
-            yield from _breach(column, joint, samples.time, row, small, f"at most {LARGEST:g} in size")
-    if signal.positive:
-        for joint, row in zip(given, samples.values[given], strict=True):
-            yield from _breach(name, joint, samples.time, row, ~(row <= 0), "positive")
-
-
-def _breach(
-    quantity: str, joint: int, time: FloatArray, row: FloatArray, holds: BoolArray, requirement: str
-) -> Iterator[SampleProblem]:
-    """The first sample at which a requirement does not hold, and how many there are."""
-    if holds.all():
-        return
-    first, count = int(np.argmin(holds)), len(holds) - int(np.count_nonzero(holds))
-    message = f"must be {requirement}, not {row[first]:g} (t = {time[first]:g} s"
-    message += ")" if count == 1 else f"; {count} such samples)"
-    yield SampleProblem(quantity, message, joint, first)
