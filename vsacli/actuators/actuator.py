@@ -132,12 +132,16 @@ class Actuator(ABC):
                 given only if the kind has `deflection_rates`.
         """
 
+    def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        """theta, (2, samples), from phi and the position of the joint; velocities from their rates (69)."""
+        return phi + q
+
     @abstractmethod
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
         """Rate of tau_spring of each motor, (motors, samples), from the other variables of the joint."""
 
-    def carried(self, phi: FloatArray) -> Carried:
-        """What the springs carry at phi, for the self-check."""
+    def carried(self, of_joint: OfJoint) -> Carried:
+        """What the springs carry by their laws, from the motion of joint and motors, for the self-check."""
         raise NotImplementedError(f"{type(self).__name__} has no springs")
 
     @classmethod

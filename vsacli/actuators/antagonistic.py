@@ -150,9 +150,9 @@ class Antagonistic(Actuator):
         sides = zip(self.laws, of_joint["phi"], of_joint["dphi"], strict=True)
         return np.stack([law.stiffness(phi) * dphi for law, phi, dphi in sides])
 
-    def carried(self, phi: FloatArray) -> Carried:
+    def carried(self, of_joint: OfJoint) -> Carried:
         """Sums over both springs, (14)."""
-        sides = list(zip(self.laws, phi, strict=True))
+        sides = list(zip(self.laws, of_joint["phi"], strict=True))
         tau = np.stack([law.torque(deflection) for law, deflection in sides])
         sigma = np.stack([law.stiffness(deflection) for law, deflection in sides])
         return Carried(tau.sum(axis=0), np.abs(tau).sum(axis=0), sigma.sum(axis=0))

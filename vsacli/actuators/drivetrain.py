@@ -14,6 +14,7 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
 from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.variables import VARIABLES
 
 SIDES = 2
 """Motors that a joint has at most."""
@@ -36,6 +37,7 @@ class Drivetrain:
         joint: (motors,), index of the joint of each motor.
         inertia, damping, max_torque: (motors,) of the motors, joint side of the gear.
         rigid: (joints,), whether the joint has no spring.
+        deflected: (joints, 2), where there is a motor whose phi is a deflection.
         chosen: indices of the joints whose stiffness is commanded.
         spring_joint: (springs,), index of the joint of each spring.
         domain: (2, springs), lowest and highest phi for which each law holds.
@@ -46,6 +48,7 @@ class Drivetrain:
         counts = [len(actuator.motors) for actuator in actuators]
         self.present = np.arange(SIDES) < np.array(counts)[:, None]
         self.joint = np.array([index for index, _ in motors])
+        self.deflected = np.array([actuator.has(VARIABLES["phi"]) for actuator in actuators])
         self.rigid = np.array([not actuator.sprung for actuator in actuators])
         self.sprung = ~self.rigid[self.joint]
         self.inertia, self.damping, self.max_torque = (

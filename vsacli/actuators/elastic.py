@@ -70,9 +70,9 @@ class Elastic(Actuator):
         rates: FloatArray = self.stiffness * of_joint["dphi"][:1]
         return rates
 
-    def carried(self, phi: FloatArray) -> Carried:
+    def carried(self, of_joint: OfJoint) -> Carried:
         """K phi, with the stiffness K."""
-        tau_e = phi[0] * self.stiffness
+        tau_e = of_joint["phi"][0] * self.stiffness
         return Carried(tau_e, np.abs(tau_e), np.full_like(tau_e, self.stiffness))
 
     @classmethod

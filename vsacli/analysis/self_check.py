@@ -7,12 +7,11 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.json_records import Stored, named
-from vsacli.base.variables import Block
+from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
@@ -104,9 +103,9 @@ def spring_residual(robot: Robot, block: Block) -> float:
         if not joint.actuator.sprung:
             continue
         regular = ~has(block.flags[:, index], Flag.INFEASIBLE | Flag.SINGULAR)
-        phi, tau_e = block.phi[regular, index], block.tau_e[regular, index]
-        stiffness = block.stiffness[regular, index]
-        carried = joint.actuator.carried(phi.T)
+        of_joint = {name: values[..., regular] for name, values in block.of_joint(index).items()}
+        tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
+        carried = joint.actuator.carried(of_joint)
         size = np.maximum(carried.size, np.finfo(float).tiny)
         errors += [np.abs(carried.tau_e - tau_e) / size, np.abs(carried.stiffness - stiffness) / stiffness]
     return float(np.max(np.concatenate([np.zeros(1), *errors])))
@@ -131,12 +130,11 @@ def _ladder(robot: Robot, trajectory: Trajectory, engine: Engine, scales: FloatA
     grid = times + steps[:, None, :] * np.arange(-3, 4)[None, :, None]
     block = compute_block(robot, trajectory.at(grid.ravel()), engine=engine)
     smooth = _motors_move_smoothly(block, grid.shape)
-    motors = np.array([joint.actuator.motor_count for joint in robot.joints])
-    absent = np.arange(SIDES) >= motors[:, None]
 
     def on_grid(name: str) -> FloatArray:
         values: FloatArray = getattr(block, name).reshape(*grid.shape, len(robot.joints), -1)
-        return values if name.endswith("tau_e") else np.where(absent, 0.0, values)
+        there = [joint.actuator.has(VARIABLES[name]) for joint in robot.joints]
+        return np.where(there, values, 0.0)
 
     errors = [
         _rung_error(

@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FlagArray, FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Joint
 
@@ -57,21 +59,29 @@ def drive(
             step where they are NaN is infeasible.
     """
     transmission = joint.actuator.transmit(command, near_singular, followed)
-    dtheta = transmission.dphi + command.dq  # (69)
-    motors = joint.actuator.motors
+    actuator = joint.actuator
+    dtheta = actuator.motor_positions(transmission.dphi, command.dq)  # (69)
+    motors = actuator.motors
     inertia = _by_motor([motor.inertia for motor in motors])
     damping = _by_motor([motor.damping for motor in motors])
     tau_motor = inertia * transmission.ddtheta + damping * dtheta + transmission.tau_spring  # (73)-(74)
     driven = Drive(
         **transmission._asdict(),
-        theta=transmission.phi + command.q,  # (69)
+        theta=actuator.motor_positions(transmission.phi, command.q),  # (69)
         dtheta=dtheta,
         tau_motor=tau_motor,
         motor_power=tau_motor * dtheta,
     )
+    driven = driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
     of_joint = {**command.arrays(), **driven._asdict()}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
     return driven._replace(flags=driven.flags | exceeded)
+
+
+def _published(actuator: Actuator, phi: FloatArray) -> FloatArray:
+    """Phi of the motors that a spring lies behind; NaN of one that sets the springs."""
+    there = actuator.has(VARIABLES["phi"])[: actuator.motor_count]
+    return phi if all(there) else np.where(np.array(actuator.has(VARIABLES["phi"]))[:, None], phi, np.nan)
 
 
 def _by_motor(values: list[float]) -> FloatArray:

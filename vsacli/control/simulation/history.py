@@ -49,7 +49,7 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
     phi, dphi = drivetrain.deflections(phase.q, phase.theta), drivetrain.deflections(phase.dq, phase.dtheta)
     springs = drivetrain.state(phase.q, phase.theta, phase.dq, phase.dtheta)
     tau_e = plant.link_torque(phase.dq, ddq, springs.tau_e, torque)
-    still = np.zeros_like(phase.q)
+    still, deflected = np.zeros_like(phase.q), drivetrain.deflected
     theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)
     tau_motor = drivetrain.of_joints(torque)
     return {
@@ -59,8 +59,8 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
         "stiffness": np.where(drivetrain.rigid, np.nan, springs.stiffness),  # (11)
         "dstiffness": np.where(drivetrain.rigid, np.nan, springs.dstiffness),  # (18)
         "tau_e": tau_e,
-        "phi": drivetrain.merged(phi, still),
-        "dphi": drivetrain.merged(dphi, still),
+        "phi": np.where(deflected, drivetrain.merged(phi, still), np.nan),
+        "dphi": np.where(deflected, drivetrain.merged(dphi, still), np.nan),
         "theta": theta,
         "dtheta": dtheta,
         "tau_spring": drivetrain.merged(springs.tau_spring, tau_e),
