@@ -168,6 +168,8 @@ def test_starts_that_cannot_be_had_are_refused(error, message):
 def test_conditions_that_contradict_themselves_are_refused():
     with pytest.raises(InputError, match="measured positions need the controller feedback-linearization"):
         simulate(vsa_3r(), short_motion(3), measured="positions")
+    with pytest.raises(InputError, match="unknown measurement 'position'; did you mean 'positions'"):
+        simulate(vsa_3r(), short_motion(3), gains=GAINS, measured="position")
     with pytest.raises(InputError, match="the relative one at least 1e-13, not 1e-15"):
         Tolerances(rtol=1e-15)
     with pytest.raises(InputError, match="must lie between 0 and 1, not 1"):

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
@@ -108,8 +109,10 @@ def check_measured(measured: Measured, gains: Gains | None) -> None:
     """Refuse to measure what no controller uses.
 
     Raises:
-        InputError: positions are measured, but there is no feedback.
+        InputError: there is no such word, or positions are measured, but there is no feedback.
     """
+    if measured not in (words := get_args(Measured)):
+        raise InputError.one(f"unknown measurement {measured!r}{did_you_mean(measured, words)}")
     if gains is None and measured == "positions":
         raise InputError.one(
             "feedforward measures nothing: measured positions need the controller feedback-linearization"
