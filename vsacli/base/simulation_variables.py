@@ -6,9 +6,11 @@ from collections.abc import Iterator
 
 from vsacli.base.variables import VARIABLES, Variable
 
-COMMANDED = ("q", "dq", "ddq", "stiffness", "dstiffness")
+TRACKED = ("q", "dq", "ddq", "stiffness", "dstiffness")
+"""What is commanded and comes out otherwise."""
+
 ACTUAL = (
-    *COMMANDED,
+    *TRACKED,
     *("tau_e", "phi", "dphi", "theta", "dtheta", "tau_spring", "tau_motor"),
     *("elastic_energy", "motor_power", "motor_energy", "det_A"),
 )
@@ -27,7 +29,7 @@ def error(name: str) -> str:
 
 def _declared() -> Iterator[Variable]:
     yield VARIABLES["time"]
-    yield from (VARIABLES[name] for name in COMMANDED)
+    yield from (VARIABLES[name] for name in TRACKED)
     yield VARIABLES["tau_motor"]._replace(
         long_name="motor torque that the controller asks for", equation="controller"
     )

@@ -36,7 +36,7 @@ class Profile(Protocol):
         """The same at the steps start..stop-1, whose times are `time`; given columns pass through."""
 
     def stretched(self, factor: float) -> Profile:
-        """The same course, slower by a factor, from the same first time on."""
+        """The same profile, slower by a factor, from the same first time on."""
 
     def summary(self) -> dict[str, Any] | None:
         """The spline that values at the steps come from, in JSON values; None if they come from none."""
@@ -61,5 +61,5 @@ class WrenchProfile:
             raise InputError.one(f"the wrench has {self.profile.components} components, not {expected}")
 
     def stretched(self, factor: float) -> WrenchProfile:
-        """The same course, slower by a factor, from the same first time on."""
+        """The same profile, slower by a factor, from the same first time on."""
         return replace(self, profile=self.profile.stretched(factor))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.base.arrays import FlagArray, FloatArray, of_joint
-from vsacli.base.simulation_variables import COMMANDED, ERRORS, SIMULATION_VARIABLES, actual, error
+from vsacli.base.simulation_variables import ERRORS, SIMULATION_VARIABLES, TRACKED, actual, error
 from vsacli.base.variables import Block
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
@@ -26,7 +26,7 @@ class History(Block):
 def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory) -> History:
     """Evaluate every variable along a state trajectory."""
     reference = loop.reference(integrated.time).of_joints
-    commanded = {name: reference[name] for name in COMMANDED}
+    commanded = {name: reference[name] for name in TRACKED}
     found = _actual(loop, integrated)
     chosen = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)
     for name in ("stiffness", "dstiffness"):  # elsewhere there is none to command

@@ -1,4 +1,4 @@
-"""Courses of position, stiffness and wrench over time, in closed form: here the simple ones."""
+"""Profiles of signals in closed form: here the simple ones."""
 
 from vsacli.trajectory.curves.closed_form import DEGREES, VIA_DEGREES, ClosedForm, Constant
 from vsacli.trajectory.curves.rest_to_rest import RestToRest

@@ -69,7 +69,7 @@ class ClosedForm(ABC):
         return None
 
     def stretched(self, factor: float) -> Self:
-        """The same course, slower by a factor."""
+        """The same profile, slower by a factor."""
         first, last = self.span
         return replace(self, span=(first, stretch(last, first, factor)))
 

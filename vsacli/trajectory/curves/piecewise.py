@@ -83,7 +83,7 @@ class Chain(ClosedForm):
         return rows
 
     def stretched(self, factor: float) -> Self:
-        """The same course, every part slower by a factor."""
+        """The same profile, every part slower by a factor."""
 
         def later(span: tuple[float, float]) -> tuple[float, float]:
             start, end = (stretch(time, self.span[0], factor) for time in span)

@@ -57,7 +57,7 @@ class RestToRest(ClosedForm):
 
 
 def _rise(u: FloatArray, degree: int) -> FloatArray:
-    """Rest-to-rest course from 0 at u = 0 to 1 at u = 1: a sum of positive terms, so accurate for small u.
+    """The polynomial from 0 at u = 0 to 1 at u = 1: a sum of positive terms, so accurate for small u.
 
     With m = (degree-1)/2 it is u^(m+1) sum over k = 0..m of binomial(m+k, k) (1-u)^k.
     """
@@ -67,7 +67,7 @@ def _rise(u: FloatArray, degree: int) -> FloatArray:
 
 
 def _rates(elapsed: FloatArray, remaining: FloatArray, total: float, degree: int) -> Iterator[FloatArray]:
-    """Derivatives 1, 2, ... of that course by time.
+    """Derivatives 1, 2, ... of that polynomial by time.
 
     The first is c p^m / T with p = s (1-s), s = elapsed / T, m = (degree-1)/2 and
     c = degree! / m!^2. Since dp/ds = 1-2s and d(1-2s)/ds = -2, the others are sums of p^i (1-2s)^j as well.

@@ -33,7 +33,7 @@ SAME_TIME = 1e-9
 Values: TypeAlias = tuple[float | None, ...]
 """A number for each joint or axis, None for joints that do not take the signal."""
 
-_TIMES = {1: "once", 2: "twice", 4: "four times"}
+_TIMES = ("not", "once", "twice", "three times", "four times")
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class Part:
         return rows
 
     def stretched(self, factor: float) -> Part:
-        """The same course, slower by a factor, from the same first time on."""
+        """The same spline, slower by a factor, from the same first time on."""
         from scipy.interpolate import BSpline
 
         knots = stretch(self.spline.t, self.spline.t[0], factor)
@@ -122,7 +122,7 @@ class Fit:
         return rows
 
     def stretched(self, factor: float) -> Fit:
-        """The same course, slower by a factor, from the same first time on."""
+        """The same spline, slower by a factor, from the same first time on."""
         parts = tuple(part.stretched(factor) for part in self.parts)
         return replace(self, parts=parts, step=factor * self.step)
 

@@ -158,5 +158,5 @@ class SampledProfile:
         return self.fit.at(time, self.record.signal.orders)
 
     def stretched(self, factor: float) -> SampledProfile:
-        """The same course, slower by a factor; the warnings are those about the record."""
+        """The same profile, slower by a factor; the warnings are those about the record."""
         return replace(self, record=self.record.stretched(factor), fit=self.fit.stretched(factor))
