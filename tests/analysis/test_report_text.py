@@ -296,3 +296,17 @@ def test_failed_self_check_warns_against_the_torques():
         "SELF-CHECK FAILED: derivatives are off by 3.3e-03 (bound 1e-08), "
         "springs by 1.0e-15 (bound 1e-11); do not use these torques"
     )
+
+
+def test_a_report_from_before_there_were_notes_is_read():
+    content = report().as_json()
+    del content["notes"]
+    assert Report.from_json(content) == report()
+
+
+@pytest.mark.parametrize("key", ["robot", "samples", "self_check", "joints"])
+def test_what_lacks_what_every_report_has_is_none(key):
+    content = report().as_json()
+    del content[key]
+    with pytest.raises(TypeError, match=f"missing 1 required positional argument: '{key}'"):
+        Report.from_json(content)
