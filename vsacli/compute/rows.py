@@ -12,7 +12,7 @@ from vsacli.base.arrays import AnyArray
 _Row = TypeVar("_Row")
 
 
-class Layout:
+class RowLayout:
     """Arrays whose entries lie one after the other, a row each, as a kernel takes and gives them.
 
     Attributes:

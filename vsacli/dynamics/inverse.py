@@ -17,7 +17,7 @@ from vsacli.base.json_records import Stored
 from vsacli.base.signals import COMMANDED, commanded_names, orders_of_derivation
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
-from vsacli.compute.rows import Layout
+from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import Scalar
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.limits import limit_checks
@@ -75,19 +75,19 @@ class InverseDynamics:
         return LinkTorques(self.robot, self.frame)
 
     @property
-    def arguments(self) -> Layout:
+    def arguments(self) -> RowLayout:
         """Rows that inverse dynamics takes."""
         joints = len(self.robot.joints)
         commanded = dict.fromkeys(commanded_names(), (joints,))
         followed = {"phi": (joints, SIDES)} if self.followed else {}
-        return Layout({**self.links.arguments.shapes, **commanded, **followed})
+        return RowLayout({**self.links.arguments.shapes, **commanded, **followed})
 
     @property
-    def results(self) -> Layout:
+    def results(self) -> RowLayout:
         """Rows that inverse dynamics gives."""
         joints = len(self.robot.joints)
         of_motors = {name for name in COMPUTED if "motor" in VARIABLES[name].dims}
-        return Layout({name: (joints, SIDES) if name in of_motors else (joints,) for name in COMPUTED})
+        return RowLayout({name: (joints, SIDES) if name in of_motors else (joints,) for name in COMPUTED})
 
     @property
     def inputs(self) -> int:

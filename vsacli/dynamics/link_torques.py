@@ -14,7 +14,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
 from vsacli.compute.engine import Engine, choose
-from vsacli.compute.rows import Layout
+from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import (
     ZERO,
     Scalar,
@@ -86,15 +86,15 @@ class LinkTorques:
     frame: str | None = None
 
     @property
-    def arguments(self) -> Layout:
+    def arguments(self) -> RowLayout:
         """Rows that the recursion takes."""
         joints, names = (len(self.robot.joints),), () if self.frame is None else WRENCH_NAMES
-        return Layout(dict.fromkeys(POSITION.names, joints) | dict.fromkeys(names, (len(WRENCH_AXES),)))
+        return RowLayout(dict.fromkeys(POSITION.names, joints) | dict.fromkeys(names, (len(WRENCH_AXES),)))
 
     @property
-    def results(self) -> Layout:
+    def results(self) -> RowLayout:
         """Rows that the recursion gives."""
-        return Layout(dict.fromkeys(TORQUES, (len(self.robot.joints),)))
+        return RowLayout(dict.fromkeys(TORQUES, (len(self.robot.joints),)))
 
     @property
     def inputs(self) -> int:

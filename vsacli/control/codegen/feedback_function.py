@@ -9,7 +9,7 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.flags import Flag, marked
-from vsacli.compute.rows import Layout
+from vsacli.compute.rows import RowLayout
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.control.codegen.robot_functions import command_structure, variable_array
 from vsacli.control.feedback_linearization import control_law, position_order
@@ -114,7 +114,7 @@ class _Law:
 
     def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
         """The arrays of each argument by name."""
-        sizes = Layout({name: (structure.layout.size,) for name, structure in self.arguments})
+        sizes = RowLayout({name: (structure.layout.size,) for name, structure in self.arguments})
         entries = sizes.arrays(np.concatenate(rows))
         return (structure.layout.arrays(entries[name]) for name, structure in self.arguments)
 

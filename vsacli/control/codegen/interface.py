@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from vsacli.compute.rows import Layout
+from vsacli.compute.rows import RowLayout
 from vsacli.compute.tracing import Kind, Program, trace
 
 Rows = Sequence[Any]
@@ -56,9 +56,9 @@ class Structure:
         return (entry for array in self.arrays for entry in array.entries)
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> RowLayout:
         """Where the entries of each array stand among all entries."""
-        return Layout({array.name: array.shape for array in self.arrays})
+        return RowLayout({array.name: array.shape for array in self.arrays})
 
 
 @dataclass(frozen=True)

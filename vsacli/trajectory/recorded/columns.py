@@ -45,7 +45,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ColumnLayout:
     """Where quantities stand in a table.
 
     Attributes:
@@ -65,7 +65,7 @@ def column_layout(
     wanted: Sequence[Signal],
     file: str,
     line: int = 1,
-) -> Layout:
+) -> ColumnLayout:
     """Where the quantities stand in a table.
 
     Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1; one way
@@ -103,7 +103,7 @@ def column_layout(
     columns = dict(_measured(names, units, way, joints, problems))
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
-    return Layout(
+    return ColumnLayout(
         time=columns[TIME],
         quantities={
             name: {index: columns[column] for index, column in of_joints.items()}

@@ -18,7 +18,7 @@ from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.trajectory.joints import CommandedJoints, takers
 from vsacli.trajectory.recorded.arrays import SampleProblem, time_problems, value_problems
-from vsacli.trajectory.recorded.columns import Column, Layout, column_layout
+from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -100,7 +100,7 @@ def read_recording(
     return Recording(RecordedTimes(time), profiles, notes, source, lines)
 
 
-def _unused(layout: Layout, wanted: Sequence[Signal]) -> Iterator[str]:
+def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:
     for signal in (POSITION, *COMMANDED.values(), WRENCH):
         if signal not in wanted and any(layout.quantities.get(name) for name in signal.names):
             yield f"its columns of {signal.names[0]} are not used"
@@ -110,7 +110,7 @@ def _unused(layout: Layout, wanted: Sequence[Signal]) -> Iterator[str]:
 
 
 def _samples(
-    signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: Table, layout: Layout
+    signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: Table, layout: ColumnLayout
 ) -> Samples:
     labels = WRENCH_AXES if signal is WRENCH else joint_names
     values, *derivatives = (
@@ -139,7 +139,7 @@ def _si(table: Table, column: Column) -> FloatArray:
         return values * column.factor
 
 
-def _located(problem: SampleProblem, table: Table, layout: Layout) -> Problem:
+def _located(problem: SampleProblem, table: Table, layout: ColumnLayout) -> Problem:
     line = 0 if problem.sample is None else table.line_of(problem.sample)
     column = (
         problem.quantity if problem.joint is None else layout.quantities[problem.quantity][problem.joint].name
