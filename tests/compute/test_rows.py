@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.compute.rows import Layout
+from vsacli.compute.rows import RowLayout
 
-LAYOUT = Layout({"q": (3,), "phi": (3, 2), "none": (0,), "time": ()})
+LAYOUT = RowLayout({"q": (3,), "phi": (3, 2), "none": (0,), "time": ()})
 
 
 def test_what_is_packed_comes_back():
