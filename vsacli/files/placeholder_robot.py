@@ -110,7 +110,7 @@ def _keys(nodes: Sequence[tree.Node]) -> tuple[str, ...]:
 
 
 def _names(words: Iterable[str]) -> tuple[str, ...]:
-    """Those of the words that may be names of joints, each once."""
+    """Words that may be names of joints, each once."""
     return tuple(dict.fromkeys(word for word in words if IDENTIFIER.fullmatch(word)))[:MOST_JOINTS]
 
 

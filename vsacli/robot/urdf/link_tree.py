@@ -84,7 +84,7 @@ class Urdf:
 
 
 def below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
-    """Those of the joints that hang below a link, parents before children."""
+    """Joints that hang below a link, parents before children."""
     children: dict[str, list[UrdfJoint]] = {}
     for joint in joints:
         children.setdefault(joint.parent, []).append(joint)

@@ -169,7 +169,7 @@ class ChainPath(NamedTuple):
 
     @property
     def moving(self) -> tuple[UrdfJoint, ...]:
-        """Those that are not fixed."""
+        """Joints of the path that are not fixed."""
         return tuple(joint for joint in self.joints if not joint.is_fixed)
 
 

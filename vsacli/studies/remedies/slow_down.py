@@ -106,7 +106,7 @@ def _stride(number: int) -> int:
 
 
 def _slowed(motion: Motion, factor: float) -> Motion:
-    """The same steps passed more slowly, at rest if the factor is infinite; their times are kept."""
+    """A motion passed more slowly, at rest if the factor is infinite; their times are kept."""
     return motion.mapped(motion.time, lambda array, order: array / factor**order)
 
 
