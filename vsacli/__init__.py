@@ -19,12 +19,10 @@ if TYPE_CHECKING:
     from vsacli.base.flags import Flag
     from vsacli.base.wrench import Wrench
     from vsacli.control.feedback_linearization import FeedbackLinearization, feedback_linearization
-    from vsacli.control.gains import Gains
-    from vsacli.control.linear_control import Integral
+    from vsacli.control.gains import Gains, Integral
     from vsacli.control.simulation.integrator import Tolerances
     from vsacli.control.simulation.perturbation import perturbed
-    from vsacli.control.simulation.simulate import simulate
-    from vsacli.control.simulation.start import InitialError
+    from vsacli.control.simulation.simulate import InitialError, simulate
     from vsacli.dynamics.forward import State, mass_matrix, state_derivative
     from vsacli.dynamics.link_torques import link_torques
     from vsacli.robot.file import load_robot
@@ -90,9 +88,9 @@ _HOME = {
     "Flag": "base.flags",
     "Gains": "control.gains",
     "Inertia": "robot.model",
-    "InitialError": "control.simulation.start",
+    "InitialError": "control.simulation.simulate",
     "InputError": "base.errors",
-    "Integral": "control.linear_control",
+    "Integral": "control.gains",
     "Joint": "robot.model",
     "Limits": "robot.model",
     "Link": "robot.model",

@@ -23,6 +23,7 @@ from vsacli import inverse_dynamics
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.laws.quadratic import Quadratic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import margin, reach_flags
 from vsacli.analysis.run import Run
@@ -234,6 +235,16 @@ def test_limits_do_not_move_the_corridor():
             np.testing.assert_array_equal(getattr(free, name), getattr(held, name))
     assert Flag(int(held.flags[0])) == Flag.DEFLECTION_LIMIT
     assert np.all(np.isfinite(held.tau_motor))
+
+
+def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
+    actuator = springs(*[Quadratic(k=1000, max_deflection=0.1)] * 2)
+    found = drive(joint_with(actuator), command(stiffness=1000.0))  # 2 k |phi| on either side
+    np.testing.assert_allclose(found.phi[:, 0], [0.25, -0.25], rtol=1e-12)
+    checks = [check.motor for check in actuator.limits() if check.flag is Flag.DEFLECTION_LIMIT]
+    held = [check for check in actuator.limits() if np.isfinite(check.range).all()]
+    assert checks == [1, 2]
+    assert [check.flags({"phi": found.phi}).tolist() for check in held] == [[Flag.DEFLECTION_LIMIT]] * 2
 
 
 # The other preload

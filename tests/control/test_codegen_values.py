@@ -21,8 +21,7 @@ from vsacli.base.variables import Block
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.feedback_linearization import FeedbackLinearization
-from vsacli.control.gains import Gains
-from vsacli.control.linear_control import Integral
+from vsacli.control.gains import Gains, Integral
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import TORQUES, compute_block
 from vsacli.dynamics.link_torques import link_torques

@@ -20,8 +20,7 @@ from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import Wrench
 from vsacli.control.feedback_linearization import FeedbackLinearization, feedback_linearization
-from vsacli.control.gains import Gains
-from vsacli.control.linear_control import Integral
+from vsacli.control.gains import Gains, Integral
 from vsacli.control.poles import gains_from_text, load_gains, parse_poles
 from vsacli.dynamics.forward import State, state_derivative
 from vsacli.dynamics.inverse import compute_block

@@ -19,7 +19,7 @@ from vsacli.control.simulation.controllers import LinearizingFeedback
 from vsacli.control.simulation.history import History, history
 from vsacli.control.simulation.integrator import Integrator, Tolerances, continuous
 from vsacli.control.simulation.reference import Reference
-from vsacli.control.simulation.start import InitialError
+from vsacli.control.simulation.simulate import InitialError
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot

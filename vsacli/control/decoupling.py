@@ -8,8 +8,7 @@ from vsacli.actuators.drivetrain import DrivetrainState
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.wrench import Wrench
-from vsacli.control.gains import Gains
-from vsacli.control.linear_control import Integral, linear_control
+from vsacli.control.gains import Gains, Integral, linear_control
 from vsacli.dynamics.forward import Plant
 from vsacli.trajectory.motion import Motion
 

@@ -13,8 +13,7 @@ from vsacli.compute.rows import RowLayout
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.control.codegen.robot_functions import command_structure, variable_array
 from vsacli.control.feedback_linearization import control_law, position_order
-from vsacli.control.gains import STIFFNESS_ORDER, Gains
-from vsacli.control.linear_control import Integral
+from vsacli.control.gains import STIFFNESS_ORDER, Gains, Integral
 from vsacli.dynamics.forward import Plant
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot

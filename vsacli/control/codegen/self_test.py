@@ -1,4 +1,4 @@
-"""The test program that comes with generated code: reference vectors, and a comparison with them."""
+"""The test program that comes with generated code: what NumPy makes of some inputs, and a comparison."""
 
 from __future__ import annotations
 
@@ -6,10 +6,115 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, over_time
+from vsacli.base.signals import POSITION, orders_of_derivation
 from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.interface import Array, Function
-from vsacli.control.codegen.reference_vectors import CASES, Arrays, Reference
+from vsacli.control.gains import STIFFNESS_ORDER
+from vsacli.dynamics.inverse import compute_block
+from vsacli.robot.model import Robot
+from vsacli.trajectory.motion import Motion
+
+CASES = 6
+"""Samples; the last one asks for half of the smallest stiffness that can be reached."""
+
+SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness": 100.0, "ddstiffness": 500.0}
+"""Half-widths of what is drawn, SI units; 1 for further signals."""
+
+MISSED = {"q": 0.01, "dq": 0.1, "theta": 0.01, "dtheta": 0.1}
+"""By how much the measured state misses the command."""
+
+POLE = -20.0
+
+Arrays = dict[str, FloatArray]
+"""Arrays (cases, ...) by name."""
+
+
+class Reference:
+    """Inputs and results of the generated functions of a robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._rng = np.random.default_rng(1)
+        command = self._command()
+        self._inputs = {
+            "motion": {name: command[name] for name in POSITION.names},
+            "command": command,
+            "state": self._state(command),
+            "integral": {name: self._drawn(scale) for name, scale in (("q", 1e-3), ("stiffness", 1.0))},
+        }
+
+    def inputs(self, function: Function) -> list[Arrays]:
+        """The arguments of a function, each by the names of its arrays."""
+        return [
+            _gains(structure.arrays[0].shape) if structure.name == "gains" else self._inputs[structure.name]
+            for _, structure in function.arguments
+        ]
+
+    def results(self, function: Function) -> Arrays:
+        """What the function computes from them, by the names of the arrays of its result."""
+        arguments = self.inputs(function)
+        entries = [
+            array.reshape(CASES, -1)
+            for (_, structure), arrays in zip(function.arguments, arguments, strict=True)
+            for array in (arrays[member.name] for member in structure.arrays)
+        ]
+        with np.errstate(all="ignore"):
+            cases = [_computed(function, row) for row in np.concatenate(entries, axis=1)]
+        found = function.result.layout.arrays(np.array(cases).T)
+        return {name: over_time(array) for name, array in found.items()}
+
+    @property
+    def largest_stiffness(self) -> float:
+        """Largest stiffness demanded, of joints of either kind."""
+        return float(np.nanmax(self._inputs["command"]["stiffness"]))
+
+    def _drawn(self, scale: float) -> FloatArray:
+        return self._rng.uniform(-scale, scale, (CASES, len(self._robot.joints)))
+
+    def _command(self) -> Arrays:
+        names = [name for name in orders_of_derivation() if name != "stiffness"]
+        drawn = {name: self._drawn(SCALES.get(name, 1.0)) for name in names}
+        block = compute_block(self._robot, self._motion(drawn, np.ones_like(drawn["q"])))
+        lower = np.nan_to_num(block.stiffness_lower)
+        upper = np.minimum(np.nan_to_num(block.stiffness_upper, nan=0.0), 4 * lower)
+        stiffness = lower + self._rng.uniform(0.2, 0.8, lower.shape) * (upper - lower)
+        stiffness[-1] = lower[-1] / 2
+        return {**drawn, "stiffness": stiffness}
+
+    def _motion(self, arrays: Arrays, stiffness: FloatArray) -> Motion:
+        return Motion.of(np.arange(float(CASES)), {**arrays, "stiffness": stiffness})
+
+    def _state(self, command: Arrays) -> Arrays:
+        block = compute_block(self._robot, self._motion(command, command["stiffness"]))
+        of_joint, of_motor = (
+            {name: getattr(block, name) for name in names} for names in (("q", "dq"), ("theta", "dtheta"))
+        )
+        at_rest = {
+            name: np.where(np.isnan(values), block.q[..., None], values) for name, values in of_motor.items()
+        }
+        return {
+            name: values + self._rng.uniform(-MISSED[name], MISSED[name], values.shape)
+            for name, values in {**of_joint, **at_rest}.items()
+        }
+
+
+def _gains(shape: Sequence[int]) -> Arrays:
+    """All poles at one place, with integral action; the same for each case."""
+    joints, order = shape
+    position, stiffness = (np.poly([POLE] * (count + 1))[:0:-1] for count in (order, STIFFNESS_ORDER))
+    return {
+        "position": np.tile(position[1:], (CASES, joints, 1)),
+        "stiffness": np.tile(stiffness[1:], (CASES, joints, 1)),
+        "position_integral": np.full((CASES, joints), position[0]),
+        "stiffness_integral": np.full((CASES, joints), stiffness[0]),
+    }
+
+
+def _computed(function: Function, entries: FloatArray) -> list[float]:
+    """The results for one sample, by NumPy."""
+    return [np.asarray(row, dtype=np.float64).item() for row in function.compute(list(entries[:, None]))]
+
 
 TOLERANCE = {"double": 1e-9, "float": 2e-3}
 """Largest difference from NumPy, relative to the largest value of an array; rounding grows with the condition

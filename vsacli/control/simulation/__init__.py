@@ -2,7 +2,6 @@
 
 from vsacli.control.simulation.integrator import Tolerances
 from vsacli.control.simulation.perturbation import perturbed
-from vsacli.control.simulation.simulate import Measured, Simulation, check_measured, simulate
-from vsacli.control.simulation.start import InitialError
+from vsacli.control.simulation.simulate import InitialError, Measured, Simulation, check_measured, simulate
 
 __all__ = ["InitialError", "Measured", "Simulation", "Tolerances", "check_measured", "perturbed", "simulate"]

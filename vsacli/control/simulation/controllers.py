@@ -10,8 +10,7 @@ from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
 from vsacli.control.feedback_linearization import FeedbackLinearization
-from vsacli.control.gains import Gains
-from vsacli.control.linear_control import Integral
+from vsacli.control.gains import Gains, Integral
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.state_vector import Phase

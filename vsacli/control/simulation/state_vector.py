@@ -8,7 +8,7 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
-from vsacli.control.linear_control import Integral
+from vsacli.control.gains import Integral
 
 
 class Phase(NamedTuple):
