@@ -98,6 +98,7 @@ class Plant:
         self.drivetrain = Drivetrain(robot.actuators)
         self.chain = chain_of(robot, frame)
         self._rigid_inertia = self.drivetrain.direct(self.drivetrain.inertia)
+        self._rigid_matrix = np.diag(self._rigid_inertia)
         self._rigid_damping = self.drivetrain.direct(self.drivetrain.damping)
         self._inertia = self.drivetrain.inertia[self.drivetrain.sprung]
         self._damping = self.drivetrain.damping[self.drivetrain.sprung]
@@ -141,7 +142,7 @@ class Plant:
             wrench: what the environment exerts, if the plant was made for one.
         """
         tau_e, spring = self.drivetrain.torques(q, theta)
-        matrix = self.chain.mass_matrix(q) + np.diag(self._rigid_inertia)
+        matrix = self.chain.mass_matrix(q) + self._rigid_matrix
         drive = tau_e + self.drivetrain.direct(torque)
         ddq = self.chain.solve(matrix, drive - self.chain.bias(q, dq, wrench) - self._rigid_damping * dq)
         ddtheta = (torque[..., self.drivetrain.sprung] - self._damping * dtheta - spring) / self._inertia
