@@ -209,7 +209,7 @@ def test_fit_that_is_asked_for():
     for method, exact in (("lsq", False), ("interpolate", True), (None, True)):
         (profile,) = read_recording("m.csv", JOINTS, {POSITION: method}).profiles
         assert profile.fit.exact.all() == exact
-    with pytest.raises(InputError, match="fit must be one of lsq, interpolate, not 'spline'"):
+    with pytest.raises(InputError, match="fit must be one of lsq, interpolate, smooth, not 'spline'"):
         Trajectory.from_samples(TIME, motion(), fit="spline")
 
 

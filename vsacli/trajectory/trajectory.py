@@ -134,8 +134,9 @@ class Trajectory:
             ddwrench: second derivative of its components.
             wrench_frame: along whose axes the components are, "end_effector" or "base".
             fit: the splines, "interpolate": through the samples, or "lsq": near noisy ones by least squares,
-                with knots by generalised cross-validation; then the values are those of the spline too. By
-                default what the noise of each column asks for, see `vsacli.trajectory.fits.fit_samples`.
+                with knots by generalised cross-validation, or "smooth": a smoothing spline for noise of any
+                colour; with both the values are those of the spline too. By default what the noise of each
+                column asks for, see `vsacli.trajectory.fits.fit_samples`.
             name: used in reports and for the name of the result file.
             **commanded: derivatives of the stiffness, `dstiffness` and `ddstiffness`; further signals of
                 `COMMANDED` and their derivatives, likewise.

@@ -153,7 +153,7 @@ class Recorded(Declaration):
 
         doc = (
             "spline for derivatives that are not given: through the samples, or near noisy ones by least"
-            " squares; by default what their noise asks for"
+            " squares, or a smoothing one for noise of any colour; by default what their noise asks for"
         )
         file = text("path of the CSV file, relative to the trajectory file")
         return {**use.frame(), "file": file, "fit": choice(METHODS, doc, default=None)}

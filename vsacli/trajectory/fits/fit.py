@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.trajectory.fits.smoothing import Smoothing
 from vsacli.trajectory.times import stretch
 
 if TYPE_CHECKING:
@@ -24,11 +25,15 @@ class Part:
         members: their indices.
         spline: with one column a member.
         exact: whether it goes through the samples, rather than near them.
+        smoothing: what is known of it if it is a smoothing spline, or was compared with one.
+        smooth: whether it is a smoothing spline.
     """
 
     members: IndexArray
     spline: BSpline[np.float64]
     exact: bool
+    smoothing: Smoothing | None = None
+    smooth: bool = False
 
     @property
     def knots(self) -> FloatArray:
@@ -68,8 +73,9 @@ class Part:
         """The same spline, slower by a factor, from the same first time on."""
         from scipy.interpolate import BSpline
 
-        knots = stretch(self.spline.t, self.spline.t[0], factor)
-        return replace(self, spline=BSpline(knots, self.spline.c, self.spline.k))
+        knots = stretch(self.spline.t, self.knots[0], factor)
+        known = None if self.smoothing is None else self.smoothing.stretched(factor)
+        return replace(self, spline=BSpline(knots, self.spline.c, self.spline.k), smoothing=known)
 
 
 @dataclass(frozen=True, eq=False)

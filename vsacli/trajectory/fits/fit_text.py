@@ -17,6 +17,7 @@ from vsacli.trajectory.fits.selection import (
     LEAST_SQUARES,
     LEAST_SQUARES_GAIN,
     SMALLEST_SHARE,
+    SMOOTH,
 )
 
 SHARE = 0.05
@@ -35,6 +36,10 @@ FACTORS = {
 """By how much a given derivative may be too large throughout, and what that hints at."""
 
 
+LISTED_LINES = 5
+"""Frequencies that a sentence names."""
+
+
 def fit_sentences(
     value: str, fitted: Sequence[str], labels: Sequence[str], time: FloatArray, fit: Fit
 ) -> Iterator[str]:
@@ -50,17 +55,65 @@ def fit_sentences(
     if not fitted or not fit.parts:
         return
     exact = [part for part in fit.parts if part.exact]
-    smooth = [part for part in fit.parts if not part.exact]
+    near = {
+        "least-squares": [part for part in fit.parts if not part.exact and not part.smooth],
+        "smoothing": [part for part in fit.parts if part.smooth],
+    }
     names = ", ".join(fitted)
     verb = "comes" if len(fitted) == 1 else "come"
-    of_some = bool(exact and smooth)
+    of_some = sum(map(bool, (exact, *near.values()))) > 1
     if exact:
         whose = f" of {_members(exact, labels)}" if of_some else ""
         yield f"{names}{whose} {verb} from a C{fit.degree - 1} spline through {value}; {_trust(time, exact)}"
-    if smooth:
-        whose = f" of {_members(smooth, labels)}" if of_some else ""
-        source = f"come from a C{fit.degree - 1} least-squares spline near the samples of {value}"
-        yield f"{value}, {names}{whose} {source}: {_misfit(smooth, labels, fit)}; {_trust(time, smooth)}"
+    for kind, parts in near.items():
+        if parts:
+            whose = f" of {_members(parts, labels)}" if of_some else ""
+            source = f"come from a C{fit.degree - 1} {kind} spline near the samples of {value}"
+            misfit, trust = _misfit(parts, labels, fit), _trust(time, parts)
+            yield f"{value}, {names}{whose} {source}: {misfit}; {trust}"
+    yield from _doubts(value, fitted[-1], labels, fit)
+
+
+def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
+    """What the record does not determine, by the smoothing splines of components."""
+    for part in fit.parts:
+        known = part.smoothing
+        if known is None:
+            continue
+        label = _members([part], labels)
+        lines = ", ".join(f"{frequency:.4g}" for frequency in known.lines.others[:LISTED_LINES])
+        if not part.smooth and lines:
+            yield (
+                f"{value} of {label} has a vibration at {lines} Hz beyond a smooth motion, which {highest}"
+                " follows; if it is no motion, fit: smooth leaves it out"
+            )
+        if not known.resolved:
+            yield (
+                f"{highest} of {label} is not determined by the record: no two resolutions of a smoothing"
+                f" spline agree on it, the best have a deviation of {100 * known.relative:.2g} %"
+            )
+        elif not known.determined:
+            yield (
+                f"{highest} of {label} is not determined by the record to 10 %: its standard deviation is"
+                f" {100 * known.relative:.2g} % of its root mean square"
+            )
+        if part.smooth and lines:
+            yield f"{value} of {label} has a vibration at {lines} Hz, which is taken for noise"
+
+
+def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
+    """How noise was understood: whose is not white, and what is mains hum.
+
+    Args:
+        value: name of the signal.
+        labels: of the components.
+        fit: of the signal.
+    """
+    for part in fit.parts:
+        known = part.smoothing
+        if known is not None and known.lines.hum:
+            hum = ", ".join(f"{frequency:.4g}" for frequency in known.lines.hum[:LISTED_LINES])
+            yield f"mains hum of {hum} Hz in {value} of {_members([part], labels)} is taken for noise"
 
 
 def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
@@ -78,11 +131,12 @@ def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
         "columns": [
             {
                 "name": labels[member],
-                "method": INTERPOLATE if part.exact else LEAST_SQUARES,
+                "method": _method(part),
                 "knots": len(part.knots),
                 "residual": {"rms": float(fit.residual[member]), "max": float(fit.largest[member])},
                 "noise": float(fit.noise[member]),
                 "doubtful": dict(zip(("start", "end"), part.doubtful, strict=True)),
+                **({} if part.smoothing is None else {"deviation": part.smoothing.relative}),
             }
             for member, part in sorted(parts.items(), key=itemgetter(0))
         ],
@@ -135,6 +189,9 @@ def _errors(fit: Fit, order: int) -> FloatArray:
     """Standard deviation of a derivative of the fit, inside, due to noise of the samples, (components,)."""
     errors = np.zeros(fit.components)
     for part in fit.parts:
+        if part.smooth and part.smoothing is not None:
+            errors[part.members] = part.smoothing.deviations[order]
+            continue
         span = float(np.mean(np.diff(part.knots)))
         gain = (
             INTERPOLATION_GAIN[fit.degree][order]
@@ -168,6 +225,12 @@ def _factor(given: FloatArray, expected: FloatArray) -> float | None:
 
 def _rms(rows: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.mean(rows**2, axis=-1)))
+
+
+def _method(part: Part) -> str:
+    if part.smooth:
+        return SMOOTH
+    return INTERPOLATE if part.exact else LEAST_SQUARES
 
 
 def _members(parts: Sequence[Part], labels: Sequence[str]) -> str:

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.trajectory.fits.coloured import instead_of_followed_noise, replaced, smooth_part
 from vsacli.trajectory.fits.fit import Fit, Part, join
 from vsacli.trajectory.fits.least_squares import best_spans, fit_spline, most_spans
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-LEAST_SQUARES, INTERPOLATE = "lsq", "interpolate"
-METHODS = (LEAST_SQUARES, INTERPOLATE)
+LEAST_SQUARES, INTERPOLATE, SMOOTH = "lsq", "interpolate", "smooth"
+METHODS = (LEAST_SQUARES, INTERPOLATE, SMOOTH)
 
 INTERPOLATION_GAIN = {7: (1.0, 1.481, 4.628, 6.957, 37.415), 5: (1.0, 1.376, 4.798)}
 """By degree, for each derivative k: standard deviation at the samples, times step^k, of a spline through
@@ -45,15 +46,18 @@ def fit_samples(time: FloatArray, values: FloatArray, degree: int, order: int, m
         values: (components, samples); a component that is NaN throughout gets no spline.
         degree: of the splines, 5 or 7.
         order: of the highest derivative that is needed.
-        method: `LEAST_SQUARES`, `INTERPOLATE`, or None: for each component by its noise. Least squares are
-            used if noise, as estimated from differences of the samples, makes up more than 1 % of the highest
-            derivative of the interpolating spline, and if cross-validation finds fewer knots better.
+        method: `LEAST_SQUARES`, `INTERPOLATE`, `SMOOTH`, or None: for each component by its noise. Least
+            squares are used if noise, as estimated from differences of the samples, makes up more than 1 % of
+            the highest derivative of the interpolating spline, and if cross-validation finds fewer knots
+            better. A component whose noise is not white, which either would follow, gets a smoothing spline.
     """
     present = np.flatnonzero(~np.all(np.isnan(values), axis=1))
     noise = np.zeros(len(values))
     noise[present] = estimated_noise(time, values[present], degree + 1)
     parts: list[Part] = []
-    if present.size and method == LEAST_SQUARES:
+    if method == SMOOTH:
+        parts += (smooth_part(time, values, member, degree, order) for member in present.tolist())
+    elif present.size and method == LEAST_SQUARES:
         spans = best_spans(time, values[present], degree)
         parts += _least_squares(time, values, present, spans, degree)
     elif present.size:
@@ -64,7 +68,9 @@ def fit_samples(time: FloatArray, values: FloatArray, degree: int, order: int, m
             left = np.setdiff1d(present, [member for part in parts for member in part.members])
             exact = exact if len(left) == len(present) else _interpolation(time, values, left, degree)
         parts += [exact] if exact.members.size else []
-    return join(degree, parts, time, values, noise)
+    fit = join(degree, parts, time, values, noise)
+    instead = list(instead_of_followed_noise(time, values, fit, order)) if method is None else []
+    return join(degree, replaced(parts, instead), time, values, noise) if instead else fit
 
 
 def _interpolation(time: FloatArray, values: FloatArray, members: IndexArray, degree: int) -> Part:

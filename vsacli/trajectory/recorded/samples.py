@@ -11,7 +11,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import Fit, fit_samples, mismatches
-from vsacli.trajectory.fits.fit_text import describe, fit_sentences
+from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences
 from vsacli.trajectory.times import stretch
 
 
@@ -91,7 +91,7 @@ class SampledProfile:
 
         Args:
             record: the samples.
-            method: "lsq", "interpolate", or None to decide by their noise; see `fit_samples`.
+            method: "lsq", "interpolate", "smooth", or None to decide by their noise; see `fit_samples`.
             resampled: whether the steps are not the recorded times.
         """
         signal = record.signal
@@ -114,13 +114,14 @@ class SampledProfile:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The given derivatives, if they play no part."""
+        """What of noise is known to be none of motion, and the given derivatives if they play no part."""
         record = self.record
+        of_fit = tuple(fit_notes(record.signal.names[0], record.labels, self.fit)) if self.fitted else ()
         given = [name for name in record.signal.names[1:] if name not in record.missing]
         if not self.resampled or not given:
-            return ()
+            return of_fit
         verb = "plays" if len(given) == 1 else "play"
-        return (f"the given {', '.join(given)} {verb} no part, since the steps are resampled",)
+        return (*of_fit, f"the given {', '.join(given)} {verb} no part, since the steps are resampled")
 
     @property
     def fitted(self) -> bool:

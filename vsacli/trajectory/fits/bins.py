@@ -1,0 +1,157 @@
+"""Samples as means over equal bins of time, with what a uniform B-spline has for them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.trajectory.fits.information import block_count, sort_rows
+
+BINS_PER_SPAN = 2
+
+LONGEST_LINK = 4.001
+"""Bins between two means whose errors are still taken for correlated: a row of the difference of both must
+not reach further than a block of unknowns."""
+
+
+class Whitened(NamedTuple):
+    """Rows with independent errors of the same size.
+
+    Attributes:
+        rows: (blocks, rows, columns), see `information.Rows`.
+        target: (blocks, rows).
+        log_scale: logarithm of the determinant of what the covariance was divided by, twice negative.
+    """
+
+    rows: FloatArray
+    target: FloatArray
+    log_scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class Bins:
+    """Means of a record over two bins to a knot span, empty ones left out.
+
+    Attributes:
+        start: of the record, s.
+        span: length of a knot span, s.
+        spans: their number.
+        degree: of the spline.
+        means: (bins,), of the samples.
+        design: (bins, degree + 1), means of the B-splines at the same samples: averaging costs no bias.
+        first: index of the first of these B-splines, (bins,).
+        gaps: distance from one mean time to the next, in bins, (bins - 1,); infinite where they are unlinked.
+    """
+
+    start: float
+    span: float
+    spans: int
+    degree: int
+    means: FloatArray
+    design: FloatArray
+    first: IndexArray
+    gaps: FloatArray
+
+    @classmethod
+    def of(cls, time: FloatArray, row: FloatArray, spans: int, degree: int) -> Bins:
+        """Averages of samples.
+
+        Args:
+            time: (samples,), s.
+            row: (samples,).
+            spans: of the spline, of equal length.
+            degree: of the spline.
+        """
+        start, span = float(time[0]), float(time[-1] - time[0]) / spans
+        place = np.clip((time - start) / span, 0, spans * (1 - 1e-15))
+        which = np.minimum((BINS_PER_SPAN * place).astype(int), BINS_PER_SPAN * spans - 1)
+        count = np.bincount(which).astype(np.float64)
+        used = np.flatnonzero(count)
+
+        def mean(values: FloatArray) -> FloatArray:
+            means: FloatArray = np.bincount(which, values).astype(np.float64)[used] / count[used]
+            return means
+
+        basis = uniform_basis(place - which // BINS_PER_SPAN, degree)
+        gaps = np.diff(mean(time)) * BINS_PER_SPAN / span
+        return cls(
+            start=start,
+            span=span,
+            spans=spans,
+            degree=degree,
+            means=mean(row),
+            design=np.stack([mean(each) for each in basis], axis=1),
+            first=used // BINS_PER_SPAN,
+            gaps=np.where(gaps > LONGEST_LINK, np.inf, gaps),
+        )
+
+    @property
+    def coefficients(self) -> int:
+        """Of the spline."""
+        return self.spans + self.degree
+
+    @property
+    def knots(self) -> FloatArray:
+        """Of the spline: equally spaced, also beyond both ends."""
+        places = np.arange(-self.degree, self.spans + self.degree + 1, dtype=np.float64)
+        return self.start + self.span * places
+
+    def whitened(self, correlation: float) -> Whitened:
+        """Differences of neighbouring means whose errors are independent.
+
+        Args:
+            correlation: of the errors of two neighbouring means; those further apart are correlated the less,
+                as those of a process of first order.
+        """
+        lag = np.append(0.0, np.sign(correlation) * np.abs(correlation) ** self.gaps)
+        scale = 1 / np.sqrt(1 - lag**2)
+        linked = lag != 0
+        first = self.first.copy()
+        first[1:] = np.where(linked[1:], self.first[:-1], self.first[1:])
+        width = self.degree + 1
+        rows = np.zeros((len(first), width + math.ceil(LONGEST_LINK / BINS_PER_SPAN)))
+        columns = (self.first - first)[:, None] + np.arange(width)
+        np.put_along_axis(rows, columns, self.design, axis=1)
+        rows[1:, :width] -= lag[1:, None] * self.design[:-1]
+        errors = self.means - lag * np.append(0.0, self.means[:-1])
+        ordered = sort_rows(first, rows * scale[:, None], self.coefficients)
+        target = np.zeros(ordered.blocks.shape[:2])
+        target[ordered.block, ordered.place] = errors * scale
+        return Whitened(ordered.blocks, target, 2 * float(np.sum(np.log(scale))))
+
+    def differences(self, order: int) -> FloatArray:
+        """Rows of the differences of the coefficients, (blocks, rows, columns), and units behind the last.
+
+        The units make the unknowns that fill up the last block zero.
+        """
+        count, last = block_count(self.coefficients), self.coefficients - order
+        weights = [(-1.0) ** (order - k) * math.comb(order, k) for k in range(order + 1)]
+        rows = sort_rows(np.arange(last), np.tile(weights, (last, 1)), self.coefficients).blocks
+        height = rows.shape[2] // 2
+        full = np.zeros((count, height, 2 * height))
+        full[:, : rows.shape[1]] = rows
+        spare = np.arange(self.coefficients, count * height)
+        full[spare // height, spare % height, spare % height] = 1
+        return full
+
+
+def uniform_basis(place: FloatArray, degree: int) -> list[FloatArray]:
+    """The B-splines that are not zero on a span, first to last, on knots one apart.
+
+    Args:
+        place: within the span, 0 to 1, (samples,).
+        degree: of the B-splines.
+    """
+    values = [np.ones_like(place)]
+    for k in range(1, degree + 1):
+        higher = [np.zeros_like(place) for _ in range(k + 1)]
+        for i, value in enumerate(values):
+            rising = (place + (k - 1 - i)) / k
+            higher[i + 1] += rising * value
+            higher[i] += (1 - rising) * value
+        values = higher
+    return values

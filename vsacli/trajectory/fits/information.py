@@ -1,0 +1,138 @@
+"""Linear estimation with banded rows in square-root information form: block by block QR, no normal equations.
+
+Unknowns are estimated from rows of data and from rows of a prior, each of which concerns a few neighbouring
+unknowns. The prior may outweigh the data by twenty orders of magnitude, so that a Cholesky factorisation of
+the sum of both Gram matrices would lose the data; a QR decomposition of the rows themselves does not.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+
+BLOCK = 12
+"""Unknowns of a block. No row may reach further than this: eight coefficients of a B-spline of degree 7, or
+two neighbouring such rows at most two spans apart."""
+
+
+class Rows(NamedTuple):
+    """Rows sorted by the block in which they start.
+
+    Attributes:
+        blocks: (blocks, most rows of a block, 2 `BLOCK`); what is not used is zero.
+        block: of each row, (rows,).
+        place: of each row in its block, (rows,).
+    """
+
+    blocks: FloatArray
+    block: IndexArray
+    place: IndexArray
+
+
+class Factor(NamedTuple):
+    """The block-bidiagonal triangular factor of several estimations at a time, and what is left.
+
+    Attributes:
+        diagonal: (candidates, blocks, `BLOCK`, `BLOCK`).
+        upper: the blocks to the right of these, same shape.
+        right: the transformed right-hand side, (candidates, blocks, `BLOCK`).
+        rest: sum of squares that no choice of unknowns removes, (candidates,).
+    """
+
+    diagonal: FloatArray
+    upper: FloatArray
+    right: FloatArray
+    rest: FloatArray
+
+    @property
+    def log_determinants(self) -> FloatArray:
+        """Logarithms of the determinants of the Gram matrices, (candidates,)."""
+        pivots = np.abs(np.diagonal(self.diagonal, axis1=2, axis2=3))
+        return np.asarray(2 * np.sum(np.log(np.maximum(pivots, np.finfo(float).tiny)), axis=(1, 2)))
+
+
+def block_count(unknowns: int) -> int:
+    """How many blocks hold that many unknowns."""
+    return -(-unknowns // BLOCK)
+
+
+def sort_rows(first: IndexArray, rows: FloatArray, unknowns: int) -> Rows:
+    """Sort rows into blocks.
+
+    Args:
+        first: index of the first unknown that each row concerns, (rows,), never decreasing.
+        rows: (rows, width), at most `BLOCK` wide.
+        unknowns: how many there are.
+    """
+    block = first // BLOCK
+    place = np.arange(len(first)) - np.searchsorted(block, block)
+    count = block_count(unknowns)
+    blocks = np.zeros((count, int(place.max()) + 1, 2 * BLOCK))
+    columns = (first - block * BLOCK)[:, None] + np.arange(rows.shape[1])
+    blocks[block[:, None], place[:, None], columns] = rows
+    return Rows(blocks, block, place)
+
+
+def factorise(data: FloatArray, target: FloatArray, prior: FloatArray, weights: FloatArray) -> Factor:
+    """Triangular factors of data and prior.
+
+    Args:
+        data: rows, (blocks, rows, 2 `BLOCK`).
+        target: what the data rows are to give, (blocks, rows).
+        prior: rows that are to give zero, (blocks, `BLOCK`, 2 `BLOCK`).
+        weights: of the prior rows, (candidates, blocks, `BLOCK`).
+    """
+    candidates, count = weights.shape[:2]
+    diagonal = np.empty((candidates, count, BLOCK, BLOCK))
+    upper, right, rest = np.empty_like(diagonal), np.empty(diagonal.shape[:3]), np.zeros(candidates)
+    work = np.zeros((candidates, 2 * BLOCK + data.shape[1], 2 * BLOCK + 1))
+    for k in range(count):
+        work[:, BLOCK : 2 * BLOCK, :-1] = weights[:, k, :, None] * prior[k]
+        work[:, BLOCK : 2 * BLOCK, -1] = 0
+        work[:, 2 * BLOCK :, :-1] = data[k]
+        work[:, 2 * BLOCK :, -1] = target[k]
+        triangle = _triangle(work)
+        diagonal[:, k] = triangle[:, :BLOCK, :BLOCK]
+        upper[:, k] = triangle[:, :BLOCK, BLOCK:-1]
+        right[:, k] = triangle[:, :BLOCK, -1]
+        rest += triangle[:, 2 * BLOCK, -1] ** 2
+        work[:, :BLOCK, :BLOCK] = triangle[:, BLOCK : 2 * BLOCK, BLOCK:-1]
+        work[:, :BLOCK, BLOCK:-1] = 0
+        work[:, :BLOCK, -1] = triangle[:, BLOCK : 2 * BLOCK, -1]
+    return Factor(diagonal, upper, right, rest + np.sum(work[:, :BLOCK, -1] ** 2, axis=1))
+
+
+class Posterior:
+    """What one estimation says about its unknowns, in units of the standard deviation of a data row."""
+
+    def __init__(self, factor: Factor) -> None:
+        """Solve for the unknowns.
+
+        Args:
+            factor: of one candidate.
+        """
+        self._inverse = np.linalg.inv(factor.diagonal[0])
+        self._upper = factor.upper[0]
+        count = len(self._inverse)
+        self._roots = np.zeros((count + 1, BLOCK, BLOCK))
+        """Square roots of the covariances of the blocks; behind the last there is nothing to know."""
+        values = np.zeros((count + 1, BLOCK))
+        for k in range(count - 1, -1, -1):
+            inverse, upper = self._inverse[k], self._upper[k]
+            values[k] = inverse @ (factor.right[0, k] - upper @ values[k + 1])
+            passed = inverse @ upper @ self._roots[k + 1]
+            self._roots[k] = _triangle(np.hstack([inverse, passed]).T).T
+        self.unknowns: FloatArray = values[:-1].ravel()
+
+    def variances(self, blocks: FloatArray) -> FloatArray:
+        """Of what rows give, (blocks, rows), for rows as in `Rows.blocks`."""
+        near = blocks[:, :, :BLOCK] @ self._inverse
+        far = (blocks[:, :, BLOCK:] - near @ self._upper) @ self._roots[1:]
+        return np.asarray(np.sum(near**2, axis=2) + np.sum(far**2, axis=2))
+
+
+def _triangle(rows: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.qr(rows, mode="r"))
