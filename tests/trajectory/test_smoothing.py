@@ -6,7 +6,7 @@ from numpy.polynomial import Polynomial
 from scipy.interpolate import BSpline
 from scipy.signal import butter, filtfilt, lfilter
 
-from vsacli.trajectory.fits import SMOOTH, fit_samples
+from vsacli.trajectory.fits import LEAST_SQUARES, SMOOTH, fit_samples
 from vsacli.trajectory.fits.bins import Bins, uniform_basis
 from vsacli.trajectory.fits.penalised import Model
 from vsacli.trajectory.fits.residual import spectral_lines
@@ -150,9 +150,11 @@ def test_noise_that_is_not_white_is_found_by_default(colour):
 def test_white_noise_and_encoders_keep_their_least_squares(colour, motion):
     time, values, _ = record(motion, colour, 1)
     (part,) = fit_samples(time, values[None], 7, 4, None).parts
-    assert not part.exact
-    assert not part.smooth
-    assert part.smoothing is None
+    (asked,) = fit_samples(time, values[None], 7, 4, LEAST_SQUARES).parts
+    np.testing.assert_array_equal(part.spline.c, asked.spline.c)
+    np.testing.assert_array_equal(part.spline.t, asked.spline.t)
+    if motion is sines:
+        assert part.smoothing is None
 
 
 @pytest.mark.parametrize("motion", [sines, pauses, velocity_steps])
@@ -273,3 +275,15 @@ def test_short_records(count):
     fit = fit_samples(time, np.array([np.sin(time), np.full(count, 0.3)]), 7, 4, SMOOTH)
     assert np.isfinite(fit.at(time, 5)).all()
     assert np.abs(fit.at(time, 1)[0, 1] - 0.3).max() < 100 * EPS
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+def test_vibration_that_may_be_motion_is_kept_by_default_and_said(noise):
+    time = np.arange(10001) / 1000
+    values = sines(time, 0)[0] + 3e-4 * np.sin(2 * np.pi * 15 * time)
+    values += noise * np.random.default_rng(0).standard_normal(len(time))
+    fit = fit_samples(time, values[None], 7, 4, None)
+    assert not fit.parts[0].smooth
+    assert fit.parts[0].smoothing.lines.others == pytest.approx([15], abs=0.1)
+    (_, said) = Trajectory.from_samples(time, values[:, None]).warnings
+    assert "has a vibration at 15 Hz beyond a smooth motion" in said

@@ -15,12 +15,15 @@ from vsacli.trajectory.fits.smoothing import smoothing_spline
 DISAGREEMENT, DISAGREEING_DEVIATIONS = 0.1, 3.0
 """Share of the highest derivative, and deviations of a smoothing spline, that a fit may differ from it by."""
 
+COMPARED_SAMPLES = 100_000
+"""Up to which least squares are compared with a smoothing spline without suspicion: it takes as long."""
+
 PROBES = 4000
 """Samples, about, at which they are compared; between samples far apart neither is known."""
 
 VIBRATION = 0.9
-"""Share of the power of a residual in lines from which on it is no noise: a Hann window keeps all of a steady
-vibration in few frequencies."""
+"""Share of the power of a residual in lines from which on it is no noise that interpolation follows: a Hann
+window keeps all of a steady vibration in few frequencies. Least squares can follow one beside white noise."""
 
 
 def smooth_part(time: FloatArray, values: FloatArray, member: int, degree: int, order: int) -> Part:
@@ -39,18 +42,24 @@ def instead_of_followed_noise(time: FloatArray, values: FloatArray, fit: Fit, or
     That the residual of coarse splines stagnates is the suspicion; what convicts the fit is a smoothing
     spline whose highest derivative is another by more than its own deviation explains. If the residual of
     the latter is a vibration, this may be motion, and the fit stays, with what was found; as it does if
-    no resolution is accepted and the suspicion is not beyond doubt.
+    no resolution is accepted and the suspicion is not beyond doubt. Least squares that follow no noise stay,
+    with what was found if the record does not determine the derivative.
     """
     for part in fit.parts:
         for column, member in enumerate(part.members.tolist()):
             fall = slowest_fall(time, values[member], fit.degree, fit.noise[member])
-            if fall >= STAGNATION:
+            suspect = fall < STAGNATION
+            if not suspect and (part.exact or len(time) > COMPARED_SAMPLES):
                 continue
             smooth = smooth_part(time, values, member, fit.degree, order)
             known = smooth.smoothing
-            if known is None or not _differ(time, part, column, smooth, order):
+            if known is None:
                 continue
-            if known.lines.share > VIBRATION or not (known.resolved or fall < FLAT):
+            differs = suspect and _differ(time, part, column, smooth, order)
+            if not differs and (part.exact or known.determined):
+                continue
+            vibrates = known.lines.share > (VIBRATION if part.exact else 0)
+            if not differs or vibrates or not (known.resolved or fall < FLAT):
                 single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], fit.degree)
                 yield Part(smooth.members, single, part.exact, known)
             else:

@@ -84,8 +84,8 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
         lines = ", ".join(f"{frequency:.4g}" for frequency in known.lines.others[:LISTED_LINES])
         if not part.smooth and lines:
             yield (
-                f"{value} of {label} has a vibration at {lines} Hz beyond a smooth motion, which {highest}"
-                " follows; if it is no motion, fit: smooth leaves it out"
+                f"{value} of {label} has a vibration at {lines} Hz beyond a smooth motion; if it is none of"
+                " the motion, fit: smooth takes it for noise"
             )
         if not known.resolved:
             yield (

@@ -57,6 +57,9 @@ if noise is white."""
 ROUNDING = 1000 * np.finfo(float).eps
 """Of the largest value; residuals below are what arithmetic leaves."""
 
+WINDOW, MOST_WINDOWS = 16384, 3
+"""Samples that are looked at together, and how many such parts of a long record: noise is everywhere."""
+
 COARSEST_SPANS = 16
 """Of `slowest_fall`."""
 
@@ -142,6 +145,13 @@ def slowest_fall(time: FloatArray, row: FloatArray, degree: int, noise: float) -
     Returns:
         With `SPANS_RATIO` times as many spans; `STAGNATION` or more of records without noise, or with white.
     """
+    starts = np.linspace(0, max(0, len(time) - WINDOW), min(MOST_WINDOWS, -(-len(time) // WINDOW)))
+    windows = [slice(start, start + WINDOW) for start in starts.astype(int).tolist()]
+    return min(_slowest_fall(time[window], row[window], degree, noise) for window in windows)
+
+
+def _slowest_fall(time: FloatArray, row: FloatArray, degree: int, noise: float) -> float:
+    """Of one window."""
     size, last, spans = float(np.std(row)), np.inf, float(COARSEST_SPANS)
     least, slowest = max(WHITE * noise, ROUNDING * float(np.abs(row).max())), np.inf
     while 4 * spans <= len(time):
