@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -43,7 +44,8 @@ def instead_of_followed_noise(time: FloatArray, values: FloatArray, fit: Fit, or
     spline whose highest derivative is another by more than its own deviation explains. If the residual of
     the latter is a vibration, this may be motion, and the fit stays, with what was found; as it does if
     no resolution is accepted and the suspicion is not beyond doubt. Least squares that follow no noise stay,
-    with what was found if the record does not determine the derivative.
+    with what was found if the record does not determine the derivative; their difference from the smoothing
+    spline counts as a deviation then.
     """
     for part in fit.parts:
         for column, member in enumerate(part.members.tolist()):
@@ -55,7 +57,11 @@ def instead_of_followed_noise(time: FloatArray, values: FloatArray, fit: Fit, or
             known = smooth.smoothing
             if known is None:
                 continue
-            differs = suspect and _differ(time, part, column, smooth, order)
+            difference = _difference(time, part, column, smooth, order)
+            allowed = DISAGREEMENT + DISAGREEING_DEVIATIONS * known.relative
+            differs = suspect and difference > allowed
+            if not differs and not part.exact:
+                known = replace(known, relative=float(np.hypot(known.relative, difference)))
             if not differs and (part.exact or known.determined):
                 continue
             vibrates = known.lines.share > (VIBRATION if part.exact else 0)
@@ -66,16 +72,15 @@ def instead_of_followed_noise(time: FloatArray, values: FloatArray, fit: Fit, or
                 yield smooth
 
 
-def _differ(time: FloatArray, part: Part, column: int, smooth: Part, order: int) -> bool:
-    """Whether the highest derivative of a fit is another than a smoothing spline's, away from the ends."""
-    known, start, end = smooth.smoothing, *smooth.doubtful
-    assert known is not None, "the spline is a smoothing one"
+def _difference(time: FloatArray, part: Part, column: int, smooth: Part, order: int) -> float:
+    """Between the highest derivatives of a fit and a smoothing spline, relative, away from the ends."""
+    start, end = smooth.doubtful
     inside = time[(time >= time[0] + start) & (time <= time[-1] - end)]
     probes = inside[:: 1 + len(inside) // PROBES]
     expected = smooth.spline(probes, nu=order)[:, 0]
     error = part.spline(probes, nu=order)[:, column] - expected
-    allowed = DISAGREEMENT + DISAGREEING_DEVIATIONS * known.relative
-    return bool(np.sum(error**2) > allowed**2 * np.sum(expected**2))
+    power = float(np.sum(expected**2))
+    return float(np.sqrt(np.sum(error**2) / power)) if power > 0 else 0.0
 
 
 def replaced(parts: Sequence[Part], instead: Sequence[Part]) -> list[Part]:
