@@ -22,9 +22,9 @@ COMPARED_SAMPLES = 100_000
 PROBES = 4000
 """Samples, about, at which they are compared; between samples far apart neither is known."""
 
-VIBRATION = 0.9
-"""Share of the power of a residual in lines from which on it is no noise that interpolation follows: a Hann
-window keeps all of a steady vibration in few frequencies. Least squares can follow one beside white noise."""
+VIBRATION = 0.5
+"""Share of the power of a residual in lines from which on it is a vibration rather than noise. The
+faint line at 358 Hz that an encoder's steps left beside filtered noise must not count."""
 
 
 def smooth_part(time: FloatArray, values: FloatArray, member: int, degree: int, order: int) -> Part:
@@ -64,8 +64,7 @@ def instead_of_followed_noise(time: FloatArray, values: FloatArray, fit: Fit, or
                 known = replace(known, relative=float(np.hypot(known.relative, difference)))
             if not differs and (part.exact or known.determined):
                 continue
-            vibrates = known.lines.share > (VIBRATION if part.exact else 0)
-            if not differs or vibrates or not (known.resolved or fall < FLAT):
+            if not differs or known.lines.share > VIBRATION or not (known.resolved or fall < FLAT):
                 single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], fit.degree)
                 yield Part(smooth.members, single, part.exact, known)
             else:
