@@ -16,7 +16,7 @@ from vsacli.analysis.report import Report
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.drive import Drive, drive
-from vsacli.dynamics.link_torques import LinkTorques
+from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.times import UniformTimes

@@ -19,7 +19,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.model import Joint
 
 JOINTS = 7

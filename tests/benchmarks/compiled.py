@@ -22,8 +22,8 @@ from vsacli.compute.engine.compiler import FLAGS, system_compiler
 from vsacli.compute.engine.engines import Engine, Kernel, kernel_program, passes
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.control.codegen.project import generate, prefix_of
+from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.dynamics.link_torques import LinkTorques
 from vsacli.robot.model import Robot
 
 LINKS, WHOLE = "link torques", "whole inverse dynamics"

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from subjects import chain, motion, seven_joints
 from timing import medians
 
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.model import Robot
 
 JOINTS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)

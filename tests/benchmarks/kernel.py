@@ -14,7 +14,7 @@ from subjects import motion, seven_joints
 from timing import medians
 
 from vsacli.base.arrays import FloatArray
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 
 DURATION = 3.0
 OURS = "vsacli, NumPy"

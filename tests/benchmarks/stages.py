@@ -14,8 +14,8 @@ from vsacli import load_trajectory
 from vsacli.analysis.run import Run
 from vsacli.base.variables import Block
 from vsacli.compute.engine import choose
+from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 from vsacli.dynamics.inverse import InverseDynamics, compute_block, usual_block
-from vsacli.dynamics.link_torques import LinkTorques, link_torques
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.model import Robot
 from vsacli.trajectory.times import UniformTimes

@@ -10,9 +10,9 @@ from samples.command_line import REPOSITORY, contents
 from samples.urdf import joint, link, random_serial, robot, serial, write
 
 from vsacli import load_robot
-from vsacli.actuators import ACTUATORS
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.rigid import Rigid
 from vsacli.cli.import_urdf import import_urdf as command
 from vsacli.robot.urdf import Placeholders, import_urdf, render, robot_text

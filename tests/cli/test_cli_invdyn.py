@@ -11,7 +11,7 @@ from samples.command_line import REST_TO_REST, ROBOT, SEVEN_JOINTS, SEVEN_JOINTS
 
 from vsacli.analysis import run as pipeline
 from vsacli.dynamics import inverse as steps
-from vsacli.dynamics.link_torques import LinkTorques
+from vsacli.dynamics.elastic_torques import LinkTorques
 
 GRAVITY = 9.81
 SPRING, HARDENING = 400.0, 2000.0

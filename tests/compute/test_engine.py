@@ -26,8 +26,8 @@ from vsacli.actuators.laws.sinh import Sinh
 from vsacli.base.flags import Flag
 from vsacli.compute.engine import choose, compiler
 from vsacli.compute.engine.engines import Engine
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
-from vsacli.dynamics.link_torques import link_torques
 from vsacli.robot.model import Robot
 
 pytestmark = needs_compiler

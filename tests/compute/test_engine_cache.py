@@ -25,7 +25,7 @@ from vsacli.compute.engine.cache import (
     open_cache,
 )
 from vsacli.compute.engine.compiled_engine import _loaded
-from vsacli.dynamics.link_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 
 KERNEL = LinkTorques(vsa_3r())
 MOTION = random_motion(vsa_3r(), 50, seed=1)

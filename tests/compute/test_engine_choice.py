@@ -15,7 +15,7 @@ from vsacli.base.errors import InputError
 from vsacli.compute.engine import NUMPY, choice, choose
 from vsacli.compute.engine.choice import LOOK_FROM
 from vsacli.compute.engine.compiled_engine import CompiledEngine, _loaded
-from vsacli.dynamics.link_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 
 KERNEL = LinkTorques(vsa_3r())
 

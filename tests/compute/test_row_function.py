@@ -10,8 +10,8 @@ from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.choice import TRACE_FROM
 from vsacli.compute.engine.engines import TracedEngine, kernel_program
 from vsacli.compute.tracing.python_code import RowFunction
+from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.dynamics.link_torques import LinkTorques
 from vsacli.robot.model import Robot
 
 CLOSED = ("vsa_3r", "lwr_7r_vsa", "rp_2", "mixed_3r", "tendon_1r", "qbmove_arm_gazebo")

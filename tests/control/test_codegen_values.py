@@ -20,11 +20,11 @@ from vsacli.base.signals import POSITION
 from vsacli.base.variables import Block
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.feedback_linearization import FeedbackLinearization
 from vsacli.control.gains import Gains, Integral
+from vsacli.control.linearization import FeedbackLinearization
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import TORQUES, compute_block
-from vsacli.dynamics.link_torques import link_torques
 from vsacli.robot.model import Robot
 
 pytestmark = needs_compiler

@@ -19,12 +19,12 @@ from vsacli.actuators.laws.quadratic import Quadratic
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import Wrench
-from vsacli.control.feedback_linearization import FeedbackLinearization, feedback_linearization
 from vsacli.control.gains import Gains, Integral
+from vsacli.control.linearization import FeedbackLinearization, feedback_linearization
 from vsacli.control.poles import gains_from_text, load_gains, parse_poles
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import State, state_derivative
 from vsacli.dynamics.inverse import compute_block
-from vsacli.dynamics.link_torques import link_torques
 from vsacli.robot.model import Pose, Robot
 from vsacli.trajectory.motion import Motion
 

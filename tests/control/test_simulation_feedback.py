@@ -14,8 +14,8 @@ from samples.plants import all_rigid
 from samples.robots import random_robot, vsa_3r
 from samples.simulated import error_course, linearized_run, mixed_3r, short_motion
 
-from vsacli.control.feedback_linearization import FeedbackLinearization
 from vsacli.control.gains import Gains
+from vsacli.control.linearization import FeedbackLinearization
 from vsacli.control.simulation import InitialError, simulate
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Pose

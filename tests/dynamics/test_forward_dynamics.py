@@ -13,8 +13,8 @@ from samples.robots import random_robot, still_joint, vsa_3r
 
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import Wrench
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import State, mass_matrix, state_derivative
-from vsacli.dynamics.link_torques import link_torques
 from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Pose, Robot
 
 CHAINS = ["R", "RRR", "RPRP", "PPP", "RRRRRRR"]

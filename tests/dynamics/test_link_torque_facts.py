@@ -22,7 +22,7 @@ from samples.robots import (
 )
 
 from vsacli.base.arrays import FloatArray
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
 
 ROUNDING = 1e-12

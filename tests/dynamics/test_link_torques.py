@@ -19,7 +19,7 @@ from samples.wrenches import random_wrench
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.model import Robot
 
 ROUNDING = 1e-12

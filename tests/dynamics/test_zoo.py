@@ -17,8 +17,8 @@ from samples.shipped import shipped_robot
 
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import mass_matrix
-from vsacli.dynamics.link_torques import link_torques
 from vsacli.files.examples import Example, examples
 from vsacli.robot.model import Robot
 

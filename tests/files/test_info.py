@@ -14,7 +14,7 @@ import pytest
 from samples.command_line import REPOSITORY, ROBOT, rest_to_rest
 from samples.marks import slow
 
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.files.info.describe import describe_trajectory
 from vsacli.files.info.extremes import free_range
 from vsacli.files.info.robot_info import describe_robot, reach, reach_bound, static_load

@@ -11,7 +11,7 @@ import pytest
 import yaml
 from samples.command_line import REPOSITORY, contents
 
-from vsacli.actuators import ACTUATORS
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.cli.new import new

@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import Wrench
 from vsacli.compute.vector import Vector
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Pose, Robot
 

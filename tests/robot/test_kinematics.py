@@ -12,7 +12,7 @@ from samples.wrenches import held, random_wrench
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import WRENCH_FRAMES
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.kinematics import forward_kinematics, jacobian
 from vsacli.robot.model import Pose, Robot
 

@@ -14,7 +14,7 @@ from samples.robots import ODD_GRAVITY, random_robot
 
 from vsacli import load_robot
 from vsacli.base.errors import InputError
-from vsacli.dynamics.link_torques import link_constants, link_torques
+from vsacli.dynamics.elastic_torques import link_constants, link_torques
 from vsacli.robot.model import Robot
 
 PANDA = [

@@ -10,7 +10,7 @@ from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
 from samples.urdf import joint, link, random_serial, robot, serial, write
 
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.urdf import import_urdf
 from vsacli.robot.urdf.rigid_motion import pose_matrix, roll_pitch_yaw
 

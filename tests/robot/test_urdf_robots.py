@@ -15,7 +15,7 @@ from oracles.urdf_pinocchio import UrdfOracle
 from samples.marks import slow
 
 from vsacli.base.errors import InputError
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.urdf import Conversion, import_urdf
 from vsacli.robot.urdf.link_tree import Urdf, below
 from vsacli.robot.urdf.reader import read_urdf

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.dynamics.link_torques import link_constants, tip_load
+from vsacli.dynamics.elastic_torques import link_constants, tip_load
 from vsacli.dynamics.recursion import JointState, recursion
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Joint, Robot

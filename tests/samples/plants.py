@@ -11,8 +11,8 @@ from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base.arrays import FloatArray
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import State
-from vsacli.dynamics.link_torques import link_torques
 from vsacli.robot.model import Robot
 
 

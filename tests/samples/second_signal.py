@@ -27,8 +27,8 @@ PRETENSION = Signal(
 
 if __name__ == "__main__":
     COMMANDED[PRETENSION.key] = PRETENSION
-    from vsacli.actuators import ACTUATORS
     from vsacli.actuators.antagonistic import Antagonistic
+    from vsacli.actuators.kinds import ACTUATORS
     from vsacli.cli.main import run
 
     class Pretensioned(Antagonistic):

@@ -21,7 +21,7 @@ from samples.robots import vsa_3r
 
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.analysis.run import Run
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.model import Limits
 from vsacli.studies.remedies import StiffnessProfile, suggest
 from vsacli.studies.remedies.nearest_spline import Bounds, NoSplineError, nearest_spline

@@ -8,7 +8,7 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.trajectory.joints import CommandedJoints
+from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 
 JOINTS = CommandedJoints({"base": "revolute", "elbow": "revolute"}, exempt={})

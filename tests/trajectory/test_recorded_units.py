@@ -1,5 +1,4 @@
-"""Units, separators and resampling of recorded motions, from vsacli.trajectory.joints import CommandedJoints
-from the file to the trajectory."""
+"""Units, separators and resampling of recorded motions, from the file to the trajectory."""
 
 from pathlib import Path
 
@@ -9,9 +8,9 @@ import pytest
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION
+from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
-from vsacli.trajectory.joints import CommandedJoints
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 

@@ -11,7 +11,7 @@ from vsacli import Trajectory, inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES
-from vsacli.dynamics.link_torques import link_torques
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes

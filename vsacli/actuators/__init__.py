@@ -1,35 +1,21 @@
-"""What drives the joints of a robot.
+"""What drives the joints of a robot: springs, and the kinds of actuator, one file each."""
 
-Adding a kind of actuator is adding a class derived from `vsacli.actuators.actuator.Actuator` and its line in
-`ACTUATORS`.
-"""
-
-from __future__ import annotations
-
-from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from vsacli.base.lazy import LazyRegistry
+from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from vsacli.base.variables import Variable
+    from vsacli.actuators import laws
+    from vsacli.actuators.antagonistic import Antagonistic
+    from vsacli.actuators.elastic import Elastic
+    from vsacli.actuators.motor import Motor
+    from vsacli.actuators.rigid import Rigid
 
-ACTUATORS = LazyRegistry(
-    {
-        "antagonistic": "vsacli.actuators.antagonistic:Antagonistic",
-        "elastic": "vsacli.actuators.elastic:Elastic",
-        "rigid": "vsacli.actuators.rigid:Rigid",
-    }
-)
-"""Kinds of actuator by the name they have in a robot file."""
-
-__all__ = ["ACTUATORS", "existing"]
-
-
-def existing(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:
-    """Which columns of a variable of joints exist, for each joint by its kind of actuator.
-
-    A kind that is not known may have them all.
-    """
-    every = [True] * (2 if "motor" in variable.dims else 1)
-    return [ACTUATORS[kind].has(variable) if kind in ACTUATORS else every for kind in kinds]
+__all__ = [
+    "Antagonistic",
+    "Elastic",
+    "Motor",
+    "Rigid",
+    "laws",
+]
+__getattr__, __dir__ = lazy_exports(__name__)

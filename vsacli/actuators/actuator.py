@@ -24,7 +24,7 @@ class Placeholders(NamedTuple):
     """The actuator of every joint as long as nothing is known of it, and its constants, in SI units.
 
     Attributes:
-        actuator: a key of `vsacli.actuators.ACTUATORS`.
+        actuator: a key of `vsacli.actuators.kinds.ACTUATORS`.
         motor_inertia: of each motor, joint side of the gear.
         stiffness: of an elastic transmission.
         spring: k and k_c of the cubic springs of an antagonistic one.

@@ -1,1 +1,19 @@
 """One run over a trajectory: its report, and its self-check."""
+
+from typing import TYPE_CHECKING
+
+from vsacli.base.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from vsacli.analysis.report import Report
+    from vsacli.analysis.result import Result
+    from vsacli.analysis.result_file import open_result
+    from vsacli.analysis.run import inverse_dynamics
+
+__all__ = [
+    "Report",
+    "Result",
+    "inverse_dynamics",
+    "open_result",
+]
+__getattr__, __dir__ = lazy_exports(__name__)

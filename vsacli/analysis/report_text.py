@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
-from vsacli.actuators import ACTUATORS
 from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.joint_report import JointDrift, JointReport, Worst
 from vsacli.analysis.self_check import LADDER_BOUND, SelfCheck
 from vsacli.base.flags import Flag

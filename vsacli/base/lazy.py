@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Mapping
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Any
 
 
@@ -41,3 +43,48 @@ class LazyRegistry(Mapping[str, Any]):
 
     def __len__(self) -> int:
         return len(self.homes)
+
+
+def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """`__getattr__` and `__dir__` of a package that imports what it exports at its first use (PEP 562).
+
+    What it exports, and from where, is what its `__init__.py` imports under `if TYPE_CHECKING:`, so that type
+    checkers and the running program are told in one place; `import *` stands for all that a room exports.
+
+    Args:
+        package: its name.
+    """
+
+    @cache
+    def homes() -> dict[str, str]:
+        path = sys.modules[package].__file__
+        assert path is not None
+        return dict(_imported_for_types(path))
+
+    def get(name: str) -> Any:
+        listed = vars(sys.modules[package]).get("__all__")
+        if name == "__all__":
+            return sorted(homes())
+        if name not in (homes() if listed is None else listed):
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        home = homes()[name]
+        if home == package:  # a module of its own
+            return importlib.import_module(f"{package}.{name}")
+        return getattr(importlib.import_module(home), name)
+
+    return get, lambda: sorted(homes())
+
+
+def _imported_for_types(path: str) -> Iterator[tuple[str, str]]:
+    """Each name that a module imports under `if TYPE_CHECKING:`, with the module it comes from."""
+    import ast
+
+    with open(path, encoding="utf-8") as file:
+        statements = ast.parse(file.read()).body
+    block = next(statement for statement in statements if isinstance(statement, ast.If))
+    for statement in block.body:
+        assert isinstance(statement, ast.ImportFrom)
+        assert statement.module is not None
+        for alias in statement.names:
+            names = importlib.import_module(statement.module).__all__ if alias.name == "*" else [alias.name]
+            yield from ((name, statement.module) for name in names)

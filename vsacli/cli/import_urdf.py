@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from vsacli.actuators import ACTUATORS
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.cli.command_parts import example, overwrite_option, refuse_input_as_output
 from vsacli.cli.console import Talk, talk_options
 

@@ -36,17 +36,17 @@ def info(file: str, robot: str | None, as_json: bool, field: str | None) -> None
 
     description = describe_file(file, robot)
     if field is not None:
-        click.echo(_found(json_value(description), field))
+        click.echo(_found(description, field))
     else:
         click.echo(json.dumps(json_value(description), indent=1) if as_json else render(description))
 
 
-def _found(content: Any, field: str) -> str:
+def _found(description: dict[str, Any], field: str) -> str:
     """The value at a path as a script wants it: texts without quotes, everything else as JSON."""
-    from vsacli.documents.paths import find
+    from vsacli.files.info import described_value
 
     try:
-        value = find(content, field)
+        value = described_value(description, field)
     except InputError as error:
         raise InputError.one(f"--field: {error}") from None
     return value if isinstance(value, str) else json.dumps(value)

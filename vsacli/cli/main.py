@@ -11,9 +11,9 @@ from typing import Any, NoReturn, cast
 
 import click
 
-from vsacli import __version__
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.lazy import LazyRegistry
+from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, OutputClosedError, reporting_stdout_errors, tell
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from vsacli.actuators import ACTUATORS
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 

@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from vsacli.control.gains import Gains
     from vsacli.control.simulation import Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
-    from vsacli.documents.source import Source
     from vsacli.results.store.simulation import SimulationWriter
     from vsacli.robot.model import Robot
     from vsacli.trajectory.trajectory import Trajectory
@@ -127,9 +126,11 @@ def simulate(
     """
     path = Path(f"{run_stem(robot, trajectory)}-simulation.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
-    simulation, sources = _prepared(inputs, **choices)
-    arm = replace(inputs.robot, sources=(*inputs.robot.sources, *sources))
-    inputs = inputs._replace(robot=arm)
+    simulation = _prepared(inputs, **choices)
+    gains: Gains | None = simulation.keywords["gains"]
+    if gains is not None:  # the file of the poles is one of the inputs that the result records
+        arm = replace(inputs.robot, sources=(*inputs.robot.sources, *gains.sources))
+        inputs = inputs._replace(robot=arm)
     refuse_input_as_output(path, inputs.files)
     from vsacli.results.store.simulation import SimulationWriter
 
@@ -164,18 +165,17 @@ def _prepared(
     measured: Any,
     rtol: float,
     atol: float,
-) -> tuple[Callable[..., Simulation], list[Source]]:
-    """The simulation that the options describe, and the files read for them."""
+) -> partial[Simulation]:
+    """The simulation that the options describe."""
     from vsacli.control.simulation import InitialError, Tolerances, check_measured, perturbed, simulate
 
     gains: Gains | None = None
-    sources: list[Source] = []
     if controller == FEEDBACK:
-        gains, sources = _gains(inputs.robot, poles, stiffness_poles, integral)
+        gains = _gains(inputs.robot, poles, stiffness_poles, integral)
     elif poles is not None or stiffness_poles is not None or integral:
         raise InputError.one(f"poles and integral action need --controller {FEEDBACK}")
     check_measured(measured, gains)
-    simulation = partial(
+    return partial(
         simulate,
         *inputs,
         gains=gains,
@@ -184,20 +184,16 @@ def _prepared(
         measured=measured,
         tolerances=Tolerances(rtol, atol),
     )
-    return simulation, sources
 
 
-def _gains(
-    robot: Robot, poles: str | None, stiffness_poles: str | None, integral: bool
-) -> tuple[Gains, list[Source]]:
+def _gains(robot: Robot, poles: str | None, stiffness_poles: str | None, integral: bool) -> Gains:
     from vsacli.control.poles import DEFAULT, gains_from_text, load_gains
 
     if poles is not None and poles.endswith((".yaml", ".yml")):
         if stiffness_poles is not None:
             raise InputError.one("--stiffness-poles: the poles file holds these too", poles)
-        gains, source = load_gains(poles, robot, integral=integral)
-        return gains, [source]
-    return gains_from_text(robot, poles or DEFAULT, stiffness_poles or DEFAULT, integral=integral), []
+        return load_gains(poles, robot, integral=integral)
+    return gains_from_text(robot, poles or DEFAULT, stiffness_poles or DEFAULT, integral=integral)
 
 
 def _run(

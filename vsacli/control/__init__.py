@@ -1,1 +1,24 @@
-"""Control laws on the state of a robot: gains, linear control, and what cancels the nonlinear dynamics."""
+"""Gains, feedback linearization, simulation, and C for controllers."""
+
+from typing import TYPE_CHECKING
+
+from vsacli.base.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from vsacli.control.gains import Gains, Integral
+    from vsacli.control.linearization import FeedbackLinearization, feedback_linearization
+    from vsacli.control.simulation.integrator import Tolerances
+    from vsacli.control.simulation.perturbation import perturbed
+    from vsacli.control.simulation.simulate import InitialError, simulate
+
+__all__ = [
+    "FeedbackLinearization",
+    "Gains",
+    "InitialError",
+    "Integral",
+    "Tolerances",
+    "feedback_linearization",
+    "perturbed",
+    "simulate",
+]
+__getattr__, __dir__ = lazy_exports(__name__)

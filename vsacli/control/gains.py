@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+
+if TYPE_CHECKING:
+    from vsacli.documents.source import Source
 
 
 class Integral(NamedTuple):
@@ -64,6 +67,7 @@ class Gains:
         stiffness: K_sigma0, K_sigma1 of (33b), (joints, 2) or (1, 2).
         position_integral: KI of the position, (joints,) or (1,), 1/s^(r+1); 0 for no integral action.
         stiffness_integral: KI of the stiffness, likewise, 1/s^3.
+        sources: the files that they were read from.
 
     Raises:
         InputError: a polynomial that is not Hurwitz.
@@ -73,6 +77,7 @@ class Gains:
     stiffness: FloatArray
     position_integral: FloatArray
     stiffness_integral: FloatArray
+    sources: tuple[Source, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("position", "stiffness"):

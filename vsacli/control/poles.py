@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, STIFFNESS_ORDER, Gains, check_stable
 from vsacli.documents.fields import Items, Record, check_fields, text, value
 from vsacli.documents.reading import read_document
-from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
 
 FORMAT = "vsacli-poles/1"
@@ -73,8 +72,8 @@ def gains_from_text(robot: Robot, position: str, stiffness: str, *, integral: bo
     return _gains(robot, [parse_poles(position)], [parse_poles(stiffness)], integral)
 
 
-def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) -> tuple[Gains, Source]:
-    """Gains from a file with the poles of each joint, and the record of the file.
+def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) -> Gains:
+    """Gains from a file with the poles of each joint.
 
     Raises:
         InputError: with every problem of the file.
@@ -92,7 +91,7 @@ def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) ->
         [parse_poles(getattr(joint, name)) for joint in joints] for name in ("position", "stiffness")
     )
     try:
-        return _gains(robot, position, stiffness, integral), source
+        return replace(_gains(robot, position, stiffness, integral), sources=(source,))
     except InputError as error:
         raise InputError.one(str(error), source.path) from None
 

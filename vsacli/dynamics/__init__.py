@@ -1,1 +1,17 @@
 """Equations (36)-(74) over blocks of samples, and the forward dynamics."""
+
+from typing import TYPE_CHECKING
+
+from vsacli.base.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from vsacli.dynamics.elastic_torques import link_torques
+    from vsacli.dynamics.forward import State, mass_matrix, state_derivative
+
+__all__ = [
+    "State",
+    "link_torques",
+    "mass_matrix",
+    "state_derivative",
+]
+__getattr__, __dir__ = lazy_exports(__name__)

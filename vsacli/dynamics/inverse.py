@@ -20,10 +20,10 @@ from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
 from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import Scalar
 from vsacli.dynamics.drive import Drive, drive
+from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
-from vsacli.dynamics.link_torques import TORQUES, LinkTorques, link_torques
+from vsacli.robot.commanded_joints import takers
 from vsacli.robot.model import Robot, check_robot
-from vsacli.trajectory.joints import takers
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 

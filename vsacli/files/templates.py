@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from vsacli.actuators import ACTUATORS
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.errors import InputError
 from vsacli.documents.commented import commented_document
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
 from vsacli.robot import file as robot_file
+from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Joint, Robot
 from vsacli.trajectory import file as trajectory_file
-from vsacli.trajectory.joints import CommandedJoints
 
 Values = dict[str, Any]
 

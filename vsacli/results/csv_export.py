@@ -12,7 +12,7 @@ from typing import Any, Literal, TextIO, TypeAlias
 
 import numpy as np
 
-from vsacli.actuators import existing
+from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.atomic_files import AtomicFile, reporting_storage_errors
 from vsacli.base.errors import InputError, VsacliError

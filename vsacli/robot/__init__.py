@@ -1,1 +1,27 @@
 """The chain of joints and links, its file, and its making from a URDF."""
+
+from typing import TYPE_CHECKING
+
+from vsacli.base.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from vsacli.robot.file import load_robot
+    from vsacli.robot.kinematics import forward_kinematics, jacobian
+    from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Pose, Robot
+    from vsacli.robot.urdf import Placeholders, import_urdf
+
+__all__ = [
+    "DenavitHartenberg",
+    "Inertia",
+    "Joint",
+    "Limits",
+    "Link",
+    "Placeholders",
+    "Pose",
+    "Robot",
+    "forward_kinematics",
+    "import_urdf",
+    "jacobian",
+    "load_robot",
+]
+__getattr__, __dir__ = lazy_exports(__name__)

@@ -9,8 +9,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from vsacli.actuators import ACTUATORS
 from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, check_type

@@ -15,9 +15,9 @@ from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, REQUIRED, check_fields, number, text, value
 from vsacli.documents.reading import read_document
+from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
-from vsacli.trajectory.joints import CommandedJoints
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes, uniform_times_over
 from vsacli.trajectory.trajectory import Trajectory

@@ -12,8 +12,8 @@ from vsacli.base.flags import Flag, marked
 from vsacli.compute.rows import RowLayout
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.control.codegen.robot_functions import command_structure, variable_array
-from vsacli.control.feedback_linearization import control_law, position_order
 from vsacli.control.gains import STIFFNESS_ORDER, Gains, Integral
+from vsacli.control.linearization import control_law, position_order
 from vsacli.dynamics.forward import Plant
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot

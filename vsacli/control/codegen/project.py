@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from vsacli import __version__
 from vsacli.base.atomic_files import check_target, reporting_storage_errors, write_text
 from vsacli.base.errors import InputError, StorageError
+from vsacli.base.version import __version__
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.header import comment, header_text
 from vsacli.control.codegen.interface import Function

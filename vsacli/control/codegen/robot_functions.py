@@ -5,8 +5,8 @@ from __future__ import annotations
 from vsacli.base.signals import POSITION, orders_of_derivation
 from vsacli.base.variables import VARIABLES
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
+from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.dynamics.link_torques import TORQUES, LinkTorques
 from vsacli.robot.model import Robot
 
 DRIVE_NAMES = (

@@ -9,8 +9,8 @@ import numpy as np
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
-from vsacli.control.feedback_linearization import FeedbackLinearization
 from vsacli.control.gains import Gains, Integral
+from vsacli.control.linearization import FeedbackLinearization
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.state_vector import Phase

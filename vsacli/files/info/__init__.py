@@ -1,6 +1,6 @@
 """What a file holds, as JSON values and as text."""
 
-from vsacli.files.info.describe import describe_file
+from vsacli.files.info.describe import describe_file, described_value
 from vsacli.files.info.text import render
 
-__all__ = ["describe_file", "render"]
+__all__ = ["describe_file", "described_value", "render"]

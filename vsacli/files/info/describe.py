@@ -9,9 +9,11 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.json_records import json_value
 from vsacli.base.signals import orders_of_derivation
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
+from vsacli.documents.paths import find
 from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.info.robot_info import describe_robot
 from vsacli.files.placeholder_robot import placeholder_robot
@@ -45,6 +47,15 @@ def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
         case kind:
             expected = "a robot, a trajectory, a result or a simulation"
             raise InputError.one(f"is a file of the kind {kind.value}; expected {expected}", path)
+
+
+def described_value(description: dict[str, Any], field: str) -> Any:
+    """The value at a path into a description, as plain JSON values.
+
+    Raises:
+        InputError: nothing is there; says what is, and the nearest name.
+    """
+    return find(json_value(description), field)
 
 
 def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:

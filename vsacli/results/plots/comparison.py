@@ -15,7 +15,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vsacli.actuators import existing
+from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import POSITION, TORQUE

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from matplotlib.figure import Figure
 
-from vsacli.actuators import existing
+from vsacli.actuators.kinds import existing
 from vsacli.base.errors import InputError
 from vsacli.base.units import ENERGY, POSITION, STIFFNESS, TORQUE
 from vsacli.base.variables import MOTORS

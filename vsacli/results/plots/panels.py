@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
-from vsacli.actuators import existing
+from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.units import TIME, TORQUE
 from vsacli.base.variables import MOTORS

@@ -12,10 +12,10 @@ from typing import Any
 import h5py
 import numpy as np
 
-from vsacli import __version__
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
+from vsacli.base.version import __version__
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import declared
 from vsacli.documents.resolved_fields import ResolvedField

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.actuators import ACTUATORS
 from vsacli.actuators.actuator import Placeholders
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError
 from vsacli.documents.source import Problems

@@ -14,7 +14,7 @@ from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, wrench_columns
-from vsacli.trajectory.joints import CommandedJoints
+from vsacli.robot.commanded_joints import CommandedJoints
 
 TIME = "time"
 

@@ -16,7 +16,7 @@ from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
-from vsacli.trajectory.joints import CommandedJoints, takers
+from vsacli.robot.commanded_joints import CommandedJoints, takers
 from vsacli.trajectory.recorded.arrays import SampleProblem, time_problems, value_problems
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Self
 
-from vsacli.actuators import ACTUATORS
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.signals import COMMANDED, Signal
 from vsacli.robot.model import Robot
 
