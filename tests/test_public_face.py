@@ -90,6 +90,14 @@ def test_rooms_list_what_they_import_for_type_checkers_and_the_package_offers_al
     assert sorted(offered) == vsacli.__all__ == dir(vsacli)
 
 
+def test_no_name_hides_behind_a_module() -> None:
+    """A module of a room would take the place of a function of that name once it is imported."""
+    for star in imported_for_types(vsacli):
+        room = importlib.import_module(str(star.module))
+        modules = {path.stem for path in Path(str(room.__file__)).parent.iterdir()}
+        assert {name for name in room.__all__ if name in modules} <= {"laws"}
+
+
 def test_other_names_are_refused() -> None:
     with pytest.raises(AttributeError, match="module 'vsacli' has no attribute 'Servo'"):
         _ = vsacli.Servo

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from vsacli import load_robot
-from vsacli.actuators import ACTUATORS
+from vsacli.actuators.kinds import ACTUATORS
 
 TRAJECTORY = """
 format: vsacli-trajectory/1

@@ -136,7 +136,9 @@ def call(
 ) -> tuple[dict[str, FloatArray], list[int]]:
     function, shape = feedback_linearization_function(robot), state.q.shape
     of_gains = {
-        name: np.broadcast_to(values, (*shape, *values.shape[1:])) for name, values in vars(gains).items()
+        name: np.broadcast_to(values, (*shape, *values.shape[1:]))
+        for name, values in vars(gains).items()
+        if name != "sources"
     }
     c = compiled_robot(folder / "c", robot, [function], "double")
     return c(function, vars(state), command, of_gains, integral._asdict())

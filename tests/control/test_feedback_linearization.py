@@ -314,8 +314,8 @@ joints:
 def test_a_file_has_poles_for_each_joint(tmp_path):
     path = tmp_path / "poles.yaml"
     path.write_text(POLES_FILE)
-    gains, source = load_gains(path, vsa_3r(), integral=False)
-    assert source.path == str(path)
+    gains = load_gains(path, vsa_3r(), integral=False)
+    assert [source.path for source in gains.sources] == [str(path)]
     assert gains.position[:, 3] == pytest.approx([61, 120, 160])
     assert gains.stiffness == pytest.approx(np.array([[400, 40], [650, 51], [400, 40]]))
 
