@@ -123,11 +123,11 @@ def test_other_preload_and_followed_deflections_agree():
     motion = demands(turned, SAMPLES)
     expected = compute_block(turned, motion)
     assert_agree(compute_block(turned, motion, engine=compiled(turned)), expected)
-    followed = np.moveaxis(expected.phi, 0, -1) * 1.001
-    kernel = InverseDynamics(turned, followed=True)
+    integrated = np.moveaxis(expected.phi, 0, -1) * 1.001
+    kernel = InverseDynamics(turned, integrated=True)
     engine = choose("c", kernel, 1, 1).engine
-    found = compute_block(turned, motion, followed=followed, engine=engine)
-    assert_agree(found, compute_block(turned, motion, followed=followed))
+    found = compute_block(turned, motion, integrated=integrated, engine=engine)
+    assert_agree(found, compute_block(turned, motion, integrated=integrated))
 
 
 @pytest.mark.usefixtures("quickly")

@@ -46,8 +46,7 @@ class JointReport(Stored):
     Attributes:
         name: of the joint.
         type: "revolute" or "prismatic".
-        actuator: "antagonistic", "elastic" or "rigid"; what the last two do not have is NaN: motor 2, margin
-            and corridor, and the stiffness of a rigid joint.
+        actuator: its kind; what that does not have is NaN: motor 2, margin and corridor, stiffness.
         steps: how many steps have each kind of trouble.
         first_time: when each kind that occurs first does, s.
         worst: the worst step of each kind that occurs; limits one by one.
@@ -104,14 +103,14 @@ class JointReport(Stored):
 
 @dataclass(frozen=True)
 class JointDrift(Stored):
-    """What became of the followed deflections of a joint.
+    """What became of the integrated deflections of a joint.
 
     Attributes:
         joint: its name.
-        largest: largest distance of a deflection from the root of (14), NaN if no step was followed.
+        largest: largest distance of a deflection from the root of (14), NaN if no step was integrated.
         time: when, s.
         unit: of the distance.
-        stop: from when on they could not be followed, and why.
+        stop: from when on they could not be integrated, and why.
     """
 
     joint: str

@@ -29,7 +29,7 @@ class Report(Stored):
         notes: how they were understood, where that is not obvious.
         self_check: outcome of the self-check.
         joints: one report a joint.
-        drifts: one a joint if the deflections were followed by integration, else none.
+        drifts: one a joint if the deflections were integrated, else none.
         fits: what is known of the splines that recorded samples were replaced by, JSON values.
     """
 

@@ -212,7 +212,7 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
 
 
 def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterator[str]:
-    """From when on deflections could not be followed."""
+    """From when on deflections could not be integrated."""
     infeasible = {joint.name: joint.steps["infeasible"] for joint in joints}
     for drift in drifts:
         if drift.stop is not None:
@@ -222,7 +222,7 @@ def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterat
 
 
 def drift_lines(drifts: Sequence[JointDrift]) -> Iterator[str]:
-    """How far the deflections that were followed drifted, if they were."""
+    """How far integrated deflections drifted, if they were."""
     if drifts:
         yield _by_joint("drift of the integration: ", [_drift_of(drift) for drift in drifts])
 

@@ -72,7 +72,7 @@ class Run:
         self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
         self._deflections = _integrated(deflections, robot, trajectory)
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        kernel = InverseDynamics(robot, frame, near_singular, followed=self._deflections is not None)
+        kernel = InverseDynamics(robot, frame, near_singular, integrated=self._deflections is not None)
         self.choice = choose(engine, kernel, trajectory.samples, threads)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
@@ -84,8 +84,8 @@ class Run:
         for start in range(0, self.trajectory.samples, self._block_samples):
             stop = min(start + self._block_samples, self.trajectory.samples)
             motion = self.trajectory.block(start, stop)
-            followed = None if self._deflections is None else self._deflections.at(motion.time)
-            block = compute_block(self.robot, motion, self._near_singular, followed, self.choice.engine)
+            integrated = None if self._deflections is None else self._deflections.at(motion.time)
+            block = compute_block(self.robot, motion, self._near_singular, integrated, self.choice.engine)
             infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
             if self._stop_on_infeasible and infeasible.any():
                 yield self._added(_shortened(block, int(infeasible.argmax()) + 1))

@@ -165,9 +165,9 @@ class DriftSummary:
         tau_e, stiffness = block.tau_e[:, self._index], block.stiffness[:, self._index]
         root = self._joint.actuator.solve(tau_e, stiffness).deflections
         drift = np.abs(block.phi[:, self._index].T - root).max(axis=0)
-        followed = np.flatnonzero(~np.isnan(drift))
-        if followed.size:
-            step = followed[drift[followed].argmax()]
+        integrated = np.flatnonzero(~np.isnan(drift))
+        if integrated.size:
+            step = integrated[drift[integrated].argmax()]
             if not drift[step] <= self._largest:
                 self._largest, self._time = float(drift[step]), float(block.time[step])
 

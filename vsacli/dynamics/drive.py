@@ -47,7 +47,7 @@ def drive(
     joint: Joint,
     command: Command,
     near_singular: float = NEAR_SINGULAR_MARGIN,
-    followed: FloatArray | None = None,
+    integrated: FloatArray | None = None,
 ) -> Drive:
     """Motor motion and motor torques of a joint, (61)-(74).
 
@@ -55,10 +55,10 @@ def drive(
         joint: the joint with its actuator.
         command: commanded motion and stiffness, and the elastic torque with its two derivatives.
         near_singular: margin below which a step is near-singular.
-        followed: deflections of an antagonistic joint to use instead of the root of (14), (2, samples); a
+        integrated: deflections of a joint to use instead of the root of (14), (2, samples); a
             step where they are NaN is infeasible.
     """
-    transmission = joint.actuator.transmit(command, near_singular, followed)
+    transmission = joint.actuator.transmit(command, near_singular, integrated)
     actuator = joint.actuator
     dtheta = actuator.motor_positions(transmission.dphi, command.dq)  # (69)
     motors = actuator.motors

@@ -38,7 +38,7 @@ def usual_block(joints: int) -> int:
 
 @dataclass(frozen=True)
 class Stop(Stored):
-    """From when on, s, the deflections of a joint cannot be followed, and why."""
+    """From when on, s, the deflections of a joint cannot be integrated, and why."""
 
     time: float
     reason: str
@@ -49,20 +49,20 @@ class InverseDynamics:
     """Inverse dynamics (36)-(74) over rows of samples, for an engine.
 
     Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, then the
-    deflections if they are followed; outputs the variables of `COMPUTED` one after the other.
+    deflections if they are integrated; outputs the variables of `COMPUTED` one after the other.
 
     Attributes:
         robot: the robot.
         frame: of the wrench; None if there is none.
         near_singular: margin below which a step is near-singular.
-        followed: whether deflections of antagonistic joints are given, else they are solved for.
+        integrated: whether deflections are given, else they are solved for.
         limits: those of each joint, since springs compare equal whatever their limits.
     """
 
     robot: Robot
     frame: str | None = None
     near_singular: float = NEAR_SINGULAR_MARGIN
-    followed: bool = False
+    integrated: bool = False
     limits: tuple[tuple[LimitCheck, ...], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -79,8 +79,8 @@ class InverseDynamics:
         """Rows that inverse dynamics takes."""
         joints = len(self.robot.joints)
         commanded = dict.fromkeys(commanded_names(), (joints,))
-        followed = {"phi": (joints, SIDES)} if self.followed else {}
-        return RowLayout({**self.links.arguments.shapes, **commanded, **followed})
+        integrated = {"phi": (joints, SIDES)} if self.integrated else {}
+        return RowLayout({**self.links.arguments.shapes, **commanded, **integrated})
 
     @property
     def results(self) -> RowLayout:
@@ -109,7 +109,7 @@ class InverseDynamics:
                 joint,
                 Command.of({name: of_joints[name][index] for name in Command.names()}),
                 self.near_singular,
-                np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.followed else None,
+                np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None,
             )
             for index, joint in enumerate(self.robot.joints)
         ]
@@ -121,7 +121,7 @@ def compute_block(
     robot: Robot,
     motion: Motion,
     near_singular: float = NEAR_SINGULAR_MARGIN,
-    followed: FloatArray | None = None,
+    integrated: FloatArray | None = None,
     engine: Engine = NUMPY,
 ) -> Block:
     """Inverse dynamics (36)-(74) of a block of steps.
@@ -131,16 +131,16 @@ def compute_block(
         motion: commanded motion and stiffness, (samples, joints); the actuators that are not antagonistic
             have a stiffness of their own, or none.
         near_singular: margin below which a step is near-singular.
-        followed: deflections of antagonistic joints to use instead of the root of (14), (joints, 2, samples);
+        integrated: deflections of the joints to use instead of the root of (14), (joints, 2, samples);
             a step where they are NaN is infeasible.
         engine: what computes.
     """
     frame = None if motion.wrench is None else motion.wrench.frame
-    kernel = InverseDynamics(robot, frame, near_singular, followed is not None)
+    kernel = InverseDynamics(robot, frame, near_singular, integrated is not None)
     given = motion.variables()
     rows = {name: by_joint(given[name]) for name in kernel.arguments.shapes if name in given}
-    if followed is not None:
-        rows["phi"] = followed.reshape(-1, followed.shape[-1])
+    if integrated is not None:
+        rows["phi"] = integrated.reshape(-1, integrated.shape[-1])
     found = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack(rows)))
     computed = {name: over_time(array) for name, array in found.items()}
     arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(np.uint16)}

@@ -1,4 +1,4 @@
-"""Integration of (19) for some joints, up to the first of them that cannot be followed further."""
+"""Integration of (19) for some joints, up to the first of them that cannot be integrated further."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Integration:
     Attributes:
         joints: as given.
         times: ends of the steps.
-        stopped: why each joint that ended the integration cannot be followed beyond the last of `times`.
+        stopped: why each joint that ended the integration cannot be integrated beyond the last of `times`.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class Integration:
                 self.times.append(self._end_of(step, self.times[-1], float(integrator.t)))
 
     def _end_of(self, step: DenseOutput, left: float, right: float) -> float:
-        """The end of a step, or the first time in it, to rounding, at which a joint cannot be followed."""
+        """The end of a step, or the first time in it, to rounding, at which a joint cannot be integrated."""
         while right - left > 4 * np.spacing(abs(right)):
             nodes = np.linspace(left, right, CHECKS + 1)
             hindrances = self._task.hindrances(self.joints, nodes[1:], by_joint(step(nodes[1:])))

@@ -67,9 +67,9 @@ def integrate_deflections(
 ) -> IntegratedDeflections:
     """Integrate phi' = A(phi)^-1 (tau_e', sigma') (19) from the root of (14) at the first step.
 
-    The smooth functions of the trajectory are followed; derivatives given with samples play no part. The way
+    The smooth functions of the trajectory count; derivatives given with samples play no part. The integration
     of a joint ends where A becomes singular or its stiffness cannot be reached; the other joints go on. Only
-    antagonistic joints have deflections to follow: those of the others are in closed form.
+    kinds of actuator that are `integrable` have deflections to integrate.
 
     Args:
         robot: the robot.

@@ -1,4 +1,4 @@
-"""What is asked of the joints at any time, and whether deflections can be followed there."""
+"""What is asked of the joints at any time, and whether deflections can be integrated there."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Task:
 
     Attributes:
         trajectory: what it is asked to do.
-        joints: the antagonistic joints, which alone have deflections to follow.
+        joints: those whose deflections can be integrated.
     """
 
     def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
@@ -60,7 +60,7 @@ class Task:
         )
 
     def hindrances(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> npt.NDArray[np.intp]:
-        """Why the deflections of some joints cannot be followed there: indices into `REASONS`."""
+        """Why the deflections of some joints cannot be integrated there: indices into `REASONS`."""
         return np.stack(
             [
                 _hindrances(actuator, command, of_joint)

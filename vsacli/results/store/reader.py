@@ -32,7 +32,7 @@ class StoredResult:
         robot_name, trajectory_name, verdict: as in the report.
         complete: False if the run was ended at an infeasible step.
         joint_names, joint_types: base to tip; "revolute" or "prismatic".
-        actuators: of each joint, "antagonistic", "elastic" or "rigid".
+        actuators: kind of the actuator of each joint.
         gear_ratio: (joints, 2), of the motors; NaN where the robot file gives none.
         variables: names of the variables the file holds, in declared order, without `time`.
         samples: number of steps stored.
