@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 
 import h5py
 import numpy as np
 import pytest
+from samples.marks import needs, needs_compiler
 from samples.own_kind import AdjustableArm
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
@@ -56,7 +56,7 @@ def test_a_robot_file_has_the_kind_and_describes_it(arm):
     "engine",
     [
         "numpy",
-        pytest.param("c", marks=pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")),
+        pytest.param("c", marks=needs_compiler),
     ],
 )
 def test_its_torques_move_a_model_made_from_the_potential_alone(arm, tmp_path, engine):
@@ -135,7 +135,8 @@ def test_figures_are_drawn(arm):
     ok(arm("plot", "move.h5", "-o", "figures"))
 
 
-@pytest.mark.skipif(shutil.which("cc") is None or shutil.which("make") is None, reason="needs a C compiler")
+@needs_compiler
+@needs("make", "make")
 def test_generated_code_agrees_with_numpy(arm, tmp_path):
     ok(arm("codegen", "arm.yaml", "-o", "code"))
     assert "feedback_linearization" in next((tmp_path / "code").glob("*.h")).read_text()
