@@ -91,4 +91,4 @@ def test_the_readme_is_the_description(wheel: zipfile.Path) -> None:
 
 def test_installing_gives_the_command() -> None:
     [command] = importlib.metadata.entry_points(group="console_scripts", name="vsacli")
-    assert command.value == "vsacli.cli:main"
+    assert command.value == "vsacli.__main__:main"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import subprocess
+import sys
 import time
 
 import h5py
@@ -14,9 +15,18 @@ PATIENCE = 60
 """Seconds until a run that should have started writing counts as broken."""
 
 
+ENDINGS = {
+    signal.SIGINT: (130, "interrupted"),
+    signal.SIGTERM: (143, "ended from outside by SIGTERM"),
+    signal.SIGHUP: (129, "ended from outside by SIGHUP"),
+}
+"""Exit code and message of a run that a signal ends; the codes are those of shells, 128 and the number."""
+
+
 def allow_interrupts():
-    """In a child process: undo that a parent may ignore Ctrl-C, as shells do for background jobs."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """In a child process: undo that a parent may ignore signals, as shells do for background jobs."""
+    for number in ENDINGS:
+        signal.signal(number, signal.SIG_DFL)
 
 
 @pytest.fixture
@@ -46,7 +56,10 @@ def temporaries(folder):
     return list(folder.glob(".vsacli-*.tmp"))
 
 
-@pytest.fixture(params=[b"old and complete", None], ids=["overwriting", "new"])
+OLD = b"old and complete"
+
+
+@pytest.fixture(params=[OLD, None], ids=["overwriting", "new"])
 def target(request, tmp_path):
     """What stands at r.h5 before: a file or nothing."""
     if request.param is not None:
@@ -54,10 +67,15 @@ def target(request, tmp_path):
     return {} if request.param is None else {"r.h5": request.param}
 
 
-def test_interrupt_leaves_the_target_and_nothing_else(tmp_path, target, writing):
-    writing.send_signal(signal.SIGINT)
+@pytest.mark.parametrize(
+    ("number", "target"),
+    [(signal.SIGINT, OLD), (signal.SIGTERM, OLD), (signal.SIGHUP, None)],
+    indirect=["target"],
+)
+def test_ended_run_leaves_the_target_and_nothing_else(tmp_path, target, writing, number):
+    writing.send_signal(number)
     out, err = writing.communicate(timeout=PATIENCE)
-    assert (writing.returncode, out, err.strip()) == (130, "", "interrupted")
+    assert (writing.returncode, out, err) == (ENDINGS[number][0], "", f"{ENDINGS[number][1]}\n")
     left = contents(tmp_path)
     del left["long.yaml"]
     assert left == target
@@ -89,3 +107,45 @@ def test_interrupt_without_a_file(tmp_path):
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE)
     assert (process.returncode, out, err.strip()) == (130, "", "interrupted")
+
+
+def test_signals_that_the_parent_ignores_stay_ignored(tmp_path, motion):
+    """As under `nohup`: signals from 0.05 s on, past the start of Python, change nothing."""
+    process = subprocess.Popen(
+        [COMMAND, "invdyn", ROBOT, motion, "-o", "r.h5"],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=ignore_signals,
+    )
+    with process:
+        while process.poll() is None:
+            time.sleep(0.05)
+            for number in ENDINGS:
+                process.send_signal(number)
+        assert (process.returncode, process.stderr.read()) == (0, "wrote r.h5\n")
+
+
+def ignore_signals():
+    for number in ENDINGS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+@pytest.mark.parametrize("imported", ["click.core", "numpy._core"])
+def test_interrupt_in_the_first_instants_is_quiet(tmp_path, motion, imported):
+    """It comes as soon as a module has been imported, which Python is told to say."""
+    process = subprocess.Popen(
+        [sys.executable, "-X", "importtime", "-m", "vsacli", "invdyn", ROBOT, motion, "-o", "r.h5"],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=allow_interrupts,
+    )
+    with process:
+        while not process.stderr.readline().rstrip().endswith(f" {imported}"):
+            assert process.poll() is None, "the module is not imported"
+        process.send_signal(signal.SIGINT)
+        said = [line for line in process.stderr if not line.startswith("import time:")]
+    assert (process.returncode, said) in [(130, ["interrupted\n"]), (-signal.SIGINT, [])]
+    assert not (tmp_path / "r.h5").exists()

@@ -12,8 +12,9 @@ import pytest
 from samples.results import PlannedTrajectory, python, random_block, robot, write_result
 
 from vsacli.base.errors import StorageError
+from vsacli.base.interrupts import interrupts_deferred
 from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.writer import ResultWriter, interrupts_deferred
+from vsacli.results.store.writer import ResultWriter
 
 ENDLESS = """
 import sys
@@ -32,6 +33,7 @@ LIMITED = """
 import resource, sys
 from samples.results import random_block, write_result
 from vsacli.base.errors import StorageError
+from vsacli.base.interrupts import interrupts_deferred
 
 block = random_block(20_000, 2)
 limit = int(sys.argv[1])

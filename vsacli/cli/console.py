@@ -29,7 +29,9 @@ class Exit(enum.IntEnum):
     USAGE = 2, "usage or input error: one line for each problem; nothing written"
     VERDICT = 3, "done, but some steps are infeasible, singular or over a limit; the report says which"
     STORAGE = 4, "a file cannot be read or written (disk full, permission); the target is untouched"
+    HUNG_UP = 129, "ended by SIGHUP, as when a terminal is closed; the target is untouched"
     INTERRUPTED = 130, "interrupted; the target is untouched"
+    TERMINATED = 143, "ended by SIGTERM, as batch systems do; the target is untouched"
 
     def __new__(cls, code: int, meaning: str) -> Self:
         """A code with what it means, which cannot be left out."""

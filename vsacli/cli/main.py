@@ -12,6 +12,7 @@ from typing import Any, NoReturn, cast
 import click
 
 from vsacli.base.errors import InputError, StorageError
+from vsacli.base.interrupts import Interrupted, unwinding_when_ended
 from vsacli.base.lazy import LazyRegistry
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
@@ -90,7 +91,8 @@ def main() -> NoReturn:
     gc.set_threshold(SELDOM)
     if isinstance(sys.stdout, io.TextIOWrapper):  # a name may hold letters that the terminal has not
         sys.stdout.reconfigure(errors="backslashreplace")
-    code = run(sys.argv[1:])
+    with unwinding_when_ended():
+        code = run(sys.argv[1:])
     gc.freeze()  # else Python would go through everything once more before it ends
     sys.exit(code)
 
@@ -104,6 +106,8 @@ def run(arguments: Sequence[str]) -> int:
         with suppress(OSError):
             error.show()
         return Exit.USAGE
+    except Interrupted as error:
+        return _fail(str(error), 128 + error.number)  # as shells call a process that a signal ended
     except (click.Abort, KeyboardInterrupt):
         return _fail("interrupted", Exit.INTERRUPTED)
     except InputError as error:
@@ -120,6 +124,6 @@ def run(arguments: Sequence[str]) -> int:
     return int(code or Exit.OK)
 
 
-def _fail(message: str, code: Exit) -> int:
+def _fail(message: str, code: int) -> int:
     tell(message)
     return code

@@ -6,8 +6,6 @@ import contextlib
 import io
 import json
 import os
-import signal
-import threading
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -18,6 +16,7 @@ import h5py
 from vsacli.base.arrays import FloatArray
 from vsacli.base.atomic_files import AtomicFile, check_free_space, reporting_storage_errors, storage_error
 from vsacli.base.errors import InputError
+from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.variables import VARIABLES, Variable, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes
@@ -42,8 +41,8 @@ class ResultWriter:
 
     A subclass writes another format: other variables in the same layout.
 
-    HDF5 crashes if an exception crosses its code. So its file is a `Sink`, which raises none, and Ctrl-C
-    waits until a block is written.
+    HDF5 crashes if an exception crosses its code. So its file is a `Sink`, which raises none, and signals
+    that end the run wait until a block is written.
 
     Args:
         path: the file to write.
@@ -239,23 +238,3 @@ class Sink(io.RawIOBase):
         except OSError as error:
             self.error = self.error or error
         super().close()
-
-
-@contextlib.contextmanager
-def interrupts_deferred() -> Iterator[None]:
-    """Let a Ctrl-C that comes during the enclosed statements take effect after them.
-
-    In a thread other than the main one, where no signal handler ever runs, this does nothing.
-    """
-    handler = signal.getsignal(signal.SIGINT)
-    if threading.current_thread() is not threading.main_thread() or not callable(handler):
-        yield
-        return
-    arrived: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, _: arrived.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-        if arrived:
-            signal.raise_signal(signal.SIGINT)
