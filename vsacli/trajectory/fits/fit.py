@@ -10,11 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.trajectory.fits.covariance import local_basis, of_derivatives, of_least_squares
+from vsacli.trajectory.fits.information import Posterior
 from vsacli.trajectory.fits.smoothing import Smoothing
 from vsacli.trajectory.times import stretch
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
+
+ORDERS = {7: 5, 5: 3}
+"""Value and derivatives that are needed, by the degree of the splines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +74,21 @@ class Part:
                 row += taylor[order + power - 1]
         return rows
 
+    def posterior(self, time: FloatArray) -> Posterior | None:
+        """What the samples say of the coefficients; None if nothing can be said.
+
+        Args:
+            time: (samples,) of the record, s.
+        """
+        if self.smoothing is not None and not self.smoothing.resolved:
+            return None
+        if self.smooth and self.smoothing is not None:
+            return self.smoothing.posterior
+        try:
+            return of_least_squares(time, self.spline.t, self.spline.k)
+        except np.linalg.LinAlgError:  # of very uneven times
+            return None
+
     def stretched(self, factor: float) -> Part:
         """The same spline, slower by a factor, from the same first time on."""
         from scipy.interpolate import BSpline
@@ -89,7 +109,7 @@ class Fit:
         residual: root mean square of sample minus fit, (components,).
         largest: largest |sample - fit|, (components,).
         noise: estimated standard deviation of a sample, (components,).
-        step: mean distance of samples, s.
+        time: (samples,) of the record, s.
     """
 
     components: int
@@ -98,7 +118,12 @@ class Fit:
     residual: FloatArray
     largest: FloatArray
     noise: FloatArray
-    step: float
+    time: FloatArray
+
+    @property
+    def step(self) -> float:
+        """Mean distance of samples, s."""
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
     @cached_property
     def breakpoints(self) -> FloatArray:
@@ -130,7 +155,41 @@ class Fit:
     def stretched(self, factor: float) -> Fit:
         """The same spline, slower by a factor, from the same first time on."""
         parts = tuple(part.stretched(factor) for part in self.parts)
-        return replace(self, parts=parts, step=factor * self.step)
+        return replace(self, parts=parts, time=stretch(self.time, self.time[0], factor))
+
+    def covariance(self, time: FloatArray) -> FloatArray:
+        """Posterior covariances of value and derivatives, shape (components, orders, orders, samples).
+
+        Orders go from the value to the highest derivative that the signal needs. Square roots of the diagonal
+        are standard deviations; those of a smoothing spline count, beside noise, what its resolution leaves
+        uncertain. Splines through samples of all digits have deviations of the size of rounding.
+
+        Args:
+            time: (samples,), any of the span, s.
+
+        Returns:
+            NaN where nothing can be said: of components that have no values, and of those for which no two
+            resolutions of a smoothing spline agree.
+        """
+        orders = ORDERS[self.degree]
+        found = np.full((self.components, orders, orders, len(time)), np.nan)
+        for part, posterior in zip(self.parts, self._posteriors, strict=True):
+            if posterior is not None:
+                basis = local_basis(part.spline.t, self.degree, time, orders)
+                unit = self._units(part)
+                found[part.members] = unit[:, None, None, None] ** 2 * of_derivatives(posterior, basis)
+        return found
+
+    @cached_property
+    def _posteriors(self) -> list[Posterior | None]:
+        """Of the coefficients of each part; None if nothing can be said of them."""
+        return [part.posterior(self.time) for part in self.parts]
+
+    def _units(self, part: Part) -> FloatArray:
+        """Of the deviations of the posterior, (members,)."""
+        if part.smooth and part.smoothing is not None:
+            return np.array([part.smoothing.unit])
+        return np.asarray(self.noise[part.members])
 
 
 def join(degree: int, parts: Sequence[Part], time: FloatArray, rows: FloatArray, noise: FloatArray) -> Fit:
@@ -153,5 +212,4 @@ def join(degree: int, parts: Sequence[Part], time: FloatArray, rows: FloatArray,
             residual[part.members] = np.sqrt(np.mean(error**2, axis=1))
             largest[part.members] = np.abs(error).max(axis=1)
             noise[part.members] = np.sqrt(np.sum(error**2, axis=1) / freedom)
-    step = float(time[-1] - time[0]) / (len(time) - 1)
-    return Fit(components, degree, tuple(parts), residual, largest, noise, step)
+    return Fit(components, degree, tuple(parts), residual, largest, noise, time)

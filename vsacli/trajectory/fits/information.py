@@ -108,30 +108,46 @@ def factorise(data: FloatArray, target: FloatArray, prior: FloatArray, weights: 
 class Posterior:
     """What one estimation says about its unknowns, in units of the standard deviation of a data row."""
 
-    def __init__(self, factor: Factor) -> None:
-        """Solve for the unknowns.
+    def __init__(self, diagonal: FloatArray, upper: FloatArray) -> None:
+        """Invert a triangular factor of the inverse covariance.
 
         Args:
-            factor: of one candidate.
+            diagonal: its blocks, (blocks, `BLOCK`, `BLOCK`).
+            upper: the blocks to the right of these, same shape.
         """
-        self._inverse = np.linalg.inv(factor.diagonal[0])
-        self._upper = factor.upper[0]
-        count = len(self._inverse)
-        self._roots = np.zeros((count + 1, BLOCK, BLOCK))
+        self._inverse, self._upper = np.linalg.inv(diagonal), upper
+        self._roots = np.zeros((len(diagonal) + 1, BLOCK, BLOCK))
         """Square roots of the covariances of the blocks; behind the last there is nothing to know."""
-        values = np.zeros((count + 1, BLOCK))
-        for k in range(count - 1, -1, -1):
-            inverse, upper = self._inverse[k], self._upper[k]
-            values[k] = inverse @ (factor.right[0, k] - upper @ values[k + 1])
-            passed = inverse @ upper @ self._roots[k + 1]
-            self._roots[k] = _triangle(np.hstack([inverse, passed]).T).T
-        self.unknowns: FloatArray = values[:-1].ravel()
+        passed = -self._inverse @ upper
+        for k in range(len(diagonal) - 1, -1, -1):
+            root = np.hstack([self._inverse[k], passed[k] @ self._roots[k + 1]])
+            self._roots[k] = _triangle(root.T).T
+
+    def unknowns(self, right: FloatArray) -> FloatArray:
+        """The most probable values of the unknowns.
+
+        Args:
+            right: the transformed right-hand side, (blocks, `BLOCK`).
+        """
+        values = np.zeros((len(right) + 1, BLOCK))
+        for k in range(len(right) - 1, -1, -1):
+            values[k] = self._inverse[k] @ (right[k] - self._upper[k] @ values[k + 1])
+        return values[:-1].ravel()
+
+    def roots_of(self, rows: FloatArray, block: IndexArray | slice = slice(None)) -> FloatArray:
+        """Square roots of the covariances of what rows of the same block give, (..., rows, 2 `BLOCK`).
+
+        Args:
+            rows: (..., rows, 2 `BLOCK`).
+            block: index of the block in which they start, (...,); by default one after the other.
+        """
+        near = rows[..., :BLOCK] @ self._inverse[block]
+        far = (rows[..., BLOCK:] - near @ self._upper[block]) @ self._roots[1:][block]
+        return np.concatenate([near, far], axis=-1)
 
     def variances(self, blocks: FloatArray) -> FloatArray:
         """Of what rows give, (blocks, rows), for rows as in `Rows.blocks`."""
-        near = blocks[:, :, :BLOCK] @ self._inverse
-        far = (blocks[:, :, BLOCK:] - near @ self._upper) @ self._roots[1:]
-        return np.asarray(np.sum(near**2, axis=2) + np.sum(far**2, axis=2))
+        return np.asarray(np.sum(self.roots_of(blocks) ** 2, axis=2))
 
 
 def _triangle(rows: FloatArray) -> FloatArray:

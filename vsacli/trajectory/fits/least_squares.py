@@ -106,11 +106,31 @@ def _solve(time: FloatArray, rows: FloatArray, spans: int, degree: int) -> BSpli
     from scipy.linalg import solveh_banded
 
     knots = _knots(time, spans, degree)
-    bands, sums = np.zeros((degree + 1, spans + degree)), np.zeros((spans + degree, len(rows)))
+    bands, sums = normal_equations(time, rows, knots, degree)
+    return BSpline(knots, solveh_banded(bands, sums, lower=True), degree)
+
+
+def normal_equations(
+    time: FloatArray, rows: FloatArray, knots: FloatArray, degree: int
+) -> tuple[FloatArray, FloatArray]:
+    """What determines the coefficients of the spline nearest to samples.
+
+    Args:
+        time: (samples,), s.
+        rows: (components, samples).
+        knots: of the spline, s.
+        degree: of the spline.
+
+    Returns:
+        The lower bands of the Gram matrix, (degree + 1, coefficients), and the right-hand sides,
+        (coefficients, components).
+    """
+    coefficients = len(knots) - degree - 1
+    bands, sums = np.zeros((degree + 1, coefficients)), np.zeros((coefficients, len(rows)))
     for start in range(0, len(time), BLOCK_SAMPLES):
         stop = start + BLOCK_SAMPLES
         _add(bands, sums, time[start:stop], rows[:, start:stop], knots)
-    return BSpline(knots, solveh_banded(bands, sums, lower=True), degree)
+    return bands, sums
 
 
 def _knots(time: FloatArray, spans: int, degree: int) -> FloatArray:

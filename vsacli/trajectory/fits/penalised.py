@@ -89,13 +89,14 @@ class Model:
         return float(self._factor.rest[0]) / _freedom(self.bins)
 
     @cached_property
-    def _posterior(self) -> Posterior:
-        return Posterior(self._factor)
+    def posterior(self) -> Posterior:
+        """Of the coefficients; its unit of variance is that of the noise."""
+        return Posterior(self._factor.diagonal[0], self._factor.upper[0])
 
-    @property
+    @cached_property
     def coefficients(self) -> FloatArray:
         """Of the spline."""
-        return self._posterior.unknowns[: self.bins.coefficients]
+        return self.posterior.unknowns(self._factor.right[0])[: self.bins.coefficients]
 
     @property
     def spline(self) -> BSpline[np.float64]:
@@ -112,7 +113,7 @@ class Model:
         """
         order, count = self.bins.degree, len(self.penalties)
         segment = _segment(count, self.segments)
-        certain = self._posterior.variances(self.bins.differences(order)).ravel()[:count] * self.penalties
+        certain = self.posterior.variances(self.bins.differences(order)).ravel()[:count] * self.penalties
         size = np.bincount(segment)
         free = np.maximum(np.bincount(segment, np.clip(1 - certain, 0, 1)), 1e-4 * size)
         found = np.bincount(segment, self.penalties * np.diff(self.coefficients, order) ** 2)
@@ -128,7 +129,7 @@ class Model:
         rows = _derivative_rows(places, bins.degree, order) / bins.span**order
         first = np.repeat(np.arange(bins.spans), len(places))
         ordered = sort_rows(first, np.tile(rows, (bins.spans, 1)), bins.coefficients)
-        variances = self._posterior.variances(ordered.blocks)[ordered.block, ordered.place]
+        variances = self.posterior.variances(ordered.blocks)[ordered.block, ordered.place]
         return np.asarray(np.sqrt(variances * self.noise_variance))
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -11,6 +12,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins
+from vsacli.trajectory.fits.information import Posterior
 from vsacli.trajectory.fits.penalised import Model, most_likely
 from vsacli.trajectory.fits.residual import Lines, spectral_lines
 
@@ -52,12 +54,16 @@ class Smoothing:
         relative: that of the highest derivative that is needed, over this derivative's own root mean square.
         resolved: whether two successive resolutions agree on that derivative.
         lines: frequencies that stand out of the residual.
+        posterior: of the coefficients.
+        unit: of the posterior's deviations.
     """
 
     deviations: FloatArray
     relative: float
     resolved: bool
     lines: Lines
+    posterior: Posterior
+    unit: float
 
     @property
     def determined(self) -> bool:
@@ -133,7 +139,9 @@ def smoothing_spline(
     residual = row - (scale * spline(time)[:, 0] + offset)
     size = scale * float(np.sqrt(np.mean(spline(model.probes, nu=order)[model.inside] ** 2)))
     lines = spectral_lines(time, residual, order, size)
-    known = Smoothing(deviations, best.stated, best.accepted, lines)
+    # the unit of the posterior that makes its deviations those that are stated
+    unit = scale * _factor(model) * math.sqrt(model.noise_variance) * best.stated / best.deviation
+    known = Smoothing(deviations, best.stated, best.accepted, lines, model.posterior, unit)
     return BSpline(spline.t, scale * spline.c + offset, degree), known
 
 
@@ -163,5 +171,8 @@ def _models(time: FloatArray, row: FloatArray, degree: int) -> Iterator[Model]:
 
 def _rms_deviation(model: Model, order: int) -> float:
     """Of a derivative, away from the ends."""
-    factor = SEGMENTED_FACTOR if model.segments > 1 else 1.0
-    return factor * float(np.sqrt(np.mean(model.deviations(order)[model.inside] ** 2)))
+    return _factor(model) * float(np.sqrt(np.mean(model.deviations(order)[model.inside] ** 2)))
+
+
+def _factor(model: Model) -> float:
+    return SEGMENTED_FACTOR if model.segments > 1 else 1.0
