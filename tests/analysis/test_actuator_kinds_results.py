@@ -73,13 +73,14 @@ def test_what_a_joint_does_not_have_is_null_in_json(robot: Robot, motion: Trajec
 def test_the_table_has_a_dash_for_it(vsacli: Callable[..., Outcome]) -> None:
     outcome = vsacli("check-feasibility", ROBOT, TRAJECTORY)
     assert outcome.code == 0
-    _, _, base, shoulder, elbow, start, step, energy, effort, check = outcome.out.splitlines()
+    _, _, base, shoulder, elbow, start, step, end, energy, effort, check = outcome.out.splitlines()
     assert base.split() == ["base", "0.945", "N", "m", "5.66", "N", "m", "-", "-", "-"]
     assert shoulder.split() == ["shoulder", "32.7", "N", "m", "34.9", "N", "m", "1000", "-", "-"]
     assert elbow.split()[4:8] == ["98.9", "/", "91.6", "N"]
     expected = "base +0 rad, shoulder +0.03245 rad, elbow +0.07276 -0.05513 rad"
     assert start == f"start motors at: {expected}"
     assert step.endswith("(elbow)")
+    assert end.startswith("end motors at: base +1.571 rad, shoulder ")
     assert energy.startswith("energy: motors spend ")
     assert effort.endswith("(elbow), its load takes 3.69 N m")
     assert check.startswith("self-check passed")

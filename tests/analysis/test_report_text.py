@@ -35,6 +35,10 @@ QUIET = JointReport(
     torque_step=(0.35, 0.42),
     other_preload=False,
     energy=JointEnergy(9.66, 20.4, 11.2, 61.2, 2.84),
+    start_dtheta=(0.0, 0.0),
+    end_theta=(-0.8426, -1.2396),
+    end_dtheta=(0.0, 0.0),
+    peak_dtheta=(0.9, 0.6),
 )
 
 
@@ -94,6 +98,7 @@ def test_whole_report_of_a_run_without_trouble():
         stiffness_min=9000.0,
         stiffness_max=9000.0,
         start_theta=(0.0317, 0.00602),
+        end_theta=(0.2317, 0.18602),
         torque_step=(0.1, 0.2),
         margin=0.11,
         energy=JointEnergy(12.04, 20.4, 11.2, 31.0, 5.0),
@@ -105,6 +110,7 @@ def test_whole_report_of_a_run_without_trouble():
         "slide       7.55 N      98.9 / 91.6 N        9000   8009.5-20000.0   11.00 %",
         "start motors at: elbow +0.07276 -0.05513 rad, slide +0.0317 +0.00602 m",
         "torque step at start: 0.42 N m (elbow)",
+        "end motors at: elbow -0.8426 -1.24 rad, slide +0.2317 +0.186 m",
         "energy: motors spend 40.8 J, take back 22.4 J; springs hold up to 12.0 J (slide)",
         "co-contraction: up to 61.2 N m rms for each motor (elbow), its load takes 2.84 N m",
         "self-check passed (4e-11, bound 1e-08)",
@@ -270,6 +276,31 @@ def test_starts_of_many_joints_are_three_to_a_line():
     assert [each.count(" rad") for each in lines] == [3, 3, 1]
     assert [each.endswith(",") for each in lines] == [True, True, False]
     assert {each.index("joint_") for each in lines} == {len("start motors at: ")}
+
+
+def test_motors_that_move_at_an_end_are_named():
+    fast = replace(QUIET, name="base", start_dtheta=(2.8, -2.75), end_dtheta=(0.0, 0.0009))
+    slide = replace(QUIET, name="slide", type="prismatic", start_dtheta=(0.01, 0.0))
+    text = render(report(QUIET, fast, slide))
+    assert line(text, "motors move at the start") == (
+        "motors move at the start: base +2.8 -2.75 rad/s, slide +0.01 +0 m/s"
+    )
+    assert line(text, "motors move at the end") == "motors move at the end: base +0 +0.0009 rad/s"
+
+
+def test_motors_that_rest_but_for_rounding_are_not_named():
+    at_rest = replace(QUIET, start_dtheta=(1e-4, -1e-17), end_dtheta=(NAN, NAN))
+    held = replace(QUIET, start_dtheta=(1e-12, 1e-12), peak_dtheta=(1e-12, 1e-12))
+    assert "motors move" not in render(report(at_rest, held))
+
+
+def test_ends_are_missing_in_reports_that_were_written_before():
+    content = report().as_json()
+    for joint in content["joints"]:
+        del joint["end"], joint["start"]["dtheta"], joint["peak"]["dtheta"]
+    text = str(Report.from_json(content))
+    assert "start motors at: elbow +0.07276 -0.05513 rad" in text
+    assert "end motors" not in text
 
 
 def test_start_at_an_infeasible_step_is_undefined():

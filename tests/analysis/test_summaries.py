@@ -154,6 +154,22 @@ def test_start_tells_where_the_motors_wait_and_how_their_torque_jumps():
     np.testing.assert_allclose(base.torque_step, 3.2 * np.abs(result.ddtheta[0, 0]), rtol=1e-12)
 
 
+def test_ends_tell_where_the_motors_are_and_how_fast():
+    whole = motion(stiffness=(850.0,) * 3, end_stiffness=(1275.0,) * 3)
+    result = inverse_dynamics(vsa_3r(), whole)
+    for index, joint in enumerate(result.report.joints):
+        assert joint.end_theta == tuple(result.theta[-1, index])
+        assert joint.start_dtheta == joint.end_dtheta == (0.0, 0.0)
+        assert joint.peak_dtheta == tuple(np.abs(result.dtheta[:, index]).max(axis=0))
+
+
+def test_end_of_a_run_that_stopped_early_is_unknown():
+    robot, whole = troubled()
+    for joint in inverse_dynamics(robot, whole, stop_on_infeasible=True).report.joints:
+        assert np.isnan(joint.end_theta).all()
+        assert np.isnan(joint.end_dtheta).all()
+
+
 def test_report_names_the_other_preload_if_it_does_for_every_step():
     """Springs a hundred times too soft for the elbow, so that its load is beyond where the branches part."""
     weak = dataclasses.replace(vsa_3r().joints[2], actuator=springs(Cubic(k=4, k_c=20), Cubic(k=4.4, k_c=20)))

@@ -20,12 +20,16 @@ from samples.remedies import (
 from samples.robots import vsa_3r
 
 from vsacli.actuators.laws.sinh import Sinh
-from vsacli.analysis.run import Run
+from vsacli.analysis.run import Run, inverse_dynamics
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.model import Limits
 from vsacli.studies.remedies import StiffnessProfile, suggest
 from vsacli.studies.remedies.nearest_spline import Bounds, NoSplineError, nearest_spline
 from vsacli.studies.remedies.suggestions import NotPossible
+from vsacli.trajectory.curves.sinusoids import Sinusoids
+from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN = 0.01
 
@@ -127,8 +131,9 @@ def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, st
     moved = change(found, trajectory)
     motion = trajectory.block(0, trajectory.samples)
     least = np.maximum(stiffness_needed(robot, motion) - motion.commanded["stiffness"], 0)
-    # where nothing is needed nothing is gained, and the excess is small: a few percent of the largest change
-    assert np.mean(moved - least) < 0.15 * moved.max()
+    # where nothing is needed nothing is gained, and the excess is small: a few percent of the largest change,
+    # more where the motion is so fast that a change is still large at the ends, where it begins flat
+    assert np.mean(moved - least) < (0.15 if duration > 0.3 else 0.2) * moved.max()
     assert moved.min() > -0.1 * moved.max()
 
 
@@ -140,14 +145,45 @@ def test_joints_that_are_fine_are_left_alone():
 
 
 def test_profile_and_its_derivatives_belong_together():
-    trajectory = rest_to_rest(0.5)
+    trajectory = rest_to_rest(0.5, rate=10_000)
     motion = profile(vsa_3r(), trajectory).trajectory.block(0, trajectory.samples)
-    step = 1e-3
+    step = 1e-4
     for values, rates in (("stiffness", "dstiffness"), ("dstiffness", "ddstiffness")):
         value, rate = motion.of_joints[values], motion.of_joints[rates]
         difference = (value[2:] - value[:-2]) / (2 * step)
-        # second order in the step over pieces of 0.02 s, at whose ends the third derivative jumps
+        # second order in the step over pieces of 0.001 s and more, at whose ends the third derivative jumps
         np.testing.assert_allclose(difference, rate[1:-1], atol=0.03 * np.abs(rate).max())
+
+
+@pytest.mark.parametrize("duration", [0.3, 0.5, 4.0])
+def test_rest_to_rest_stays_rest_to_rest(duration):
+    trajectory = rest_to_rest(duration, 790.0, rate=800 / duration)
+    fixed = profile(vsa_3r(), trajectory).trajectory
+    commanded = fixed.block(0, fixed.samples).commanded
+    for rate in ("dstiffness", "ddstiffness"):
+        # three coefficients are equal there, which leaves their rounding over the square of a short piece
+        assert np.abs(commanded[rate][[0, -1]]).max() < 1e-8 * np.abs(commanded[rate]).max()
+    report = inverse_dynamics(vsa_3r(), fixed).report
+    for joint in report.joints:
+        assert max(np.abs((joint.start_dtheta, joint.end_dtheta)).flat) < 1e-12 * min(joint.peak_dtheta)
+    assert "motors move" not in str(report)
+
+
+def test_moving_ends_keep_the_rates_that_were_commanded():
+    """A sinusoid that starts at full speed, with a stiffness that falls at the start."""
+    position = Sinusoids(
+        signal=POSITION, span=(0.0, 2.0), cycles=1.5, offset=(0.0,), sine=((0.6,),), cosine=((0.2,),)
+    )
+    stiffness = Sinusoids(
+        signal=STIFFNESS, span=(0.0, 2.0), cycles=0.75, offset=(805.0,), sine=((-8.0,),), cosine=((3.0,),)
+    )
+    trajectory = Trajectory(UniformTimes(2.0, 500.0), position, {"stiffness": stiffness}, name="swing")
+    fixed = profile(pendulum(), trajectory).trajectory
+    for time in (0, -1):
+        before, after = (each.block(0, 1001).commanded for each in (trajectory, fixed))
+        for rate in ("dstiffness", "ddstiffness"):
+            # the spline vanishes there but for the rounding of equal coefficients
+            np.testing.assert_allclose(after[rate][time], before[rate][time], rtol=1e-9)
 
 
 def test_profile_holds_between_the_steps():

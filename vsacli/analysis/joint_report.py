@@ -20,6 +20,9 @@ COUNTED = {
 }
 """Kinds of trouble whose steps are counted, and the bits that make them."""
 
+UNKNOWN = (math.nan, math.nan)
+"""Of both motors, where a report was written before this was stated."""
+
 
 @dataclass(frozen=True)
 class Worst(Stored):
@@ -62,6 +65,10 @@ class JointReport(Stored):
             at rest must jump there; NaN at a rigid joint, where tau_e may jump as well.
         other_preload: whether every infeasible step could be done with the opposite preload.
         energy: work of the motors, elastic energy, co-contraction.
+        start_dtheta: motor velocities at the first step.
+        end_theta: motor positions at the last step of the trajectory; NaN if that was not computed.
+        end_dtheta: motor velocities there.
+        peak_dtheta: largest |dtheta| of motors 1 and 2, over the steps where it exists.
     """
 
     name: str
@@ -81,13 +88,18 @@ class JointReport(Stored):
     torque_step: tuple[float, float]
     other_preload: bool
     energy: JointEnergy
+    start_dtheta: tuple[float, float] = UNKNOWN
+    end_theta: tuple[float, float] = UNKNOWN
+    end_dtheta: tuple[float, float] = UNKNOWN
+    peak_dtheta: tuple[float, float] = UNKNOWN
 
     shape: ClassVar = {
         **named("name", "type", "actuator", "steps", "first_time", "worst"),
         "margin": {"min": "margin", "time": "margin_time", "reachable": "reachable"},
         "stiffness": {"min": "stiffness_min", "max": "stiffness_max"},
-        "peak": {"tau_e": "peak_tau_e", "tau_motor": "peak_tau_motor"},
-        "start": {"theta": "start_theta", "torque_step": "torque_step"},
+        "peak": {"tau_e": "peak_tau_e", "tau_motor": "peak_tau_motor", "dtheta": "peak_dtheta"},
+        "start": {"theta": "start_theta", "dtheta": "start_dtheta", "torque_step": "torque_step"},
+        "end": {"theta": "end_theta", "dtheta": "end_dtheta"},
         **named("other_preload", "energy"),
     }
 

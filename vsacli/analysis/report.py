@@ -76,6 +76,7 @@ class Report(Stored):
                 *(sentence for joint in self.joints for sentence in text.sentences(joint)),
                 *text.stops(self.joints, self.drifts),
                 *text.start(self.joints),
+                *text.end(self.joints),
                 *text.energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
                 *text.drift_lines(self.drifts),
                 text.self_check_line(self.self_check),

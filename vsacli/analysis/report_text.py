@@ -10,7 +10,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.joint_report import JointDrift, JointReport, Worst
 from vsacli.analysis.self_check import LADDER_BOUND, SelfCheck
 from vsacli.base.flags import Flag
-from vsacli.base.units import POSITION, TORQUE
+from vsacli.base.units import POSITION, TORQUE, VELOCITY
 from vsacli.dynamics.energy import JointEnergy
 
 WIDTH = 78
@@ -18,6 +18,13 @@ JOINTS_PER_LINE = 3
 
 HUGE = 1e8
 """Torque or stiffness shown with an exponent, as next to a singular step."""
+
+RESTING_SHARE = 1e-3
+"""Share of its own peak velocity below which a motor rests: records of a rest-to-rest motion that were rounded
+to four digits, or had noise of 1e-4 rad, left 1e-4."""
+
+ROUNDING_SHARE = 1e-9
+"""Share of the largest velocity of any motor that may be nothing but rounding: that of a joint held still."""
 
 TROUBLE = ("infeasible", "singular", "over_limit")
 """Kinds that make the verdict worse than ok."""
@@ -177,8 +184,9 @@ _SENTENCES = {"infeasible": _infeasible, "singular": _singular, "near_singular":
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
-    """Where the motors stand at the first step, and the largest step of a torque there."""
-    yield _by_joint("start motors at: ", [_start_of(joint) for joint in joints])
+    """Where the motors are at the first step, which of them move, and the largest step of a torque there."""
+    yield _by_joint("start motors at: ", [_positions(joint, joint.start_theta, "first") for joint in joints])
+    yield from _moving("motors move at the start: ", joints, [joint.start_dtheta for joint in joints])
     steps = [(max(_of_motors(joint, joint.torque_step)), joint) for joint in joints]
     defined = [entry for entry in steps if not math.isnan(entry[0])]
     if defined:
@@ -186,11 +194,40 @@ def start(joints: Sequence[JointReport]) -> Iterator[str]:
         yield f"torque step at start: {step:.3g} {TORQUE.unit(joint.type)} ({joint.name})"
 
 
-def _start_of(joint: JointReport) -> str:
-    positions = _of_motors(joint, joint.start_theta)
+def end(joints: Sequence[JointReport]) -> Iterator[str]:
+    """Where the motors are at the last step, and which of them still move; nothing if it was not computed."""
+    if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
+        return
+    yield _by_joint("end motors at: ", [_positions(joint, joint.end_theta, "last") for joint in joints])
+    yield from _moving("motors move at the end: ", joints, [joint.end_dtheta for joint in joints])
+
+
+def _positions(joint: JointReport, theta: tuple[float, float], step: str) -> str:
+    positions = _of_motors(joint, theta)
     if any(map(math.isnan, positions)):
-        return f"{joint.name} undefined (first step infeasible)"
-    return f"{joint.name} {' '.join(f'{theta:+.4g}' for theta in positions)} {POSITION.unit(joint.type)}"
+        return f"{joint.name} undefined ({step} step infeasible)"
+    return f"{joint.name} {_signed(positions)} {POSITION.unit(joint.type)}"
+
+
+def _moving(
+    label: str, joints: Sequence[JointReport], velocities: Sequence[tuple[float, float]]
+) -> Iterator[str]:
+    """The joints whose motors do not rest at an end of the motion, and how fast they are."""
+    fastest = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
+    moving = [
+        f"{joint.name} {_signed(_of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
+        for joint, dtheta in zip(joints, velocities, strict=True)
+        if any(
+            abs(speed) > max(RESTING_SHARE * peak, ROUNDING_SHARE * fastest)
+            for speed, peak in zip(dtheta, joint.peak_dtheta, strict=True)
+        )
+    ]
+    if moving:
+        yield _by_joint(label, moving)
+
+
+def _signed(values: Iterable[float]) -> str:
+    return " ".join(f"{value:+.4g}" for value in values)
 
 
 def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str]:

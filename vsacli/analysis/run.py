@@ -104,16 +104,18 @@ class Run:
 
     def report(self) -> Report:
         """The verdict on the blocks so far, with the self-check of the whole."""
+        complete = self._samples == self.trajectory.samples
+        joints = zip(self._summaries, self._energy.report(), strict=True)
         return Report(
             robot=self.robot.name,
             trajectory=self.trajectory.name,
             samples=self._samples,
             duration=self.trajectory.duration,
-            complete=self._samples == self.trajectory.samples,
+            complete=complete,
             warnings=(*self.robot.warnings, *self.trajectory.warnings),
             notes=self.trajectory.notes,
             self_check=self._self_check(),
-            joints=tuple(map(JointSummary.report, self._summaries, self._energy.report())),
+            joints=tuple(summary.report(energy, complete=complete) for summary, energy in joints),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,
         )

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vsacli.actuators.reach import margin
-from vsacli.analysis.joint_report import COUNTED, JointDrift, JointReport, Worst
+from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, has
 from vsacli.base.variables import MOTORS, VARIABLES, Block
@@ -32,8 +32,9 @@ class JointSummary:
         self._worst: dict[str, tuple[float, Worst]] = {}
         self._margin = (math.inf, math.nan, (math.nan, math.nan))
         self._stiffness = (math.nan, math.nan)
-        self._peaks = np.full(3, np.nan)
+        self._peaks = np.full(5, np.nan)
         self._start: FloatArray | None = None
+        self._end = np.full((2, len(MOTORS)), np.nan)
         self._other_preload = True
 
     def add(self, block: Block) -> None:
@@ -43,15 +44,16 @@ class JointSummary:
         stiffness = block.stiffness[:, index]
 
         if self._start is None:
-            self._start = np.stack((block.theta[0, index], self._torque_step(block)))
+            self._start = np.stack((*_motors_at(block, 0, index), self._torque_step(block)))
+        self._end = np.stack(_motors_at(block, -1, index))
         self._count(flags, block.time)
         if "stiffness" in self._joint.actuator.commanded:
             self._add_reach(flags, block)
         self._record_limits(flags, block)
         least, most = self._stiffness
         self._stiffness = np.fmin(least, stiffness.min()), np.fmax(most, stiffness.max())
-        peaks = np.abs(block.tau_e[:, index]), *np.abs(block.tau_motor[:, index]).T
-        self._peaks = np.fmax(self._peaks, [np.fmax.reduce(values) for values in peaks])
+        rows = block.tau_e[:, index], *block.tau_motor[:, index].T, *block.dtheta[:, index].T
+        self._peaks = np.fmax(self._peaks, [np.fmax.reduce(np.abs(row)) for row in rows])
 
     def _add_reach(self, flags: FlagArray, block: Block) -> None:
         """Merge what there is to say about the corridor."""
@@ -67,12 +69,17 @@ class JointSummary:
             demand = block.tau_e[outside, index], stiffness[outside]
             self._other_preload = bool(self._joint.actuator.other_preload(*demand).all())
 
-    def report(self, energy: JointEnergy) -> JointReport:
-        """What was found so far, besides the energy; at least one block must have been added."""
+    def report(self, energy: JointEnergy, *, complete: bool) -> JointReport:
+        """What was found so far, besides the energy; at least one block must have been added.
+
+        Args:
+            energy: of the joint.
+            complete: whether the last step that was added is that of the trajectory.
+        """
         assert self._start is not None
         least, time, reachable = self._margin
-        (theta_1, theta_2), (step_1, step_2) = self._start.tolist()
-        peak_tau_e, peak_1, peak_2 = self._peaks.tolist()
+        start_theta, start_dtheta, torque_step = map(_pair, self._start)
+        end_theta, end_dtheta = map(_pair, self._end) if complete else (UNKNOWN, UNKNOWN)
         return JointReport(
             name=self._joint.name,
             type=self._joint.type,
@@ -85,12 +92,16 @@ class JointSummary:
             reachable=reachable,
             stiffness_min=float(self._stiffness[0]),
             stiffness_max=float(self._stiffness[1]),
-            peak_tau_e=peak_tau_e,
-            peak_tau_motor=(peak_1, peak_2),
-            start_theta=(theta_1, theta_2),
-            torque_step=(step_1, step_2),
+            peak_tau_e=float(self._peaks[0]),
+            peak_tau_motor=_pair(self._peaks[1:3]),
+            start_theta=start_theta,
+            torque_step=torque_step,
             other_preload="infeasible" in self._worst and self._other_preload,
             energy=energy,
+            start_dtheta=start_dtheta,
+            end_theta=end_theta,
+            end_dtheta=end_dtheta,
+            peak_dtheta=_pair(self._peaks[3:]),
         )
 
     def _count(self, flags: FlagArray, time: FloatArray) -> None:
@@ -175,6 +186,16 @@ class DriftSummary:
         """What was found so far."""
         unit = VARIABLES["phi"].quantity.unit(self._joint.type)
         return JointDrift(self._joint.name, self._largest, self._time, unit, self._stop)
+
+
+def _motors_at(block: Block, step: int, joint: int) -> tuple[FloatArray, FloatArray]:
+    """Position and velocity of the motors of a joint at a step."""
+    return block.theta[step, joint], block.dtheta[step, joint]
+
+
+def _pair(values: FloatArray) -> tuple[float, float]:
+    first, second = values.tolist()
+    return first, second
 
 
 def _worst_step(hit: BoolArray, badness: FloatArray) -> Iterator[int]:

@@ -16,6 +16,9 @@ DEGREE = 3
 PIECES_PER_SMOOTHING = 3
 """Pieces of the spline in one smoothing time: what the objective leaves is no finer."""
 
+END_HALVINGS = 4
+"""Halvings of the pieces at both ends, where the function begins flat although its bounds may move."""
+
 DECAY_SMOOTHING_TIMES = 8
 """Smoothing times over which a change dies out; e^-8 is left of it."""
 
@@ -60,9 +63,10 @@ class Bounds:
 def nearest_spline(bounds: Bounds, smoothing: float) -> BSpline[np.float64]:
     """The C2 function x between bounds that minimises the integral of x^2 + smoothing^4 x''^2.
 
-    A convex quadratic programme in the coefficients of a cubic spline, solved as a problem of least distance
-    by non-negative least squares (Lawson & Hanson, "Solving Least Squares Problems", 1974, chapter 23). Far
-    from where the bounds exclude zero, x is zero.
+    Its first and second derivative vanish at both ends, so that what it is added to starts and stops as it
+    did. A convex quadratic programme in the coefficients of a cubic spline, solved as a problem of least
+    distance by non-negative least squares (Lawson & Hanson, "Solving Least Squares Problems", 1974, chapter
+    23). Far from where the bounds exclude zero, x is zero.
 
     Args:
         bounds: excluding zero at some instants.
@@ -74,19 +78,19 @@ def nearest_spline(bounds: Bounds, smoothing: float) -> BSpline[np.float64]:
     from scipy.interpolate import BSpline
 
     knots, free, smoothing = _knots(bounds, smoothing)
+    shapes = _shapes(free)
     size = float(np.max(bounds.missed_by(np.zeros_like(bounds.time))))
     scaled = Bounds(bounds.time, bounds.low / size, bounds.high / size)
-    coefficients = np.zeros(len(free))
-    coefficients[free] = _least_coefficients(scaled, knots, free, smoothing)
-    return BSpline(knots, size * coefficients, DEGREE)
+    amounts = _least_amounts(scaled, knots, shapes, smoothing)
+    return BSpline(knots, size * (shapes @ amounts), DEGREE)
 
 
 def _knots(bounds: Bounds, smoothing: float) -> tuple[FloatArray, BoolArray, float]:
-    """Equal pieces, which coefficients are free, and the smoothing that such pieces can follow."""
+    """Pieces, which coefficients are free, and the smoothing that such pieces can follow."""
     first, last = bounds.time[[0, -1]]
     while True:
         pieces = int(np.ceil(PIECES_PER_SMOOTHING * (last - first) / smoothing))
-        ends = np.linspace(first, last, pieces + 1)
+        ends = _graded(np.linspace(first, last, pieces + 1))
         knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
         near = _pieces_near(ends, bounds.time[bounds.excluding_zero], DECAY_SMOOTHING_TIMES * smoothing)
         # coefficient i belongs to the pieces i-3..i
@@ -96,6 +100,25 @@ def _knots(bounds: Bounds, smoothing: float) -> tuple[FloatArray, BoolArray, flo
         smoothing *= 1.5
 
 
+def _graded(ends: FloatArray) -> FloatArray:
+    """Ends of equal pieces, of which the outer ones are halved again and again towards their ends."""
+    halves = (ends[1] - ends[0]) * 0.5 ** np.arange(END_HALVINGS, 0, -1)
+    return np.concatenate([ends[:1], ends[0] + halves, ends[1:-1], ends[-1] - halves[::-1], ends[-1:]])
+
+
+def _shapes(free: BoolArray) -> FloatArray:
+    """Coefficients of the shapes that make up the spline, (coefficients, shapes).
+
+    One for each free coefficient; but the first three are one, and so are the last three, since the first two
+    derivatives vanish at an end where these are equal.
+    """
+    rows = np.arange(len(free))
+    shape_of = np.clip(rows - DEGREE + 1, 0, len(free) - 2 * DEGREE + 1)
+    shapes = np.zeros((len(free), shape_of[-1] + 1))
+    shapes[rows, shape_of] = 1.0
+    return shapes[:, np.any(shapes[free], axis=0)]
+
+
 def _pieces_near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
     """The pieces with one of these ascending times in reach."""
     next_time = np.append(times, np.inf)[np.searchsorted(times, ends[:-1] - reach)]
@@ -103,28 +126,27 @@ def _pieces_near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray
     return near
 
 
-def _least_coefficients(bounds: Bounds, knots: FloatArray, free: BoolArray, smoothing: float) -> FloatArray:
-    """The free coefficients, with as many of the bounds as matter."""
+def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
+    """The amount of each shape, with as many of the bounds as matter."""
     from scipy.interpolate import BSpline
 
-    root = _objective(knots, free, smoothing)
+    root = _objective(knots, shapes, smoothing)
     bounding = np.flatnonzero(bounds.excluding_zero)
     watched = bounding[evenly(len(bounding), MOST_COEFFICIENTS)]
-    coefficients = np.zeros(len(free))
     for _ in range(MOST_ROUNDS):
-        rows = BSpline.design_matrix(bounds.time[watched], knots, DEGREE).toarray()[:, free]
+        rows = BSpline.design_matrix(bounds.time[watched], knots, DEGREE).toarray() @ shapes
         finite = np.isfinite(bounds.high[watched])
         above = np.concatenate([bounds.low[watched], -bounds.high[watched][finite]])
-        coefficients[free] = _least_distance(root, np.concatenate([rows, -rows[finite]]), above)
-        missed = bounds.missed_by(BSpline(knots, coefficients, DEGREE)(bounds.time))
+        amounts = _least_distance(root, np.concatenate([rows, -rows[finite]]), above)
+        missed = bounds.missed_by(BSpline(knots, shapes @ amounts, DEGREE)(bounds.time))
         if missed.max() <= BOUND_ACCURACY:
-            return coefficients[free]
+            return amounts
         watched = np.union1d(watched, _peaks(missed))
     raise NoSplineError
 
 
-def _objective(knots: FloatArray, free: BoolArray, smoothing: float) -> FloatArray:
-    """Upper triangular R such that |R c|^2 is the integral, in smoothing times; exact by Gauss' rule."""
+def _objective(knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
+    """Upper triangular R such that |R x|^2 is the integral, in smoothing times; exact by Gauss' rule."""
     from scipy.interpolate import BSpline
 
     ends = knots[DEGREE:-DEGREE]
@@ -132,7 +154,7 @@ def _objective(knots: FloatArray, free: BoolArray, smoothing: float) -> FloatArr
     nodes, weights = np.polynomial.legendre.leggauss(DEGREE + 1)
     time = ((ends[:-1] + half)[:, None] + half[:, None] * nodes).ravel()
     share = np.sqrt(half[:, None] * weights / smoothing).ravel()
-    basis = BSpline(knots, np.eye(len(free))[:, free], DEGREE)
+    basis = BSpline(knots, shapes, DEGREE)
     rows = [share[:, None] * basis(time), share[:, None] * smoothing**2 * basis(time, nu=2)]
     return np.asarray(np.linalg.qr(np.concatenate(rows), mode="r"), dtype=np.float64)
 
