@@ -20,8 +20,8 @@ HUGE = 1e8
 """Torque or stiffness shown with an exponent, as next to a singular step."""
 
 RESTING_SHARE = 1e-3
-"""Share of its own peak velocity below which a motor rests: records of a rest-to-rest motion that were rounded
-to four digits, or had noise of 1e-4 rad, left 1e-4."""
+"""Share of its own peak velocity below which a motor rests: records of a rest-to-rest motion, rounded to
+four digits or with noise of 1e-4 rad, left 1e-4."""
 
 ROUNDING_SHARE = 1e-9
 """Share of the largest velocity of any motor that may be nothing but rounding: that of a joint held still."""
