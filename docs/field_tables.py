@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from vsacli.documents.fields import FINITE, REQUIRED, declared
 from vsacli.documents.kinds.nested import refused_in
-from vsacli.documents.records import Field
+from vsacli.documents.records import Field, on_one_line
 
 Variants = Mapping[str, type]
 
@@ -107,4 +107,4 @@ def _default(default: Any) -> str:
         return "none" if not any(map(math.isfinite, default)) else str(list(default))
     if isinstance(default, float):
         return f"{default:g}" if math.isfinite(default) else "none"
-    return f"`{default}`"
+    return f"`{on_one_line(default)}`"

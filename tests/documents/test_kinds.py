@@ -12,6 +12,7 @@ import pytest
 from vsacli.base.units import LENGTH, POSITION
 from vsacli.documents.fields import (
     NON_NEGATIVE,
+    Boolean,
     Choice,
     Integer,
     Interval,
@@ -80,6 +81,7 @@ def resolved(kind: Kind, content: Any) -> dict[str, tuple[tuple[str, ...], Any]]
     ("kind", "content", "expected"),
     [
         (Number(LENGTH), 1, {"": ((), 1.0)}),
+        (Boolean(), True, {"": ((), "true")}),
         (Text(), "a", {"": ((), "a")}),
         (Choice(("a", "b")), "b", {"": ((), "b")}),
         (Vector(2, LENGTH), (1, 2), {"": (("axis",), [1.0, 2.0])}),
@@ -120,6 +122,7 @@ def test_kinds_without_arrays_say_so(kind: Kind) -> None:
         (Interval(LENGTH), (2.0, 1.0), ("x",), "the lower bound 2 exceeds the upper bound 1"),
         (Interval(LENGTH), (2.0, 1e31), ("x", 1), "must be at most 1e+30 in size, not 1e+31"),
         (Choice(("a",), not_yet=("b",)), "b", ("x",), "'b' is not supported yet"),
+        (Boolean(), 1, ("x",), "must be true or false, not 1"),
         (Text(identifier=True), "1", ("x",), "must be made of letters, digits, _ and -, beginning with"),
         (
             Items(Record(Wheel), unique="name"),
@@ -130,7 +133,7 @@ def test_kinds_without_arrays_say_so(kind: Kind) -> None:
     ],
 )
 def test_problems(kind: Kind, content: Any, path: tuple[str | int, ...], problem: str) -> None:
-    check = None if isinstance(kind, Interval | Text | Choice) else NON_NEGATIVE
+    check = None if isinstance(kind, Interval | Text | Choice | Boolean) else NON_NEGATIVE
     (found,) = kind.problems(("x",), check, content)
     assert found.path == path
     assert found.message.startswith(problem)
@@ -141,6 +144,7 @@ def test_problems(kind: Kind, content: Any, path: tuple[str | int, ...], problem
     [
         (Number(POSITION), "rad (m if prismatic)"),
         (Integer(), "whole number"),
+        (Boolean(), "`true` or `false`"),
         (Text(), "text"),
         (Choice(("a", "b")), "`a` or `b`"),
         (Vector(3, LENGTH), "3 numbers, m"),
@@ -175,6 +179,7 @@ def lines_of(cls: type, values: Values) -> Iterator[Line]:
     ("kind", "content", "expected"),
     [
         (Number(LENGTH), 1.5, ["x: 1.5"]),
+        (Boolean(), False, ["x: false"]),
         (PerJoint(LENGTH), {"a": 1, "b": "90 deg"}, ["x: {a: 1, b: 90 deg}"]),
         (Vector(2, LENGTH), (1.0, 2), ["x: [1, 2]"]),
         (Record(Wheel), {"radius": 1}, ["x:", "  radius: 1"]),

@@ -182,7 +182,7 @@ def test_values_per_joint() -> None:
         ("joints.elbow.link.mass", -1, "joints.elbow.link.mass: must be zero or positive, not -1"),
         ("joints.elbow.link.mass", "x", "joints.elbow.link.mass: expected a number in kg, found 'x'"),
         ("joints.elbow.link.mass", None, "joints.elbow.link.mass: expected a number in kg, found nothing"),
-        ("joints.elbow.link.mass", True, "joints.elbow.link.mass: expected a number in kg, found 'True'"),
+        ("joints.elbow.link.mass", True, "joints.elbow.link.mass: expected a number in kg, found 'true'"),
         ("joints.elbow.link.mass", math.inf, "joints.elbow.link.mass: expected a number in kg, found 'inf'"),
         ("joints.elbow.name", "a b", "joints.elbow.name: must be made of letters"),
         ("joints.elbow.name", "base", "joints.2.name: 'base' is taken by another entry; each needs its own"),

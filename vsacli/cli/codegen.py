@@ -38,4 +38,6 @@ def codegen(robot: str, output: str, precision: str, overwrite: bool, talk: Talk
         talk.note(f"wrote {path}")
     for reason in project.omitted:
         talk.note(reason)
+    for warning in project.warnings:
+        talk.note(f"warning: {warning}")
     return Exit.OK

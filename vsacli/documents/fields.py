@@ -13,7 +13,7 @@ from typing import Any
 from vsacli.base.units import Quantity
 from vsacli.documents.kinds.lists import Items, Pair
 from vsacli.documents.kinds.nested import OneOf, Record
-from vsacli.documents.kinds.single import IDENTIFIER, Choice, Integer, Number, TableFile, Text
+from vsacli.documents.kinds.single import IDENTIFIER, Boolean, Choice, Integer, Number, TableFile, Text
 from vsacli.documents.kinds.vectors import Interval, PerJoint, Vector
 from vsacli.documents.records import LARGEST, REQUIRED, SMALLEST, Check, Field, Kind, check_fields, declared
 
@@ -27,6 +27,7 @@ __all__ = [
     "POSITIVE_OR_INFINITE",
     "REQUIRED",
     "SMALLEST",
+    "Boolean",
     "Check",
     "Choice",
     "Integer",
@@ -41,6 +42,7 @@ __all__ = [
     "TableFile",
     "Text",
     "Vector",
+    "boolean",
     "check_fields",
     "choice",
     "declared",
@@ -76,6 +78,11 @@ def number(
 def integer(doc: str, *, check: Check, default: Any = REQUIRED) -> Any:
     """A whole number."""
     return _declare(Field(Integer(), doc, check), default)
+
+
+def boolean(doc: str, *, default: Any = REQUIRED) -> Any:
+    """True or false."""
+    return _declare(Field(Boolean(), doc), default)
 
 
 def text(doc: str, *, identifier: bool = False, default: Any = REQUIRED) -> Any:

@@ -15,7 +15,7 @@ from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.documents import tree
 from vsacli.documents.kinds.lists import Pair
 from vsacli.documents.kinds.nested import scope_inside
-from vsacli.documents.records import Kind, declared
+from vsacli.documents.records import Kind, declared, on_one_line
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import Scope
 
@@ -106,6 +106,8 @@ def _node(value: Any) -> tree.Node:
     match value:
         case str():
             return tree.Scalar(0, value, plain=False)
+        case bool():
+            return tree.Scalar(0, on_one_line(value), plain=True)
         case Mapping():
             entries = {str(key): _node(entry) for key, entry in value.items()}
             return tree.Mapping(0, entries, dict.fromkeys(entries, 0))

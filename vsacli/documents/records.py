@@ -165,6 +165,8 @@ def on_one_line(value: Any) -> str:
             return f"{{{', '.join(f'{key}: {on_one_line(entry)}' for key, entry in value.items())}}}"
         case list() | tuple():
             return f"[{', '.join(map(on_one_line, value))}]"
+        case bool():
+            return "true" if value else "false"
         case float():
             return f"{value:.10g}"
     return str(value)

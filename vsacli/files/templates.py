@@ -19,8 +19,9 @@ Values = dict[str, Any]
 TYPES = {"R": "revolute", "P": "prismatic"}
 MOST_JOINTS = 100
 ROBOT_HEAD = (
-    "A robot to begin with. Replace the numbers by those of yours; what stands commented out is optional",
-    "and shown with its default. Numbers are SI; expressions such as pi/2 and 90 deg may be written.",
+    "A robot to begin with. Replace the numbers by those of yours, then remove `placeholder`. What stands",
+    "commented out is optional and shown with its default. Numbers are SI; expressions such as pi/2 and",
+    "90 deg may be written.",
 )
 
 DURATION = 4.0
@@ -66,6 +67,7 @@ def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-
         raise InputError.one(f"joints: expected {expected}, found {joints[:MOST_JOINTS]!r}")
     values = {
         "name": name,
+        "placeholder": True,
         "gravity": [0, 0, -9.81],
         "joints": [_joint(number, kind, actuator) for number, kind in enumerate(kinds, 1)],
     }

@@ -20,6 +20,7 @@ from vsacli.documents.fields import (
     Items,
     OneOf,
     Record,
+    boolean,
     check_fields,
     choice,
     interval,
@@ -31,6 +32,10 @@ from vsacli.documents.fields import (
 from vsacli.documents.source import Source
 
 UNBOUNDED = (-math.inf, math.inf)
+OF_PLACEHOLDERS = (
+    "the springs and motors of this robot are placeholders: replace them by those of your devices "
+    "and remove `placeholder: true`"
+)
 INERTIA_ROUNDING = 1e-12
 """Relative size below which a negative eigenvalue of an inertia tensor is rounding of its entries."""
 
@@ -188,6 +193,10 @@ class Robot:
 
     name: str = text("name of the robot")
     description: str = text("what the robot is and where its numbers come from", default="")
+    placeholder: bool = boolean(
+        "whether springs and motors stand in for others that are not known yet, which every report repeats",
+        default=False,
+    )
     gravity: tuple[float, float, float] = vector(
         3, units.ACCELERATION, "gravity acceleration in the base frame", default=(0.0, 0.0, -9.81)
     )
@@ -255,7 +264,8 @@ class Robot:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may not be what was meant, one sentence each."""
-        return tuple(warning for joint in self.joints for warning in joint.warnings())
+        of_joints = (warning for joint in self.joints for warning in joint.warnings())
+        return (*([OF_PLACEHOLDERS] if self.placeholder else []), *of_joints)
 
 
 def check_robot(value: object) -> None:

@@ -76,6 +76,6 @@ def _declaration(prefix: str, function: Function) -> str:
 
 
 def comment(text: str) -> str:
-    """A comment, in as many lines as it takes."""
-    lines = textwrap.wrap(text, WIDTH - 6)
+    """A comment, in as many lines as it takes, that no text ends early."""
+    lines = textwrap.wrap(text.replace("*/", "* /"), WIDTH - 6)
     return "/* " + "\n   ".join(lines) + " */"

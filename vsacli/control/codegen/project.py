@@ -35,7 +35,7 @@ clean:
 """
 
 _README = """# {name} in C
-
+{warnings}
 `{prefix}.c` and `{prefix}.h` are C99 and need nothing but math.h. The functions allocate nothing, keep
 nothing between calls, never print, and always end after a bounded number of operations; several threads may
 call them at once.
@@ -89,6 +89,7 @@ def readme_text(
     """How to use the code."""
     return _README.format(
         name=robot.name,
+        warnings="".join(f"\nWarning: {warning}.\n" for warning in robot.warnings),
         prefix=prefix,
         upper=prefix.upper(),
         tolerance=TOLERANCE[precision],
@@ -106,10 +107,12 @@ class Project(NamedTuple):
     Attributes:
         files: texts by file name.
         omitted: the functions that there are not, with the reason; a sentence each.
+        warnings: what may be wrong with the robot, a sentence each; the files repeat it.
     """
 
     files: dict[str, str]
     omitted: list[str]
+    warnings: tuple[str, ...]
 
 
 def generate(robot: Robot, precision: str = "double") -> Project:
@@ -124,9 +127,8 @@ def generate(robot: Robot, precision: str = "double") -> Project:
     """
     functions, omitted = _functions(robot)
     prefix = prefix_of(robot)
-    head = comment(
-        f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
-    )
+    title = f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
+    head = comment(" ".join([title, *(f"Warning: {warning}." for warning in robot.warnings)]))
     try:
         files = {
             f"{prefix}.h": header_text(prefix, robot, functions, precision, head),
@@ -137,7 +139,7 @@ def generate(robot: Robot, precision: str = "double") -> Project:
         }
     except NotImplementedError as error:
         raise InputError.one(f"no C code can be made of {robot.name}: {error}") from error
-    return Project(files, omitted)
+    return Project(files, omitted, robot.warnings)
 
 
 def _functions(robot: Robot) -> tuple[list[Function], list[str]]:

@@ -1,4 +1,4 @@
-"""Values that are one: a number, a whole number, a text, a word, a file."""
+"""Values that are one: a number, a whole number, true or false, a text, a word, a file."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from vsacli.documents.records import (
     Kind,
     Refer,
     Schema,
+    on_one_line,
 )
 from vsacli.documents.resolved_fields import ResolvedField, single
 from vsacli.documents.tree import INVALID, Node, Scalar, Scope, quoted
@@ -29,6 +30,8 @@ IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 EXPRESSION = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*$"
 ANGLE = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*(deg)?[ \t]*$"
 """How expressions look, for JSON Schema."""
+
+TRUTHS = ("true", "false")
 
 
 @dataclass(eq=False)
@@ -94,6 +97,32 @@ class Integer(Kind):
         """A whole number, or an expression."""
         keywords = {} if check is None else check.keywords
         return {"anyOf": [{"type": "integer", **keywords}, _expression(EXPRESSION)]}
+
+
+@dataclass(eq=False)
+class Boolean(Kind):
+    """True or false, by these words alone."""
+
+    words = "`true` or `false`"
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """The value as `bool`."""
+        if isinstance(node, Scalar) and node.plain and node.text in TRUTHS:
+            return node.text == "true"
+        return scope.unexpected(node, "true or false", label)
+
+    def problems(self, path: FieldPath, _check: Check | None, content: Any, /) -> Iterator[FieldProblem]:
+        """Anything else."""
+        if not isinstance(content, bool):
+            yield FieldProblem(path, f"must be true or false, not {content!r}")
+
+    def schema(self, _check: Check | None, _refer: Refer, /) -> Schema:
+        """True or false."""
+        return {"type": "boolean"}
+
+    def arrays(self, content: Any, _of_record: ArraysOfRecord, /) -> Iterator[ResolvedField]:
+        """A single text, since some readers of HDF5 know no boolean."""
+        yield single((), None, on_one_line(content))
 
 
 @dataclass(eq=False)
