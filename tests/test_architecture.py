@@ -227,7 +227,7 @@ def test_every_room_has_a_folder_of_tests_of_which_some_are_quick() -> None:
 
 def test_oracles_know_nothing_of_what_they_judge() -> None:
     """Oracles take robots and arrays, and compute by themselves."""
-    known = ("vsacli.base.arrays", "vsacli.robot.model")
+    known = ("vsacli.base.arrays", "vsacli.robot.joint", "vsacli.robot.model")
     strays = [
         f"{source}:{line}: {name}"
         for source in sorted((TESTS / "oracles").glob("*.py"))

@@ -31,7 +31,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.flags import LIMITS, NEAR_SINGULAR_MARGIN, Flag
 from vsacli.dynamics.drive import Drive, drive
-from vsacli.robot.model import Joint, Limits
+from vsacli.robot.joint import Joint, Limits
 
 MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "det_A")
 LOST_AT_A_FOLD = ("dphi", "dtheta", "ddtheta", "tau_motor")

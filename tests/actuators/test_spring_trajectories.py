@@ -22,7 +22,8 @@ from vsacli.analysis.result import Result
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.signals import POSITION
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
+from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.trajectory import Trajectory
 

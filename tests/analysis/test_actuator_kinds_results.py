@@ -22,7 +22,8 @@ from vsacli.dynamics.drive import drive
 from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.results.plots import compare_files, plot_feasibility, plot_stored
 from vsacli.robot.file import load_robot
-from vsacli.robot.model import Limits, Robot
+from vsacli.robot.joint import Limits
+from vsacli.robot.model import Robot
 from vsacli.studies.remedies import StiffnessProfile, suggest, write_fixed
 from vsacli.studies.remedies.suggestions import NotPossible, StiffnessOffset
 from vsacli.trajectory.file import load_trajectory

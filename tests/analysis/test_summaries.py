@@ -21,7 +21,8 @@ from vsacli.analysis.run import Run
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 from vsacli.dynamics.inverse import usual_block
-from vsacli.robot.model import Limits, Robot
+from vsacli.robot.joint import Limits
+from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_spring", "tau_motor", "det_A")

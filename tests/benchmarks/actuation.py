@@ -20,7 +20,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.model import Joint
+from vsacli.robot.joint import Joint
 
 JOINTS = 7
 SHARES = {"light": 0.1, "heavy": 0.99}

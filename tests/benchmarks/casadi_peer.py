@@ -15,7 +15,8 @@ import casadi
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 
 ORDERS = 5
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")

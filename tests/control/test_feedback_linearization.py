@@ -25,7 +25,8 @@ from vsacli.control.poles import gains_from_text, load_gains, parse_poles
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import State, state_derivative
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Pose, Robot
+from vsacli.robot.joint import Pose
+from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
 GAINS = Gains.from_poles([-9, -10, -11 + 4j, -11 - 4j], [-12, -15])

@@ -18,7 +18,7 @@ from vsacli.control.gains import Gains
 from vsacli.control.linearization import FeedbackLinearization
 from vsacli.control.simulation import InitialError, simulate
 from vsacli.robot.file import load_robot
-from vsacli.robot.model import Pose
+from vsacli.robot.joint import Pose
 
 POSITION_POLES = [-18, -20, -15 + 8j, -15 - 8j]
 STIFFNESS_POLES = [-14, -22]

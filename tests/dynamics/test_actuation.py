@@ -18,7 +18,8 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.result import Result
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[2]

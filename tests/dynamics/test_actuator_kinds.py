@@ -22,7 +22,8 @@ from vsacli.base.flags import Flag
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
+from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
 NAN = np.nan

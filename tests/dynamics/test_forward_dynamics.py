@@ -15,7 +15,8 @@ from vsacli.base.errors import InputError
 from vsacli.base.wrench import Wrench
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import State, mass_matrix, state_derivative
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Pose, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link, Pose
+from vsacli.robot.model import Robot
 
 CHAINS = ["R", "RRR", "RPRP", "PPP", "RRRRRRR"]
 

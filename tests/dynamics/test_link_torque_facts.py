@@ -23,7 +23,8 @@ from samples.robots import (
 
 from vsacli.base.arrays import FloatArray
 from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
+from vsacli.robot.model import Robot
 
 ROUNDING = 1e-12
 """Of the largest term compared: some hundred operations of eps = 2e-16 each, and a margin of ten or more."""

@@ -19,8 +19,9 @@ from vsacli.files.info.describe import describe_trajectory
 from vsacli.files.info.extremes import free_range
 from vsacli.files.info.robot_info import describe_robot, reach, reach_bound, static_load
 from vsacli.robot.file import load_robot
+from vsacli.robot.joint import Joint, Limits, Pose
 from vsacli.robot.kinematics import tip_position
-from vsacli.robot.model import Joint, Limits, Pose, Robot
+from vsacli.robot.model import Robot
 from vsacli.trajectory.file import load_trajectory
 
 ARM = load_robot(ROBOT)

@@ -19,7 +19,8 @@ from vsacli.documents.commented import WIDTH
 from vsacli.documents.fields import OneOf, Pair, Record, declared
 from vsacli.files.templates import MOST_JOINTS, robot_template, trajectory_template
 from vsacli.robot.file import RobotFile, load_robot
-from vsacli.robot.model import OF_PLACEHOLDERS, Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import OF_PLACEHOLDERS, Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT, load_trajectory
 
 ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))

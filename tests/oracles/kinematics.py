@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Joint, Pose, Robot
+from vsacli.robot.joint import Joint, Pose
+from vsacli.robot.model import Robot
 
 STEP = 1e-30
 """A complex step has no cancellation, and the square of this one vanishes against 1."""

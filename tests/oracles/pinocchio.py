@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import DenavitHartenberg, Pose, Robot
+from vsacli.robot.joint import DenavitHartenberg, Pose
+from vsacli.robot.model import Robot
 
 
 def build(robot: Robot) -> pin.Model:

@@ -18,8 +18,9 @@ from vsacli.base.errors import InputError
 from vsacli.base.wrench import Wrench
 from vsacli.compute.vector import Vector
 from vsacli.dynamics.elastic_torques import link_torques
+from vsacli.robot.joint import Pose
 from vsacli.robot.kinematics import base_gravity
-from vsacli.robot.model import Pose, Robot
+from vsacli.robot.model import Robot
 
 ROUNDING = 1e-12
 """Of the peak: a rotation more is some 10 eps; the rest is margin. A wrong axis or order shows at 1e-1."""

@@ -13,8 +13,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import WRENCH_FRAMES
 from vsacli.dynamics.elastic_torques import link_torques
+from vsacli.robot.joint import Pose
 from vsacli.robot.kinematics import forward_kinematics, jacobian
-from vsacli.robot.model import Pose, Robot
+from vsacli.robot.model import Robot
 
 ROUNDING = 1e-13
 """Of a few dozen products of numbers of size 1 to 10 (m): some 100 eps, the rest is margin."""

@@ -13,7 +13,8 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError
 from vsacli.robot.file import load_robot
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
+from vsacli.robot.model import Robot
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from samples.urdf import INERTIAL, joint, link, robot, serial
 
 from vsacli.base.errors import InputError
-from vsacli.robot.model import UNBOUNDED
+from vsacli.robot.joint import UNBOUNDED
 from vsacli.robot.urdf import Placeholders, import_urdf
 
 BOMB = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>\n<robot name="&b;"/>'

@@ -12,7 +12,8 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Limits, Robot
+from vsacli.robot.joint import Limits
+from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
 SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness": 100.0, "ddstiffness": 500.0}

@@ -18,7 +18,8 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.drive import drive
-from vsacli.robot.model import Joint, Limits, Robot
+from vsacli.robot.joint import Joint, Limits
+from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory

@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from vsacli.dynamics.elastic_torques import link_constants, tip_load
 from vsacli.dynamics.recursion import JointState, recursion
+from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.model import Robot
 
 ComplexArray = npt.NDArray[np.complex128]
 

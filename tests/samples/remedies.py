@@ -18,7 +18,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.variables import Block
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
+from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes

@@ -20,7 +20,8 @@ from vsacli.base.signals import WRENCH
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.documents.source import Source
 from vsacli.results.store.writer import ResultWriter
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
+from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import Constant
 from vsacli.trajectory.profile import WrenchProfile
 

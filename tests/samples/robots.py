@@ -1,4 +1,4 @@
-"""Robots and motions for tests, built from the constructors of vsacli.robot.model."""
+"""Robots and motions for tests, built from the constructors of vsacli.robot."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
+from vsacli.robot.model import Robot
 
 JOINT_TYPES = {"R": "revolute", "P": "prismatic"}
 ODD_GRAVITY = (3.1, -6.4, -4.7)

@@ -28,7 +28,7 @@ from vsacli.actuators.laws.exponential import Exponential
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
-from vsacli.robot.model import Limits
+from vsacli.robot.joint import Limits
 from vsacli.studies.remedies import suggest
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads

@@ -23,7 +23,7 @@ from vsacli.actuators.laws.sinh import Sinh
 from vsacli.analysis.run import Run, inverse_dynamics
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.model import Limits
+from vsacli.robot.joint import Limits
 from vsacli.studies.remedies import StiffnessProfile, suggest
 from vsacli.studies.remedies.nearest_spline import Bounds, NoSplineError, nearest_spline
 from vsacli.studies.remedies.suggestions import NotPossible

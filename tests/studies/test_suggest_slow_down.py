@@ -23,7 +23,7 @@ from samples.remedies import (
 from samples.robots import vsa_3r
 
 from vsacli.actuators.laws.sinh import Sinh
-from vsacli.robot.model import Limits
+from vsacli.robot.joint import Limits
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.slow_down import FACTOR_DENOMINATOR, smallest_slow_down
 from vsacli.trajectory.trajectory import Trajectory

@@ -15,7 +15,7 @@ from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.inverse import Stop
 from vsacli.dynamics.limits import limit_checks
-from vsacli.robot.model import Joint
+from vsacli.robot.joint import Joint
 
 REACH = {kind: COUNTED[kind] for kind in ("infeasible", "singular", "near_singular")}
 """Kinds of trouble whose worst step is the one with the smallest margin."""

@@ -14,7 +14,7 @@ from vsacli.base.arrays import FlagArray, FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
-from vsacli.robot.model import Joint
+from vsacli.robot.joint import Joint
 
 
 class Drive(NamedTuple):

@@ -24,8 +24,9 @@ from vsacli.compute.vector import (
     trigonometric,
 )
 from vsacli.dynamics.recursion import JointState, LinkConstants, TipLoad, recursion
+from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
-from vsacli.robot.model import Joint, Robot, check_robot
+from vsacli.robot.model import Robot, check_robot
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -7,7 +7,7 @@ import numpy as np
 from vsacli.actuators.limit_check import LimitCheck, OfJoint
 from vsacli.base.arrays import FlagArray
 from vsacli.base.flags import Flag
-from vsacli.robot.model import Joint
+from vsacli.robot.joint import Joint
 
 
 def limit_checks(joint: Joint) -> list[LimitCheck]:

@@ -23,8 +23,9 @@ from vsacli.compute.tracing.python_code import StateFunction
 from vsacli.compute.vector import ZERO, Scalar, Vector
 from vsacli.dynamics.elastic_torques import joint_state, link_constants, tip_load
 from vsacli.dynamics.recursion import TipLoad, TorqueDerivatives, recursion
+from vsacli.robot.joint import Limits
 from vsacli.robot.kinematics import base_gravity
-from vsacli.robot.model import Limits, Robot
+from vsacli.robot.model import Robot
 
 SMALLEST_PIVOT = 1e-12
 """Pivot of M, relative to the diagonal entry, below which there is no mass but only rounding."""

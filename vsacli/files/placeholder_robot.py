@@ -20,7 +20,8 @@ from vsacli.documents import tree
 from vsacli.documents.fields import IDENTIFIER
 from vsacli.documents.reading import survey_document
 from vsacli.documents.table import read_table
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Robot
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
+from vsacli.robot.model import Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
 MOST_JOINTS = 1000

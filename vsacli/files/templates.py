@@ -11,7 +11,8 @@ from vsacli.documents.commented import commented_document
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
 from vsacli.robot import file as robot_file
 from vsacli.robot.commanded_joints import CommandedJoints
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 from vsacli.trajectory import file as trajectory_file
 
 Values = dict[str, Any]

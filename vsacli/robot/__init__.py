@@ -6,8 +6,9 @@ from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from vsacli.robot.file import load_robot
+    from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link, Pose
     from vsacli.robot.kinematics import forward_kinematics, jacobian
-    from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Limits, Link, Pose, Robot
+    from vsacli.robot.model import Robot
     from vsacli.robot.urdf import Placeholders, import_urdf
 
 __all__ = [

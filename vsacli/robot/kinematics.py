@@ -11,7 +11,8 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, checked_shape
 from vsacli.base.wrench import WRENCH_AXES, check_frame
 from vsacli.compute.vector import Matrix, Vector, add, exact, mul, sub, trigonometric
-from vsacli.robot.model import Joint, Pose, Robot, check_robot
+from vsacli.robot.joint import Joint, Pose
+from vsacli.robot.model import Robot, check_robot
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

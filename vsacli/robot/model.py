@@ -2,189 +2,30 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
-import numpy as np
-
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base import units
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import FieldProblem, check_type
+from vsacli.base.errors import check_type
 from vsacli.base.tables import aligned, html_table
 from vsacli.documents.fields import (
-    NON_NEGATIVE,
     Items,
-    OneOf,
     Record,
     boolean,
     check_fields,
-    choice,
-    interval,
-    number,
     text,
     value,
     vector,
 )
 from vsacli.documents.source import Source
+from vsacli.robot.joint import Joint, Pose
 
-UNBOUNDED = (-math.inf, math.inf)
 OF_PLACEHOLDERS = (
     "the springs and motors of this robot are placeholders: replace them by those of your devices "
     "and remove `placeholder: true`"
 )
-INERTIA_ROUNDING = 1e-12
-"""Relative size below which a negative eigenvalue of an inertia tensor is rounding of its entries."""
-
-
-@dataclass(frozen=True)
-class DenavitHartenberg:
-    """Standard Denavit-Hartenberg row: frame i-1 to frame i is Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
-
-    a: float = number(units.LENGTH, "distance of the axes z_{i-1} and z_i, along x_i")
-    alpha: float = number(units.ANGLE, "angle from z_{i-1} to z_i, about x_i")
-    d: float = number(
-        units.LENGTH, "offset along z_{i-1}; the variable of a prismatic joint adds to it", default=0.0
-    )
-    theta: float = number(
-        units.ANGLE, "angle about z_{i-1}; the variable of a revolute joint adds to it", default=0.0
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-
-@dataclass(frozen=True)
-class Pose:
-    """Where a frame lies in another, as the `origin` of URDF: its origin there, then fixed-axis rotations."""
-
-    xyz: tuple[float, float, float] = vector(
-        3, units.LENGTH, "position of its origin", default=(0.0, 0.0, 0.0)
-    )
-    rpy: tuple[float, float, float] = vector(
-        3,
-        units.ANGLE,
-        "roll, pitch, yaw: turned about the fixed x, then y, then z axis, Rz(yaw) Ry(pitch) Rx(roll)",
-        default=(0.0, 0.0, 0.0),
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-
-@dataclass(frozen=True)
-class Inertia:
-    """Central inertia tensor; entries of the tensor itself, as in URDF: xy = -integral(x y dm)."""
-
-    xx: float = number(units.INERTIA, "moment about the x axis")
-    yy: float = number(units.INERTIA, "moment about the y axis")
-    zz: float = number(units.INERTIA, "moment about the z axis")
-    xy: float = number(units.INERTIA, "tensor entry -integral(x y dm)", default=0.0)
-    xz: float = number(units.INERTIA, "tensor entry -integral(x z dm)", default=0.0)
-    yz: float = number(units.INERTIA, "tensor entry -integral(y z dm)", default=0.0)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        smallest = self.principal_moments[0]
-        if smallest < -INERTIA_ROUNDING * np.abs(self.tensor).max():
-            problem = f"the tensor has the negative eigenvalue {smallest:.4g} kg m^2, which no body has"
-            check_fields(self, FieldProblem((), problem))
-
-    @property
-    def tensor(self) -> FloatArray:
-        """The symmetric 3x3 tensor."""
-        return np.array(
-            [[self.xx, self.xy, self.xz], [self.xy, self.yy, self.yz], [self.xz, self.yz, self.zz]]
-        )
-
-    @property
-    def principal_moments(self) -> FloatArray:
-        """Eigenvalues, ascending."""
-        return np.asarray(np.linalg.eigvalsh(self.tensor), dtype=np.float64)
-
-    def warnings(self) -> Iterator[str]:
-        """What may not be what was meant, though it can be computed with."""
-        low, middle, high = self.principal_moments
-        if high == 0:
-            yield "its inertia is zero"
-        elif high - low - middle > INERTIA_ROUNDING * high:
-            excess = high - low - middle
-            sides = f"{high:.4g} > {low:.4g} + {middle:.4g} by {excess:.4g} kg m^2"
-            yield f"its inertia breaks the triangle inequality: {sides}"
-
-
-@dataclass(frozen=True)
-class Link:
-    """The augmented link: the body with the motors mounted on it, without the inertia of their rotors."""
-
-    mass: float = number(units.MASS, "mass of the augmented link", check=NON_NEGATIVE)
-    com: tuple[float, float, float] = vector(3, units.LENGTH, "centre of mass in the link frame (DH frame i)")
-    inertia: Inertia = value(Record(Inertia), "inertia tensor about the centre of mass, link axes")
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-    def warnings(self) -> Iterator[str]:
-        """What may not be what was meant, though it can be computed with."""
-        if self.mass == 0:
-            yield "its mass is zero"
-        yield from self.inertia.warnings()
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Ranges of the commanded motion; steps beyond are computed and flagged."""
-
-    position: tuple[float, float] = interval(units.POSITION, "range of the joint position", default=UNBOUNDED)
-    velocity: tuple[float, float] = interval(units.VELOCITY, "range of the joint velocity", default=UNBOUNDED)
-    stiffness: tuple[float, float] = interval(
-        units.STIFFNESS, "range of the joint stiffness", one_sided=True, default=UNBOUNDED
-    )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-
-
-@dataclass(frozen=True)
-class Joint:
-    """One joint with its link and actuator."""
-
-    name: str = text("name of the joint, used in reports and CSV headers", identifier=True)
-    type: str = choice(("revolute", "prismatic"), "kind of joint")
-    dh: DenavitHartenberg = value(Record(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
-    link: Link = value(Record(Link), "the link the joint moves")
-    damping: float = number(
-        units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
-    )
-    actuator: Actuator = value(OneOf(ACTUATORS), "what drives the joint")
-    limits: Limits = value(Record(Limits), "limits of the commanded motion", default=Limits())
-
-    unit_variant = "type"
-
-    def __post_init__(self) -> None:
-        problems = []
-        if not self.actuator.sprung and self.limits.stiffness != UNBOUNDED:
-            reason = f"a joint with a {self.actuator_type} actuator has no stiffness to limit; leave it out"
-            problems.append(FieldProblem(("limits", "stiffness"), reason))
-        check_fields(self, *problems)
-
-    @property
-    def is_revolute(self) -> bool:
-        """Whether the joint variable is an angle."""
-        return self.type == "revolute"
-
-    @property
-    def actuator_type(self) -> str:
-        """The key of its actuator in `ACTUATORS`."""
-        return ACTUATORS.name_of(type(self.actuator))
-
-    def warnings(self) -> Iterator[str]:
-        """What may not be what was meant, of the link and of the springs."""
-        yield from (f"link of joint {self.name}: {warning}" for warning in self.link.warnings())
-        yield from (f"spring of joint {self.name}: {warning}" for warning in self.actuator.warnings)
 
 
 @dataclass(frozen=True, repr=False)

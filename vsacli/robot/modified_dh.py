@@ -16,8 +16,9 @@ import math
 from itertools import pairwise
 
 from vsacli.compute.vector import Scalar, Vector, add, exact, mul, sub, trigonometric
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link, Pose
 from vsacli.robot.kinematics import rotation_matrix
-from vsacli.robot.model import DenavitHartenberg, Inertia, Joint, Link, Pose, Robot
+from vsacli.robot.model import Robot
 
 AFTER_LAST = DenavitHartenberg(a=0, alpha=0)
 """In place of the row that would follow the last one: nothing moves its frame."""

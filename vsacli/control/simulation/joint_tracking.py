@@ -17,7 +17,8 @@ from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
 from vsacli.dynamics.limits import limit_checks
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 
 HEADER = ("joint", "q error: peak", "end", "stiffness error: peak", "end", "peak motor 1 / 2")
 

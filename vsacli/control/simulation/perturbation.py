@@ -11,7 +11,8 @@ from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError
 from vsacli.documents.fields import Kind, Number, OneOf, Pair, Record, declared
-from vsacli.robot.model import Inertia, Joint, Link, Robot
+from vsacli.robot.joint import Inertia, Joint, Link
+from vsacli.robot.model import Robot
 
 
 def perturbed(robot: Robot, relative: float, seed: int) -> Robot:

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 
 MOST_STARTS = 16
 """Random configurations to start from, for each goal; fewer in long chains."""

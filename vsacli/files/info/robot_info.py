@@ -10,8 +10,9 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import declared
 from vsacli.files.info.extremes import Extremes, free_range, largest_sizes, unlimited
+from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, frames, tip_position
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.model import Robot
 
 LOAD_ROUNDING = 1e-12
 """Torques below this share of the largest are the rounding of a zero."""

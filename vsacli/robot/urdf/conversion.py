@@ -16,7 +16,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
-from vsacli.robot.model import UNBOUNDED, DenavitHartenberg, Inertia, Joint, Limits, Link, Pose, Robot
+from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Inertia, Joint, Limits, Link, Pose
+from vsacli.robot.model import Robot
 from vsacli.robot.urdf.dh import SNAP_ANGLE, Frames, Snap, dh_frames, tidy, tidy_angle
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.residual import Residual, kinematic_residual

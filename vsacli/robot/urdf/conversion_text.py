@@ -10,7 +10,7 @@ from typing import Any
 from vsacli.actuators.actuator import Actuator
 from vsacli.documents.fields import Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
 from vsacli.robot.file import FORMAT
-from vsacli.robot.model import UNBOUNDED, DenavitHartenberg, Joint, Limits, Link, Pose
+from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Joint, Limits, Link, Pose
 from vsacli.robot.urdf.conversion import Conversion
 from vsacli.robot.urdf.residual import Residual
 from vsacli.robot.urdf.serial_chain import ChainJoint

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import DenavitHartenberg
+from vsacli.robot.joint import DenavitHartenberg
 from vsacli.robot.urdf.rigid_motion import inverse, transform
 from vsacli.robot.urdf.serial_chain import ChainJoint
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.robot.joint import Pose
 from vsacli.robot.kinematics import frames
-from vsacli.robot.model import Pose, Robot
+from vsacli.robot.model import Robot
 from vsacli.robot.urdf.rigid_motion import cross_matrix, inverse, pose_matrix
 from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
 

@@ -19,7 +19,8 @@ from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.inverse import command_of, compute_block, elastic_torques, usual_block
 from vsacli.dynamics.limits import limit_checks
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 

@@ -12,7 +12,8 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.inverse import elastic_torques, usual_block
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, path_reason
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory

@@ -11,7 +11,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
 from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.inverse import check_fit
-from vsacli.robot.model import Joint, Robot
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import Load, joint_loads
 from vsacli.studies.remedies.slow_down import smallest_slow_down

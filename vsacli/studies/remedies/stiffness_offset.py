@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from vsacli.base.arrays import IndexArray, evenly
-from vsacli.robot.model import Joint
+from vsacli.robot.joint import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed, stiffness_text
 from vsacli.studies.remedies.admissible_stiffness import Load, checked_range
 

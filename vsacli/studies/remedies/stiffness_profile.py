@@ -11,7 +11,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import STIFFNESS
-from vsacli.robot.model import Joint
+from vsacli.robot.joint import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, stiffness_text
 from vsacli.studies.remedies.admissible_stiffness import (
     Load,
