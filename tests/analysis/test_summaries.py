@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from samples.drives import Stopped, lower_by_preload, motion, springs, with_joint, with_preload
 from samples.robots import vsa_3r
+from samples.shipped import shipped_robot
 
 from vsacli import inverse_dynamics
 from vsacli.actuators.antagonistic import Antagonistic
@@ -259,3 +260,26 @@ def test_worst_verdict_wins():
     assert verdict_of(dataclasses.replace(report, self_check=failed), infeasible=1) == "self_check_failed"
     assert not dataclasses.replace(report.self_check, ladder=math.nan).passed
     assert not dataclasses.replace(report.self_check, spring_residual=math.nan).passed
+
+
+def test_what_is_not_finite_counts_as_infeasible_and_is_named():
+    """Speeds of 1e80 rad/s, whose fourth powers overflow in the second derivative of tau_e."""
+    robot, time = shipped_robot("mixed_3r"), np.linspace(0, 1, 9)
+    q = np.zeros((9, 3))
+    dq = np.where(time > 0.3, 1e80, 0.0)[:, None] * [1, 1, 1]
+    trajectory = Trajectory.from_samples(time, q, q + 900, dq=dq, ddq=q, d3q=q, d4q=q)
+    with np.errstate(all="ignore"):
+        result = inverse_dynamics(robot, trajectory)
+    flags = dict(zip(robot.joint_names, result.flags.T, strict=True))
+    kinds = {joint.actuator_type: joint.name for joint in robot.joints}
+    both = Flag.NOT_FINITE | Flag.INFEASIBLE
+    assert np.array_equal(flags[kinds["elastic"]] & both, np.where(time > 0.3, both, 0))
+    assert np.array_equal(flags[kinds["antagonistic"]] & both, np.where(time > 0.3, Flag.INFEASIBLE, 0)), (
+        "its springs cannot carry 1e160 N m at that stiffness: that is why there are no numbers"
+    )
+    of_elastic = result.report.joints[robot.joint_names.index(kinds["elastic"])]
+    assert of_elastic.steps["infeasible"] == 6
+    assert of_elastic.first_time["not_finite"] == of_elastic.worst["not_finite"].time == 0.375
+    assert f"{kinds['elastic']}: a number of its motors is not finite at t = 0.375 s" in str(result.report)
+    stored = Report.from_json(json.loads(json.dumps(result.report.as_json())))
+    assert str(stored) == str(result.report)

@@ -75,11 +75,11 @@ def close(found: FloatArray, expected: FloatArray, units: int) -> BoolArray:
 def test_of_single_samples(tmp_path: Path) -> None:
     values = Structure("values", "", (Array("x", (2,), ""),))
     results = Structure("results", "", (Array("y", (Everything.outputs,), ""),))
-    function = Function("all", "", (("values", values),), results, Everything(), flagged=False)
+    function = Function("all", "", (("values", values),), results, Everything())
     (tmp_path / "each.h").write_text(
         "typedef struct { double x[2]; } each_values;\n"
         f"typedef struct {{ double y[{Everything.outputs}]; }} each_results;\n"
-        "void each_all(const each_values *values, each_results *results);\n"
+        "unsigned each_all(const each_values *values, each_results *results);\n"
     )
     (tmp_path / "each.c").write_text(source_text("each", [function], "double", "/* all */"))
     x, y = operands()

@@ -59,7 +59,7 @@ class Compiled:
             arguments: arrays (samples, ...) by name, for each argument.
         """
         call = getattr(self._library, f"{self._prefix}_{function.name}")
-        call.restype = ctypes.c_uint if function.flagged else None
+        call.restype = ctypes.c_uint
         result_type = self._struct(function.result)
         samples = len(next(iter(arguments[0].values())))
         found: dict[str, list[Any]] = {array.name: [] for array in function.result.arrays}

@@ -169,6 +169,13 @@ def _near_singular(joint: JointReport, worst: Worst) -> str:
     )
 
 
+def _not_finite(joint: JointReport, worst: Worst) -> str:
+    return (
+        f"a number of its motors is not finite at t = {_time(worst.time)}: motion, stiffness or load are too "
+        f"large, or no numbers (infeasible: {_steps(joint, 'infeasible')})"
+    )
+
+
 def _limit(joint: JointReport, worst: Worst) -> str:
     whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     value, bound = _apart(worst.value, worst.bound)
@@ -180,7 +187,12 @@ def _limit(joint: JointReport, worst: Worst) -> str:
     )
 
 
-_SENTENCES = {"infeasible": _infeasible, "singular": _singular, "near_singular": _near_singular}
+_SENTENCES = {
+    "not_finite": _not_finite,
+    "infeasible": _infeasible,
+    "singular": _singular,
+    "near_singular": _near_singular,
+}
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:

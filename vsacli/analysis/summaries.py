@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.actuators.reach import margin
 from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import SINGULAR_MARGIN, has
+from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.inverse import Stop
@@ -49,6 +49,7 @@ class JointSummary:
         self._count(flags, block.time)
         if "stiffness" in self._joint.actuator.commanded:
             self._add_reach(flags, block)
+        self._record_not_finite(flags, block.time)
         self._record_limits(flags, block)
         least, most = self._stiffness
         self._stiffness = np.fmin(least, stiffness.min()), np.fmax(most, stiffness.max())
@@ -124,7 +125,7 @@ class JointSummary:
 
     def _record_reach(self, flags: FlagArray, gap: FloatArray, block: Block) -> None:
         """Followed deflections may end inside the corridor; such a step is infeasible, but has no worst."""
-        outside = gap < -SINGULAR_MARGIN
+        outside = (gap < -SINGULAR_MARGIN) & ~has(flags, Flag.NOT_FINITE)
         for kind, bits in REACH.items():
             hit = has(flags, bits) & (outside if kind == "infeasible" else ~outside)
             for step in _worst_step(hit, -gap):
@@ -135,6 +136,14 @@ class JointSummary:
                 bound = lower if value - lower <= upper - value or math.isnan(lower) else upper
                 unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
                 self._keep(-gap[step], Worst(kind, float(block.time[step]), value, bound, unit))
+
+    def _record_not_finite(self, flags: FlagArray, time: FloatArray) -> None:
+        """The first step counts: what is not finite is as bad as any other."""
+        hit, label = has(flags, Flag.NOT_FINITE), Flag.NOT_FINITE.label
+        if hit.any() and label not in self._first_time:
+            self._first_time[label] = first = float(time[hit.argmax()])
+            unit = VARIABLES["tau_motor"].quantity.unit(self._joint.type)
+            self._keep(0.0, Worst(label, first, math.nan, math.nan, unit))
 
     def _record_limits(self, flags: FlagArray, block: Block) -> None:
         values = block.of_joint(self._index)

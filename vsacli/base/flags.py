@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable
 from functools import reduce
-from operator import or_
+from operator import and_, or_
 from typing import Self
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FlagArray
+from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 
 SINGULAR_MARGIN = 1e-9
@@ -45,6 +46,11 @@ class Flag(enum.IntFlag):
     POSITION_LIMIT = 128, "the commanded position leaves the joint's range", "position"
     VELOCITY_LIMIT = 256, "the commanded velocity exceeds the joint's limit", "velocity"
     STIFFNESS_LIMIT = 512, "the commanded stiffness leaves the joint's allowed range", "stiffness"
+    NOT_FINITE = (
+        16384,
+        "something of the motors is infinite or no number, since what it follows from is, or is too large",
+        None,
+    )
 
     def __new__(cls, bit: int, meaning: str, quantity: str | None) -> Self:
         """A bit with all that is said of it, none of which can be left out."""
@@ -81,6 +87,17 @@ def has(flags: FlagArray, bits: Flag) -> BoolArray:
 def marked(flag: Flag, where: BoolArray) -> FlagArray:
     """The bit where it shall be set, else 0."""
     return where.astype(np.uint16) * np.uint16(flag)
+
+
+def finite(arrays: Iterable[FloatArray]) -> BoolArray:
+    """Where every one of some arrays of a shape is a finite number; an infinity is none."""
+    whole: BoolArray = reduce(and_, map(np.isfinite, arrays))
+    return whole
+
+
+def not_finite_flags(where: BoolArray) -> FlagArray:
+    """NOT_FINITE, and INFEASIBLE with it: who heeds the latter alone stops there as well."""
+    return marked(Flag.NOT_FINITE | Flag.INFEASIBLE, where)
 
 
 def check_near_singular(threshold: float) -> None:

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FlagArray, FloatArray
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, finite, has, not_finite_flags
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
+
+PLACES = ("phi", "theta", "tau_spring")
+"""What the motors have at every step that is feasible."""
+
+RATES = ("dphi", "dtheta", "ddtheta", "tau_motor", "motor_power")
+"""What they have where it is regular as well."""
 
 
 class Drive(NamedTuple):
@@ -75,7 +83,27 @@ def drive(
     driven = driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
     of_joint = {**command.arrays(), **driven._asdict()}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
-    return driven._replace(flags=driven.flags | exceeded)
+    unexplained = not_finite_flags(_not_finite(actuator, of_joint))
+    return driven._replace(flags=driven.flags | exceeded | unexplained)
+
+
+def _not_finite(actuator: Actuator, of_joint: OfJoint) -> BoolArray:
+    """Where something of the motors is no finite number, and neither infeasible nor singular says why.
+
+    Of a demand that is no finite number itself, neither can be said.
+    """
+    demand = finite([of_joint["tau_e"], *(of_joint[key] for key in actuator.commanded)])
+    placed, moved = (finite(_of_motors(actuator, of_joint, names)) for names in (PLACES, RATES))
+    infeasible, singular = (has(of_joint["flags"], flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
+    defined = infeasible | (placed & (singular | moved))
+    return ~(demand & defined)
+
+
+def _of_motors(actuator: Actuator, of_joint: OfJoint, names: Iterable[str]) -> Iterator[FloatArray]:
+    """The rows (samples,) of variables of the motors that the actuator has."""
+    for name in names:
+        there = actuator.has(VARIABLES[name])
+        yield from (row for row, is_there in zip(of_joint[name], there, strict=True) if is_there)
 
 
 def _published(actuator: Actuator, phi: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.base.flags import Flag, marked
+from vsacli.base.flags import Flag, finite, marked, not_finite_flags
 from vsacli.compute.rows import RowLayout
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.control.codegen.robot_functions import command_structure, variable_array
@@ -48,11 +48,10 @@ def feedback_linearization_function(robot: Robot) -> Function:
         arguments=law.arguments,
         result=Structure(
             "control",
-            "What the controller wants; NaN at a joint whose decoupling matrix is singular.",
+            "What the controller wants; NaN where a flag says it cannot be.",
             (variable_array(robot, "tau_motor"), variable_array(robot, "flags")),
         ),
         compute=law,
-        flagged=True,
     )
 
 
@@ -108,7 +107,8 @@ class _Law:
         tau_motor = np.full_like(state["theta"], np.nan)
         tau_motor[drivetrain.present] = torque
         values = {**state, "phi": state["theta"] - state["q"][:, None], "tau_motor": tau_motor}
-        flags = [self._flags(joint, values) for joint in range(len(self._robot.joints))]
+        singular = drivetrain.determinant(state["q"], theta) == 0
+        flags = [self._flags(joint, values, singular[joint]) for joint in range(len(self._robot.joints))]
         return [*tau_motor.ravel(), *flags]
 
     def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
@@ -117,11 +117,12 @@ class _Law:
         entries = sizes.arrays(np.concatenate(rows))
         return (structure.layout.arrays(entries[name]) for name, structure in self.arguments)
 
-    def _flags(self, index: int, values: Arrays) -> Any:
+    def _flags(self, index: int, values: Arrays, singular: Any) -> Any:
         """What is wrong with a joint: no torque, or a limit that state or torque break."""
-        flags = marked(Flag.SINGULAR, np.isnan(values["tau_motor"][index, 0]))
-        of_joint = {name: array[index] for name, array in values.items()}
-        return limit_flags(self._robot.joints[index], of_joint, flags)
+        joint, of_joint = self._robot.joints[index], {name: array[index] for name, array in values.items()}
+        there = finite(of_joint["tau_motor"][: joint.actuator.motor_count])
+        flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(there | singular))
+        return limit_flags(joint, of_joint, flags)
 
 
 def _state_arrays(robot: Robot) -> tuple[Array, ...]:

@@ -70,8 +70,8 @@ class Function:
         meaning: what it computes, for the header.
         arguments: structures that it reads, by the names of the arguments.
         result: structure that it fills.
-        compute: from rows of samples of all entries of the arguments to rows of the entries of the result.
-        flagged: whether it returns the bits of all joints.
+        compute: from rows of samples of all entries of the arguments to rows of the entries of the result,
+            whose bits, of all joints together, the function returns.
     """
 
     name: str
@@ -79,7 +79,6 @@ class Function:
     arguments: tuple[tuple[str, Structure], ...]
     result: Structure
     compute: Callable[[Rows], Rows]
-    flagged: bool
 
     def program(self) -> Program:
         """What the function does to one sample."""

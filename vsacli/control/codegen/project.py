@@ -54,7 +54,8 @@ The structures are in `{prefix}.h`, each member with its unit. Joints are number
 ## In a control loop
 
 Call the function once per period, e.g. each millisecond, and look at what it returns before the torques go
-out: where a bit says that a joint's step is infeasible or singular, its torques are NaN.
+out: where a bit says that a joint's step is infeasible or singular, its torques are no numbers. NaN, infinity
+and what is too large in a command, from a sensor that failed for instance, counts as infeasible.
 
 ```c
 #include "{prefix}.h"
@@ -73,8 +74,8 @@ void every_millisecond(const {prefix}_command *command)
 ```
 
 The command must be smooth: four derivatives of the position and two of the stiffness, all of the same
-motion. Torques are those of the joint side of the gears. Do not compile with -ffast-math or
--ffinite-math-only: NaN would go unnoticed.
+motion. Torques are those of the joint side of the gears. With -ffast-math or -ffinite-math-only, under which
+NaN would go unnoticed, the code does not compile.
 """
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from vsacli.base.flags import finite, not_finite_flags
 from vsacli.base.signals import POSITION, orders_of_derivation
 from vsacli.base.variables import VARIABLES
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
@@ -36,13 +37,22 @@ def command_structure(robot: Robot) -> Structure:
 
 def link_torques_function(robot: Robot) -> Function:
     """(36)-(60)."""
+    kernel = LinkTorques(robot)
+
+    def compute(rows: Rows) -> Rows:
+        torques = kernel(rows)
+        of_joints = zip(*kernel.results.unpack(torques).values(), strict=True)
+        return [*torques, *(not_finite_flags(~finite(of_joint)) for of_joint in of_joints)]
+
     return Function(
         name="link_torques",
-        meaning="Torques that the links demand of the joints, and their first two derivatives.",
+        meaning=(
+            "Torques that the links demand of the joints, and their first two derivatives; returns the flags "
+            "of all joints, 0 if all numbers are finite."
+        ),
         arguments=(("motion", motion_structure(robot)),),
-        result=Structure("torques", "Torques of the joints.", _arrays(robot, TORQUES)),
-        compute=LinkTorques(robot),
-        flagged=False,
+        result=Structure("torques", "Torques of the joints.", _arrays(robot, (*TORQUES, "flags"))),
+        compute=compute,
     )
 
 
@@ -64,7 +74,6 @@ def inverse_dynamics_function(robot: Robot) -> Function:
             _arrays(robot, DRIVE_NAMES),
         ),
         compute=compute,
-        flagged=True,
     )
 
 

@@ -41,6 +41,11 @@ static inline int search(const {type} *nodes, int count, {type} x)
 """Functions beyond math.h; of the two sides of a comparison, maximum and minimum let NaN pass."""
 
 
+_STRICT = """#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "compile without -ffast-math and -ffinite-math-only: what is not finite would go unnoticed"
+#endif"""
+
+
 class Scalar(Dialect):
     """Plain C99.
 
@@ -132,7 +137,8 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
     declarations = list(table_declarations(tables, dialect))
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
     helpers = [_helper(name, precision) for name in HELPERS if name in used]
-    parts = [head, f'#include "{prefix}.h"\n\n#include <math.h>', "\n".join(declarations), *helpers, *bodies]
+    includes = f'#include "{prefix}.h"\n\n#include <math.h>'
+    parts = [head, includes, _STRICT, "\n".join(declarations), *helpers, *bodies]
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
@@ -145,10 +151,9 @@ def signature(prefix: str, function: Function) -> str:
     """The head of a function; each argument in a line of its own if they do not fit into one."""
     arguments = [f"const {prefix}_{structure.name} *{name}" for name, structure in function.arguments]
     result = f"{prefix}_{function.result.name} *{function.result.name}"
-    returned = "unsigned" if function.flagged else "void"
-    lines = [f"{returned} {prefix}_{function.name}({', '.join([*arguments, result])})"]
+    lines = [f"unsigned {prefix}_{function.name}({', '.join([*arguments, result])})"]
     if len(lines[0]) > WIDTH:
-        lines = [f"{returned} {prefix}_{function.name}(", ",\n    ".join([*arguments, result]) + ")"]
+        lines = [f"unsigned {prefix}_{function.name}(", ",\n    ".join([*arguments, result]) + ")"]
     return "\n    ".join(lines)
 
 
@@ -170,6 +175,5 @@ def _definition(prefix: str, function: Function, program: Program, writer: Write
             value = writer.value(output, kind, names)
             yield f"    {function.result.name}->{entry} = {value};"
             flags += [value] if array.bits and isinstance(output, Symbol) else []
-    if function.flagged:
-        yield f"    return {' | '.join(flags) or '0u'};"
+    yield f"    return {' | '.join(flags) or '0u'};"
     yield "}"
