@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -17,12 +16,6 @@ from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, finite, has, not_finit
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
-
-PLACES = ("phi", "theta", "tau_spring")
-"""What the motors have at every step that is feasible."""
-
-RATES = ("dphi", "dtheta", "ddtheta", "tau_motor", "motor_power")
-"""What they have where it is regular as well."""
 
 
 class Drive(NamedTuple):
@@ -90,20 +83,16 @@ def drive(
 def _not_finite(actuator: Actuator, of_joint: OfJoint) -> BoolArray:
     """Where something of the motors is no finite number, and neither infeasible nor singular says why.
 
-    Of a demand that is no finite number itself, neither can be said.
+    Of a demand that is no finite number itself, neither can be said. By (69) and (73)-(74) everything of a
+    motor goes into its position or its power; singular steps have no power.
     """
-    demand = finite([of_joint["tau_e"], *(of_joint[key] for key in actuator.commanded)])
-    placed, moved = (finite(_of_motors(actuator, of_joint, names)) for names in (PLACES, RATES))
+    theta, tau_spring, power = (
+        finite(of_joint[name][: actuator.motor_count]) for name in ("theta", "tau_spring", "motor_power")
+    )
     infeasible, singular = (has(of_joint["flags"], flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
-    defined = infeasible | (placed & (singular | moved))
-    return ~(demand & defined)
-
-
-def _of_motors(actuator: Actuator, of_joint: OfJoint, names: Iterable[str]) -> Iterator[FloatArray]:
-    """The rows (samples,) of variables of the motors that the actuator has."""
-    for name in names:
-        there = actuator.has(VARIABLES[name])
-        yield from (row for row, is_there in zip(of_joint[name], there, strict=True) if is_there)
+    explained = infeasible | (theta & tau_spring & (singular | power))
+    demand = finite([of_joint["tau_e"], *(of_joint[key] for key in actuator.commanded)])
+    return ~(demand & explained)
 
 
 def _published(actuator: Actuator, phi: FloatArray) -> FloatArray:
