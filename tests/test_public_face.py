@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray
+from samples.results import writing
 from samples.robots import vsa_3r
 from samples.simulated import short_motion
 
@@ -38,7 +39,6 @@ from vsacli import (
     state_derivative,
     suggest,
 )
-from vsacli.results.store.writer import ResultWriter
 
 REPOSITORY = Path(__file__).parents[1]
 ROBOT = REPOSITORY / "robots" / "vsa_3r.yaml"
@@ -141,7 +141,7 @@ def test_a_saved_result_is_opened_as_what_it_was(result: Result, tmp_path: Path)
 @pytest.mark.slow
 def test_a_variable_that_was_not_stored_is_missed_by_name(result: Result, tmp_path: Path) -> None:
     path = tmp_path / "part.h5"
-    with ResultWriter(path, result.robot, result.trajectory, ["q"]) as writer:
+    with writing(path, result.robot, result.trajectory, ["q"]) as writer:
         writer.write(result)
         writer.finish(result.report.as_json())
     with open_result(path) as opened:

@@ -12,6 +12,7 @@ from timing import medians
 
 from vsacli import load_trajectory
 from vsacli.analysis.run import Run
+from vsacli.base.outputs import Outputs
 from vsacli.base.variables import Block
 from vsacli.compute.engine import choose
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
@@ -77,7 +78,8 @@ def _run(run: Run) -> None:
 def _write(blocks: Sequence[Block], robot: Robot, trajectory: Trajectory) -> None:
     with (
         tempfile.TemporaryDirectory() as folder,
-        ResultWriter(Path(folder, "result.h5"), robot, trajectory, VARIABLES) as writer,
+        Outputs() as outputs,
+        ResultWriter(outputs.file(Path(folder, "result.h5")), robot, trajectory, VARIABLES) as writer,
     ):
         for block in blocks:
             writer.write(block)

@@ -65,7 +65,7 @@ def test_a_file_in_place_of_the_folder(vsacli: Run, tmp_path: Path) -> None:
     (tmp_path / "arm").write_text("mine")
     outcome = vsacli("codegen", ROBOT, "-o", "arm", "--overwrite")
     assert outcome.code == Exit.STORAGE
-    assert "arm: is a file; name a folder for the code" in outcome.err
+    assert "arm: is a file; name a folder" in outcome.err
     assert (tmp_path / "arm").read_text() == "mine"
 
 
@@ -82,7 +82,7 @@ def test_a_folder_that_cannot_be_made(vsacli: Run, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
     outcome = vsacli("codegen", ROBOT, "-o", "file/arm")
     assert outcome.code == Exit.STORAGE
-    assert "file/arm: cannot be written" in outcome.err
+    assert "file/arm: file is a file; name a folder" in outcome.err
     assert contents(tmp_path) == {"file": b"mine"}
 
 

@@ -13,9 +13,9 @@ from samples.command_line import contents
 from samples.marks import slow
 
 from vsacli import inverse_dynamics, load_trajectory
-from vsacli.base.errors import InputError, StorageError
+from vsacli.base.errors import InputError
 from vsacli.files import examples as module
-from vsacli.files.examples import Example, ExampleTrajectory, copy_examples, examples
+from vsacli.files.examples import Example, ExampleTrajectory, examples
 
 EXAMPLES = examples()
 RUNS = [(example, trajectory) for example in EXAMPLES for trajectory in example.trajectories]
@@ -56,7 +56,7 @@ def test_example_says_where_its_numbers_come_from(example: Example):
     ids=RUN_NAMES,
 )
 def test_every_command_takes_it(example: Example, trajectory: ExampleTrajectory, vsacli: Callable[..., Any]):
-    copy_examples([example.name], ".")
+    assert vsacli("examples", example.name, "--copy", ".").code == 0
     robot, motion = Path("robots", example.path.name), Path("trajectories", trajectory.path.name)
     motion.write_text(re.sub(r"rate: \d+", "rate: 100", motion.read_text()))
     assert vsacli("invdyn", robot, motion, "-o", "result.h5").code == 0
@@ -114,10 +114,11 @@ def test_files_that_exist_are_kept(vsacli: Callable[..., Any], tmp_path: Path):
     assert changed.read_text() != "mine"
 
 
-def test_a_folder_that_cannot_be_made(tmp_path: Path):
+def test_a_folder_that_cannot_be_made(vsacli: Callable[..., Any], tmp_path: Path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(StorageError, match=r"file.*: cannot be written: Not a directory"):
-        copy_examples(["rp_2"], tmp_path / "file")
+    outcome = vsacli("examples", "rp_2", "--copy", "file")
+    assert outcome.code == 4
+    assert outcome.err == "file/robots: file is a file; name a folder\n"
 
 
 def test_an_unknown_name_gets_the_nearest(vsacli: Callable[..., Any]):

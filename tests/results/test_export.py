@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from samples.results import python, random_block, write_result
 
-from vsacli.base.errors import InputError, StorageError
+from vsacli.base.errors import InputError
+from vsacli.base.outputs import Outputs
 from vsacli.base.variables import Block
 from vsacli.results import csv_export as export
-from vsacli.results.csv_export import UndefinedSamplesError, export_csv, export_csv_file
+from vsacli.results.csv_export import UndefinedSamplesError, export_csv
 from vsacli.results.store.reader import StoredResult
 
 SAMPLES = 241
@@ -178,43 +179,42 @@ def test_undefined_samples_between_the_exported_ones_do_not_matter(stored, block
         rows(result)
 
 
+def export_file(result, path, variables=None):
+    with Outputs() as outputs, outputs.file(path).opened() as stream:
+        export_csv(result, stream, variables)
+
+
 def test_a_file_is_written_under_its_name(stored, block, tmp_path):
     result = stored(block)
-    export_csv_file(result, tmp_path / "out.csv", ["q"])
+    export_file(result, tmp_path / "out.csv", ["q"])
     text = (tmp_path / "out.csv").read_bytes().decode()
     assert list(csv.reader(text.splitlines())) == rows(result, ["q"])
     assert "\r" not in text
-
-
-def test_an_existing_file_is_replaced_only_on_request(stored, block, tmp_path):
-    target = tmp_path / "out.csv"
-    target.write_text("old")
-    result = stored(block)
-    with pytest.raises(StorageError, match=r"out\.csv: exists already; .*--overwrite"):
-        export_csv_file(result, target)
-    assert target.read_text() == "old"
-    export_csv_file(result, target, overwrite=True)
-    assert target.read_text().startswith("time,")
 
 
 def test_a_refused_export_leaves_no_file(stored, block, tmp_path):
     result = stored(without(block, "tau_motor", (0, 0)))
     before = set(tmp_path.iterdir())
     with pytest.raises(UndefinedSamplesError):
-        export_csv_file(result, tmp_path / "out.csv")
+        export_file(result, tmp_path / "out.csv")
     assert set(tmp_path.iterdir()) == before
 
 
 FULL = """
 import resource
 from vsacli.base.errors import StorageError
-from vsacli.results.csv_export import export_csv_file
+from vsacli.base.outputs import Outputs
+from vsacli.results.csv_export import export_csv
 from vsacli.results.store.reader import StoredResult
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
 try:
-    with StoredResult.open("r.h5") as result:
-        export_csv_file(result, "out.csv")
+    with (
+        StoredResult.open("r.h5") as result,
+        Outputs() as outputs,
+        outputs.file("out.csv").opened() as stream,
+    ):
+        export_csv(result, stream)
 except StorageError as error:
     print(error)
 """

@@ -14,12 +14,22 @@ import numpy as np
 import pytest
 import xarray
 from samples.marks import slow
-from samples.results import REPORT, SOURCE, PlannedTrajectory, part, random_block, robot, write_result
+from samples.results import (
+    REPORT,
+    SOURCE,
+    PlannedTrajectory,
+    part,
+    random_block,
+    robot,
+    write_result,
+    writing,
+)
 
 from vsacli.actuators.laws import LAWS
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
+from vsacli.base.outputs import Staged
 from vsacli.base.units import POSITION
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import number
@@ -156,7 +166,7 @@ def test_floats_are_plain_and_flags_compressed(path):
 @pytest.mark.parametrize(("joints", "samples"), [(1, 100), (3, 4001), slow(7, 400_000), slow(1000, 5000)])
 def test_chunks_hold_about_a_megabyte_or_less(tmp_path, joints, samples):
     path = tmp_path / "r.h5"
-    with ResultWriter(path, robot("R" * joints), PlannedTrajectory(samples)) as writer:
+    with writing(path, robot("R" * joints), PlannedTrajectory(samples)) as writer:
         writer.write(random_block(1, joints))
         writer.finish(REPORT)
     with h5py.File(path) as file:
@@ -204,7 +214,7 @@ def test_blocks_of_any_size_give_the_same_file(tmp_path, block, monkeypatch):
 
 def test_a_run_that_ends_early_keeps_the_steps_so_far(tmp_path, block):
     path = tmp_path / "r.h5"
-    with ResultWriter(path, robot(), PlannedTrajectory(10_000)) as writer:
+    with writing(path, robot(), PlannedTrajectory(10_000)) as writer:
         writer.write(part(block, 0, 120))
         writer.finish({**REPORT, "verdict": "infeasible", "complete": False})
     with StoredResult.open(path) as result:
@@ -231,8 +241,9 @@ def test_a_selection_is_stored_with_its_coordinates(tmp_path, block):
 
 
 def test_an_unknown_variable_is_refused_before_anything_is_written(tmp_path):
+    path = tmp_path / "r.h5"
     with pytest.raises(InputError, match="no variable is called 'tau_motr'; did you mean 'tau_motor'"):
-        ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(1), ["tau_motr"])
+        ResultWriter(Staged(path, path, path), robot(), PlannedTrajectory(1), ["tau_motr"])
     assert list(tmp_path.iterdir()) == []
 
 
@@ -246,7 +257,7 @@ def test_files_that_were_read_are_stored_once_each(tmp_path, block):
     motion = Source("swing.yaml", hashlib.sha256(text.encode()).hexdigest(), text)
     noise = Source("motion\udcff.csv", "f" * 64, None)
     trajectory = PlannedTrajectory(SAMPLES, sources=(motion, noise, noise, SOURCE))
-    with ResultWriter(tmp_path / "r.h5", robot(), trajectory) as writer:
+    with writing(tmp_path / "r.h5", robot(), trajectory) as writer:
         writer.write(block)
         writer.finish(REPORT)
     with h5py.File(tmp_path / "r.h5") as file:

@@ -9,20 +9,18 @@ import subprocess
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from samples.results import PlannedTrajectory, python, random_block, robot, write_result
+from samples.results import PlannedTrajectory, python, random_block, robot, write_result, writing
 
 from vsacli.base.errors import StorageError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.writer import ResultWriter
 
 ENDLESS = """
 import sys
-from samples.results import PlannedTrajectory, random_block, robot
-from vsacli.results.store.writer import ResultWriter
+from samples.results import PlannedTrajectory, random_block, robot, writing
 
 block = random_block(2000, 2)
-with ResultWriter("r.h5", robot(), PlannedTrajectory(10**7), overwrite=True) as writer:
+with writing("r.h5", robot(), PlannedTrajectory(10**7), overwrite=True) as writer:
     writer.write(block)
     print("writing", flush=True)
     while True:
@@ -132,7 +130,7 @@ def test_a_disk_that_is_too_small_is_refused_before_the_first_step(tmp_path, mon
     match = r"r\.h5: needs 684 MB, but the disk has 0 MB left; free some space, or store fewer"
     with (
         pytest.raises(StorageError, match=match),
-        ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(10**6)),
+        writing(tmp_path / "r.h5", robot(), PlannedTrajectory(10**6)),
     ):
         pytest.fail("the writer was opened")
     assert list(tmp_path.iterdir()) == []

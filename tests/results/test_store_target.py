@@ -12,17 +12,17 @@ from samples.results import (
     ordinary_user,
     robot,
     write_result,
+    writing,
 )
 
-from vsacli.base.atomic_files import AtomicFile
 from vsacli.base.errors import StorageError
+from vsacli.base.outputs import Outputs
 from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.writer import ResultWriter
 
 
 def test_an_exception_of_the_caller_passes_through_and_leaves_nothing(tmp_path, block):
     def run():
-        with ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(99)) as writer:
+        with writing(tmp_path / "r.h5", robot(), PlannedTrajectory(99)) as writer:
             writer.write(block)
             raise ZeroDivisionError
 
@@ -32,22 +32,25 @@ def test_an_exception_of_the_caller_passes_through_and_leaves_nothing(tmp_path, 
 
 
 def test_leaving_without_finish_leaves_nothing(tmp_path, block):
-    with ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
-        writer.write(block)
+    def run():
+        with writing(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
+            writer.write(block)
+
+    with pytest.raises(RuntimeError, match="without `finish`"):
+        run()
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_name_is_free_until_finish(tmp_path, block):
-    with ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
+def test_the_name_is_free_until_the_file_is_finished(tmp_path, block):
+    with writing(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
         writer.write(block)
-        assert not (tmp_path / "r.h5").exists()
         writer.finish(REPORT)
-        assert (tmp_path / "r.h5").exists()
+        assert not (tmp_path / "r.h5").exists()
     assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
 
 
 def test_an_existing_file_is_refused_before_the_first_step(tmp_path, old):
-    writer = ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(50))
+    writer = writing(tmp_path / "r.h5", robot(), PlannedTrajectory(50))
     with pytest.raises(StorageError, match=r"r\.h5: exists already; .*--overwrite"), writer:
         pytest.fail("the writer was opened")
     assert (tmp_path / "r.h5").read_bytes() == old
@@ -71,11 +74,15 @@ def test_an_existing_file_is_replaced_on_request(tmp_path, block):
 def test_a_file_that_appears_during_the_run_is_not_replaced(tmp_path, block, monkeypatch, links):
     if not links:
         monkeypatch.setattr(os, "link", no_links)
-    with ResultWriter(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
-        writer.write(block)
-        (tmp_path / "r.h5").write_bytes(b"another run")
-        with pytest.raises(StorageError, match="exists already"):
+
+    def run():
+        with writing(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
+            writer.write(block)
             writer.finish(REPORT)
+            (tmp_path / "r.h5").write_bytes(b"another run")
+
+    with pytest.raises(StorageError, match="exists already"):
+        run()
     assert (tmp_path / "r.h5").read_bytes() == b"another run"
     assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
 
@@ -120,8 +127,8 @@ def test_a_link_goes_on_pointing_to_the_file(tmp_path, block):
 )
 def test_targets_that_cannot_be(tmp_path, name, match):
     os.mkfifo(tmp_path / "fifo")
-    with pytest.raises(StorageError, match=match), AtomicFile(tmp_path / name, overwrite=True):
-        pytest.fail("the file was opened")
+    with pytest.raises(StorageError, match=match), Outputs(overwrite=True) as outputs:
+        outputs.file(tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == ["fifo"]
 
 
@@ -130,6 +137,6 @@ def test_a_folder_that_may_not_be_written(tmp_path):
     with (
         ordinary_user(),
         pytest.raises(StorageError, match="cannot be written: no permission to write into this folder"),
-        AtomicFile(tmp_path / "r.h5"),
+        Outputs() as outputs,
     ):
-        pytest.fail("the file was opened")
+        outputs.file(tmp_path / "r.h5")

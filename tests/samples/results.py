@@ -16,6 +16,7 @@ import numpy as np
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
+from vsacli.base.outputs import Outputs
 from vsacli.base.signals import WRENCH
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.documents.source import Source
@@ -86,6 +87,18 @@ def part(block: Block, start: int, stop: int) -> Block:
     return Block(**{name: array[start:stop] for name, array in block.arrays().items()})
 
 
+@contextlib.contextmanager
+def writing(
+    path: Path, *arguments: object, overwrite: bool = False, **options: object
+) -> Iterator[ResultWriter]:
+    """A writer of a file that has its name when the context is left."""
+    with (
+        Outputs(overwrite=overwrite) as outputs,
+        ResultWriter(outputs.file(path), *arguments, **options) as writer,
+    ):
+        yield writer
+
+
 def write_result(
     path: Path,
     block: Block,
@@ -98,7 +111,7 @@ def write_result(
     """Store a block in parts of `step` samples; `options` go to the writer."""
     samples = len(block.time)
     trajectory = PlannedTrajectory(planned or samples)
-    with ResultWriter(path, robot(kinds), trajectory, **options) as writer:
+    with writing(path, robot(kinds), trajectory, **options) as writer:
         for start in range(0, samples, step):
             writer.write(part(block, start, start + step))
         writer.finish({**REPORT, "samples": samples})

@@ -66,9 +66,13 @@ class Result(Shown, Block):
             StorageError: the file exists and must not be replaced, cannot be written, or its disk is
                 full.
         """
+        from vsacli.base.outputs import Outputs
         from vsacli.results.store.writer import ResultWriter
 
-        with ResultWriter(Path(path), self.robot, self.trajectory, overwrite=overwrite) as writer:
+        with (
+            Outputs(overwrite=overwrite) as outputs,
+            ResultWriter(outputs.file(Path(path)), self.robot, self.trajectory) as writer,
+        ):
             writer.write(self)
             writer.finish(self.report.as_json())
 

@@ -56,7 +56,7 @@ def check_target(path: str | Path, *, overwrite: bool) -> Path:
         if target.exists() and not target.is_file():
             raise StorageError(path, "is not a regular file and cannot be replaced")
         if target.exists() and not overwrite:
-            raise _taken(path)
+            raise already_there(path)
     return target
 
 
@@ -127,10 +127,10 @@ class AtomicFile:
         try:
             os.link(self.temporary, self.target)
         except FileExistsError as error:
-            raise _taken(self._path) from error
+            raise already_there(self._path) from error
         except OSError as error:  # no hard links on this file system (exFAT, some network shares)
             if self.target.exists():
-                raise _taken(self._path) from error
+                raise already_there(self._path) from error
             self.temporary.replace(self.target)
 
     def __exit__(
@@ -152,7 +152,8 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> None:
         file.publish()
 
 
-def _taken(path: str | Path) -> StorageError:
+def already_there(path: str | Path) -> StorageError:
+    """What to say of a file that must not be replaced."""
     return StorageError(path, "exists already; choose another name, or replace it with --overwrite")
 
 

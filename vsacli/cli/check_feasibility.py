@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -29,6 +28,7 @@ from vsacli.cli.console import Talk, talk_options
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
+    from vsacli.base.outputs import Outputs
     from vsacli.robot.model import Robot
     from vsacli.studies.remedies import Suggestions
 
@@ -92,6 +92,7 @@ def check_feasibility(
     inputs = load_inputs(robot, trajectory, talk)
     from vsacli.analysis.run import Run
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
+    from vsacli.base.outputs import Outputs
     from vsacli.studies.remedies import check_fixed_target, fixed_paths, suggest
 
     margin = NEAR_SINGULAR_MARGIN if near_singular is None else near_singular
@@ -101,11 +102,6 @@ def check_feasibility(
         for path in fixed_paths(fixed):
             refuse_input_as_output(path, inputs.files)
     stem = run_stem(robot, trajectory)
-    if plot_folder is not None:
-        from vsacli.results.plots import FEASIBILITY, check_drawable, check_figures
-
-        check_drawable([joint.actuator_type for joint in inputs.robot.joints])
-        check_figures([FEASIBILITY], plot_folder, stem, overwrite=overwrite)
     run = Run(
         *inputs,
         stop_on_infeasible=stop_on_infeasible,
@@ -114,34 +110,39 @@ def check_feasibility(
         engine=engine,
         threads=threads,
     )
-    report, figures = (compute(run, talk), None) if plot_folder is None else _compute_and_draw(run, talk)
+    if plot_folder is None:
+        report = compute(run, talk)
+    else:
+        with Outputs(overwrite=overwrite) as outputs:
+            report = _compute_and_draw(run, plot_folder, stem, outputs, talk)
+        talk.wrote(outputs)
     suggestions = suggest(*inputs, margin) if advise or fixed is not None else None
     if suggestions is not None and fixed is not None:
         _write_fixed(suggestions, inputs.robot, fixed, overwrite, talk)
-    code = show_report(report, as_json, suggestions)
-    if plot_folder is not None and figures is not None:
-        _save(figures, plot_folder, stem, overwrite, talk)
-    return code
+    return show_report(report, as_json, suggestions)
 
 
-def _compute_and_draw(run: Run, talk: Talk) -> tuple[Report, Mapping[str, Any]]:
-    """Compute, and draw figures, by name, from a result file that exists no longer than it takes."""
-    from vsacli.results.plots import FEASIBILITY, FEASIBILITY_VARIABLES, plot_feasibility
+def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: Talk) -> Report:
+    """Compute, and draw the figure from a result file that exists no longer than it takes."""
+    from vsacli.base.outputs import Outputs
+    from vsacli.results.plots import (
+        FEASIBILITY,
+        FEASIBILITY_VARIABLES,
+        FigureFiles,
+        check_drawable,
+        plot_feasibility,
+    )
     from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
 
-    with TemporaryDirectory(prefix="vsacli-") as folder:
-        path = Path(folder) / "result.h5"
-        report = compute(run, talk, ResultWriter(path, run.robot, run.trajectory, FEASIBILITY_VARIABLES))
-        with StoredResult.open(path) as result:
-            return report, {FEASIBILITY: plot_feasibility(result)}
-
-
-def _save(figures: Mapping[str, Any], folder: str, stem: str, overwrite: bool, talk: Talk) -> None:
-    from vsacli.results.plots import save_figures
-
-    for path in save_figures(figures, folder, stem, overwrite=overwrite):
-        talk.note(f"wrote {path}")
+    check_drawable([joint.actuator_type for joint in run.robot.joints])
+    figures = FigureFiles([FEASIBILITY], folder, stem, "png", outputs)
+    with TemporaryDirectory(prefix="vsacli-") as place, Outputs() as passing:
+        file = passing.file(Path(place) / "result.h5")
+        report = compute(run, talk, ResultWriter(file, run.robot, run.trajectory, FEASIBILITY_VARIABLES))
+        with StoredResult.open(file.temporary) as result:
+            figures.save({FEASIBILITY: plot_feasibility(result)})
+    return report
 
 
 def _write_fixed(suggestions: Suggestions, robot: Robot, path: str, overwrite: bool, talk: Talk) -> None:

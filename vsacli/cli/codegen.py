@@ -30,12 +30,15 @@ def codegen(robot: str, output: str, precision: str, overwrite: bool, talk: Talk
     C99 that needs nothing but math.h: no allocation, nothing kept between calls, a bounded number of
     operations. A test program with reference values, a Makefile and a README come along.
     """
+    from vsacli.base.outputs import Outputs
     from vsacli.control.codegen.project import generate, write
     from vsacli.robot.file import load_robot
 
-    project = generate(load_robot(robot), precision)
-    for path in write(project, output, overwrite=overwrite):
-        talk.note(f"wrote {path}")
+    arm = load_robot(robot)
+    project = generate(arm, precision)
+    with Outputs(overwrite=overwrite, inputs=[source.path for source in arm.sources]) as outputs:
+        write(project, output, outputs)
+    talk.wrote(outputs)
     for reason in project.omitted:
         talk.note(reason)
     for warning in project.warnings:

@@ -9,11 +9,14 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any, Self, TextIO, cast
+from typing import TYPE_CHECKING, Any, Self, TextIO, cast
 
 import click
 
 from vsacli.base.errors import StorageError
+
+if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs
 
 PROGRESS_FROM = 100_000
 """Steps from which on a run is long enough for a progress bar."""
@@ -76,6 +79,11 @@ class Talk:
         """Something most users want to know."""
         if not self.quiet:
             tell(message)
+
+    def wrote(self, outputs: Outputs) -> None:
+        """What was written."""
+        for path in outputs.paths:
+            self.note(f"wrote {path}")
 
     def detail(self, message: str) -> None:
         """Something to know when looking closely."""

@@ -30,6 +30,7 @@ def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: 
     without names, every file that comes along does. Nothing is copied if one of the files exists there,
     unless --overwrite.
     """
+    from vsacli.base.outputs import Outputs
     from vsacli.files.examples import copy_examples
     from vsacli.files.examples import examples as shipped
 
@@ -37,8 +38,9 @@ def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: 
         click.echo("\n".join(line for each in shipped(names) for line in _lines(each)))
         talk.note("get them with vsacli examples --copy FOLDER, or vsacli examples ROBOT... --copy FOLDER")
         return
-    for path in copy_examples(names, folder, overwrite=overwrite):
-        talk.note(f"wrote {path}")
+    with Outputs(overwrite=overwrite) as outputs:
+        copy_examples(names, folder, outputs)
+    talk.wrote(outputs)
 
 
 def _lines(shown: Example) -> Iterator[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Any, TextIO
 
 import click
@@ -12,7 +11,6 @@ from vsacli.base.errors import StorageError
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
-    refuse_input_as_output,
     result_line,
     variables_option,
 )
@@ -61,7 +59,8 @@ def export(
     With --side motor, motion and torque of the motors are those of their shafts, in rad and N m at any joint;
     every motor needs a gear_ratio in the robot file. What is not of a motor stays as it is.
     """
-    from vsacli.results.csv_export import UndefinedSamplesError, export_csv, export_csv_file
+    from vsacli.base.outputs import Outputs
+    from vsacli.results.csv_export import UndefinedSamplesError, export_csv
     from vsacli.results.store.simulation import open_stored
 
     options: dict[str, Any] = {"rate": rate, "allow_nan": allow_nan, "side": side}
@@ -72,9 +71,12 @@ def export(
                 export_csv(stored, _stdout(), variables, **options)
                 sys.stdout.flush()
             else:
-                refuse_input_as_output(Path(output), [file])
-                export_csv_file(stored, output, variables, overwrite=overwrite, **options)
-                talk.note(f"wrote {output}")
+                with (
+                    Outputs(overwrite=overwrite, inputs=[file]) as outputs,
+                    outputs.file(output).opened() as stream,
+                ):
+                    export_csv(stored, stream, variables, **options)
+                talk.wrote(outputs)
     except UndefinedSamplesError as error:
         tell(str(error))
         return Exit.VERDICT

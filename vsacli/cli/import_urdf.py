@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.cli.command_parts import example, overwrite_option, refuse_input_as_output
+from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 
 
@@ -88,14 +88,14 @@ def import_urdf(
     Prints the rows, what was left out or changed, and how far the kinematics stray from the URDF's. A URDF
     says nothing about motors and springs: these are placeholders, marked in the file.
     """
-    from vsacli.base.atomic_files import check_target, write_text
+    from vsacli.base.outputs import Outputs
     from vsacli.robot import urdf as conversions
 
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
-    refuse_input_as_output(path, [urdf])
     placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)
-    check_target(path, overwrite=overwrite)
-    conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap)
-    write_text(path, conversions.robot_text(conversion), overwrite=overwrite)
+    with Outputs(overwrite=overwrite, inputs=[urdf]) as outputs:
+        file = outputs.file(path)
+        conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap)
+        file.write_text(conversions.robot_text(conversion))
     click.echo(conversions.render(conversion))
-    talk.note(f"wrote {path}")
+    talk.wrote(outputs)

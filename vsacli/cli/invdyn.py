@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -17,7 +18,6 @@ from vsacli.cli.command_parts import (
     json_option,
     load_inputs,
     overwrite_option,
-    refuse_input_as_output,
     robot_argument,
     run_stem,
     show_report,
@@ -26,6 +26,11 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.plot import draw_staged
+
+if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs
+    from vsacli.results.plots import FigureFiles
 
 
 @click.command(
@@ -73,33 +78,34 @@ def invdyn(
     """
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
-    refuse_input_as_output(path, inputs.files)
     from vsacli.analysis.run import Run
-    from vsacli.base.atomic_files import check_target
-    from vsacli.base.variables import VARIABLES
+    from vsacli.base.outputs import Outputs
     from vsacli.results.store.writer import ResultWriter
 
-    if plot_folder is not None:
-        from vsacli.results.plots import RESULT_DRAWINGS, check_figures, drawable_figures
-
-        drawn = drawable_figures(RESULT_DRAWINGS, VARIABLES if variables is None else variables)
-        check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)
-    writer = ResultWriter(
-        path, *inputs, variables, overwrite=overwrite, command_line=shlex.join(["vsacli", *sys.argv[1:]])
-    )
-    check_target(path, overwrite=overwrite)
-    run = Run(
-        *inputs,
-        stop_on_infeasible=stop_on_infeasible,
-        deflections=deflections,
-        engine=engine,
-        threads=threads,
-    )
-    report = compute(run, talk, writer)
+    with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
+        file = outputs.file(path)
+        command_line = shlex.join(["vsacli", *sys.argv[1:]])
+        writer = ResultWriter(file, *inputs, variables, command_line=command_line)
+        figures = None if plot_folder is None else _figures(plot_folder, path.stem, variables, outputs)
+        run = Run(
+            *inputs,
+            stop_on_infeasible=stop_on_infeasible,
+            deflections=deflections,
+            engine=engine,
+            threads=threads,
+        )
+        report = compute(run, talk, writer)
+        if figures is not None:
+            draw_staged(file, figures, talk)
     code = show_report(report, as_json)
-    talk.note(f"wrote {path}")
-    if plot_folder is not None:
-        from vsacli.cli.plot import draw_file
-
-        draw_file(path, Path(plot_folder), "png", overwrite, talk)
+    talk.wrote(outputs)
     return code
+
+
+def _figures(folder: str, stem: str, variables: tuple[str, ...] | None, outputs: Outputs) -> FigureFiles:
+    """Those that the variables which are stored allow."""
+    from vsacli.base.variables import VARIABLES
+    from vsacli.results.plots import RESULT_DRAWINGS, FigureFiles, drawable_figures
+
+    drawn = drawable_figures(RESULT_DRAWINGS, VARIABLES if variables is None else variables)
+    return FigureFiles(drawn, folder, stem, "png", outputs)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import click
 
 from vsacli.actuators.kinds import ACTUATORS
@@ -71,16 +73,17 @@ def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk
     from vsacli.files.templates import trajectory_template
     from vsacli.robot.file import load_robot
 
-    _write(
-        trajectory_template(None if robot_path is None else load_robot(robot_path)), output, overwrite, talk
-    )
+    robot = None if robot_path is None else load_robot(robot_path)
+    inputs = () if robot is None else [source.path for source in robot.sources]
+    _write(trajectory_template(robot), output, overwrite, talk, inputs)
 
 
-def _write(text: str, output: str | None, overwrite: bool, talk: Talk) -> None:
+def _write(text: str, output: str | None, overwrite: bool, talk: Talk, inputs: Iterable[str] = ()) -> None:
     if output is None:
         click.echo(text, nl=False)
         return
-    from vsacli.base.atomic_files import write_text
+    from vsacli.base.outputs import Outputs
 
-    write_text(output, text, overwrite=overwrite)
-    talk.note(f"wrote {output}")
+    with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
+        outputs.file(output).write_text(text)
+    talk.wrote(outputs)

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
+from vsacli.base.outputs import Outputs, Staged
 from vsacli.cli.command_parts import example, overwrite_option, result_line
 from vsacli.cli.console import Talk, talk_options
+
+if TYPE_CHECKING:
+    from vsacli.results.plots import FigureFiles
+    from vsacli.results.store.reader import StoredResult
 
 
 @click.command(
@@ -38,46 +44,50 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
     <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid joint by
     joint.
     """
-    if len(files) == 1:
-        draw_file(Path(files[0]), Path(folder), file_format, overwrite, talk)
-    else:
-        _draw_comparison([Path(file) for file in files], Path(folder), file_format, overwrite, talk)
+    with Outputs(overwrite=overwrite, inputs=files) as outputs:
+        if len(files) == 1:
+            _draw_file(Path(files[0]), Path(folder), file_format, outputs, talk)
+        else:
+            _draw_comparison([Path(file) for file in files], Path(folder), file_format, outputs, talk)
+    talk.wrote(outputs)
 
 
-def draw_file(path: Path, folder: Path, file_format: str, overwrite: bool, talk: Talk) -> None:
-    """Draw the figures of one file and say where they are."""
-    from vsacli.results.plots import (
-        check_figures,
-        drawable_figures,
-        drawings_of,
-        omitted_figures,
-        plot_stored,
-        save_figures,
-    )
+def _draw_file(path: Path, folder: Path, file_format: str, outputs: Outputs, talk: Talk) -> None:
+    """Draw the figures of one file."""
+    from vsacli.results.plots import FigureFiles, drawable_figures, drawings_of
     from vsacli.results.store.simulation import open_stored
 
     with open_stored(path) as stored:
         talk.detail(result_line(stored))
-        drawings = drawings_of(stored)
-        drawn = drawable_figures(drawings, stored.variables, path)
-        check_figures(drawn, folder, path.stem, file_format, overwrite=overwrite)
-        for reason in omitted_figures(drawings, stored.variables).values():
-            talk.note(f"{path}: {reason}")
-        saved = save_figures(plot_stored(stored), folder, path.stem, file_format, overwrite=overwrite)
-    for figure in saved:
-        talk.note(f"wrote {figure}")
+        drawn = drawable_figures(drawings_of(stored), stored.variables, path)
+        _draw(stored, path, FigureFiles(drawn, folder, path.stem, file_format, outputs), talk)
 
 
-def _draw_comparison(paths: list[Path], folder: Path, file_format: str, overwrite: bool, talk: Talk) -> None:
-    from vsacli.results.plots import COMPARISON, check_figures, compare_files, save_figures
+def draw_staged(file: Staged, figures: FigureFiles, talk: Talk) -> None:
+    """Draw the figures of a file that this command has written."""
+    from vsacli.results.store.simulation import open_stored
+
+    with open_stored(file.temporary) as stored:
+        _draw(stored, file.path, figures, talk)
+
+
+def _draw(stored: StoredResult, path: Path, figures: FigureFiles, talk: Talk) -> None:
+    """Draw the figures of an open file and say which it has not the variables for."""
+    from vsacli.results.plots import drawings_of, omitted_figures, plot_stored
+
+    for reason in omitted_figures(drawings_of(stored), stored.variables).values():
+        talk.note(f"{path}: {reason}")
+    figures.save(plot_stored(stored))
+
+
+def _draw_comparison(paths: list[Path], folder: Path, file_format: str, outputs: Outputs, talk: Talk) -> None:
+    from vsacli.results.plots import COMPARISON, FigureFiles, compare_files
     from vsacli.results.store.simulation import open_stored
 
     stem = "-".join(path.stem for path in paths)
-    check_figures([COMPARISON], folder, stem, file_format, overwrite=overwrite)
+    files = FigureFiles([COMPARISON], folder, stem, file_format, outputs)
     with ExitStack() as stack:
-        files = [stack.enter_context(open_stored(path)) for path in paths]
-        for file in files:
-            talk.detail(result_line(file))
-        figure = compare_files(files)
-    for saved in save_figures({COMPARISON: figure}, folder, stem, file_format, overwrite=overwrite):
-        talk.note(f"wrote {saved}")
+        opened = [stack.enter_context(open_stored(path)) for path in paths]
+        for each in opened:
+            talk.detail(result_line(each))
+        files.save({COMPARISON: compare_files(opened)})

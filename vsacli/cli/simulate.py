@@ -21,17 +21,19 @@ from vsacli.cli.command_parts import (
     json_option,
     load_inputs,
     overwrite_option,
-    refuse_input_as_output,
     robot_argument,
     run_stem,
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, talk_options
+from vsacli.cli.plot import draw_staged
 
 if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs
     from vsacli.control.gains import Gains
     from vsacli.control.simulation import Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
+    from vsacli.results.plots import FigureFiles
     from vsacli.results.store.simulation import SimulationWriter
     from vsacli.robot.model import Robot
     from vsacli.trajectory.trajectory import Trajectory
@@ -131,24 +133,27 @@ def simulate(
     if gains is not None:  # the file of the poles is one of the inputs that the result records
         arm = replace(inputs.robot, sources=(*inputs.robot.sources, *gains.sources))
         inputs = inputs._replace(robot=arm)
-    refuse_input_as_output(path, inputs.files)
+    from vsacli.base.outputs import Outputs
     from vsacli.results.store.simulation import SimulationWriter
 
-    if plot_folder is not None:
-        from vsacli.results.plots import check_figures, simulation_drawings
-
-        drawn = simulation_drawings(joint.actuator_type for joint in inputs.robot.joints)
-        check_figures(drawn, plot_folder, path.stem, overwrite=overwrite)
-    command_line = shlex.join(["vsacli", *sys.argv[1:]])
-    writer = SimulationWriter(path, *inputs, overwrite=overwrite, command_line=command_line)
-    report = _run(simulation, inputs.trajectory, writer, talk)
+    with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
+        file = outputs.file(path)
+        figures = None if plot_folder is None else _figures(inputs.robot, plot_folder, path.stem, outputs)
+        command_line = shlex.join(["vsacli", *sys.argv[1:]])
+        writer = SimulationWriter(file, *inputs, command_line=command_line)
+        report = _run(simulation, inputs.trajectory, writer, talk)
+        if figures is not None:
+            draw_staged(file, figures, talk)
     code = _show(report, as_json)
-    talk.note(f"wrote {path}")
-    if plot_folder is not None:
-        from vsacli.cli.plot import draw_file
-
-        draw_file(path, Path(plot_folder), "png", overwrite, talk)
+    talk.wrote(outputs)
     return code
+
+
+def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFiles:
+    from vsacli.results.plots import FigureFiles, simulation_drawings
+
+    drawn = simulation_drawings(joint.actuator_type for joint in robot.joints)
+    return FigureFiles(drawn, folder, stem, "png", outputs)
 
 
 def _prepared(

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
 from itertools import takewhile
 from pathlib import Path
 
-from vsacli.base.atomic_files import AtomicFile, check_target, reporting_storage_errors
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.outputs import Outputs
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
 from vsacli.trajectory.file import load_trajectory
@@ -81,32 +81,29 @@ def examples(names: Iterable[str] = ()) -> list[Example]:
     return [example for name, example in found.items() if not wanted or name in wanted]
 
 
-def copy_examples(names: Iterable[str], folder: str | Path, *, overwrite: bool = False) -> list[Path]:
+def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) -> list[Path]:
     """Copy examples into `robots` and `trajectories` of a folder.
 
     Args:
         names: of the robots, copied with their trajectories and the tables these need; if there are none,
             everything that is shipped is copied, files to import too.
         folder: where to; it is made if it does not exist.
-        overwrite: whether files there may be replaced.
+        outputs: what the copies belong to.
 
     Returns:
         The copies.
 
     Raises:
         InputError: as `examples`.
-        StorageError: one of them exists and `overwrite` is false, so that none is copied, or a file cannot be
-            written.
+        StorageError: as `Outputs.file`.
     """
     chosen = list(names)
     sources = [path for example in examples(chosen) for path in example.files()] if chosen else _every_file()
     copies = {path: Path(folder) / path.relative_to(_root()) for path in sources}
-    _check_targets(list(copies.values()), overwrite)
+    for copy in copies.values():
+        outputs.folder(copy.parent)
     for path, copy in copies.items():
-        with AtomicFile(copy, overwrite=overwrite) as file:
-            with reporting_storage_errors(copy):
-                file.temporary.write_bytes(path.read_bytes())
-            file.publish()
+        outputs.file(copy).write_bytes(path.read_bytes())
     return list(copies.values())
 
 
@@ -119,15 +116,6 @@ def opening_comment(path: Path) -> str:
 def _every_file() -> list[Path]:
     found = (path for folder in ("robots", "trajectories") for path in (_root() / folder).iterdir())
     return sorted(path for path in found if path.is_file() and not path.name.startswith("."))
-
-
-def _check_targets(copies: Sequence[Path], overwrite: bool) -> None:
-    """Make the folders and refuse, before anything is copied, what cannot be."""
-    for folder in {copy.parent for copy in copies}:
-        with reporting_storage_errors(folder):
-            folder.mkdir(parents=True, exist_ok=True)
-    for copy in copies:
-        check_target(copy, overwrite=overwrite)
 
 
 def _root() -> Path:

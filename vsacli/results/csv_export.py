@@ -14,7 +14,6 @@ import numpy as np
 
 from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.base.atomic_files import AtomicFile, reporting_storage_errors
 from vsacli.base.errors import InputError, VsacliError
 from vsacli.base.variables import VARIABLES, Variable, column_names, select_variables
 from vsacli.results.store.reader import StoredResult
@@ -106,28 +105,6 @@ def export_csv(
                 values = values * result.gear_ratio**variable.geared
             columns += _cells(values, _existing(result, variable))
         writer.writerows(zip(*columns, strict=True))
-
-
-def export_csv_file(
-    result: StoredResult,
-    path: str | Path,
-    variables: Iterable[str] | None = None,
-    *,
-    rate: float | None = None,
-    allow_nan: bool = False,
-    side: Side = "joint",
-    overwrite: bool = False,
-) -> None:
-    """Do `export_csv` into a file that appears only when it is complete.
-
-    Raises:
-        StorageError: the file exists and `overwrite` is false, or it cannot be written.
-        InputError, UndefinedSamplesError: as `export_csv`.
-    """
-    with AtomicFile(path, overwrite=overwrite) as file:
-        with reporting_storage_errors(path), file.temporary.open("w", encoding="utf-8", newline="") as stream:
-            export_csv(result, stream, variables, rate=rate, allow_nan=allow_nan, side=side)
-        file.publish()
 
 
 def _headers(result: StoredResult, variable: Variable, on_shaft: bool) -> Iterator[str]:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from vsacli.base.atomic_files import check_target, reporting_storage_errors, write_text
-from vsacli.base.errors import InputError, StorageError
+from vsacli.base.errors import InputError
+from vsacli.base.outputs import Outputs
 from vsacli.base.version import __version__
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.header import comment, header_text
@@ -158,23 +158,15 @@ def prefix_of(robot: Robot) -> str:
     return name if re.match(r"[a-z]", name) else f"robot_{name}".rstrip("_")
 
 
-def write(project: Project, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
-    """Write the files into a folder, which is made if need be; their paths.
+def write(project: Project, folder: str | Path, outputs: Outputs) -> None:
+    """Write the files into a folder, which is made if need be.
 
     Raises:
-        StorageError: `folder` is a file, a file exists and `overwrite` is false, or the disk fails.
+        StorageError: as `Outputs.folder` and `Outputs.file`.
     """
-    paths = [Path(folder) / name for name in project.files]
-    if Path(folder).exists():
-        if not Path(folder).is_dir():
-            raise StorageError(folder, "is a file; name a folder for the code")
-        for path in paths:
-            check_target(path, overwrite=overwrite)
-    with reporting_storage_errors(folder):
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    for path, text in zip(paths, project.files.values(), strict=True):
-        write_text(path, text, overwrite=overwrite)
-    return paths
+    outputs.folder(folder)
+    for name, text in project.files.items():
+        outputs.file(Path(folder) / name).write_text(text)
 
 
 def _plural(joints: int) -> str:

@@ -15,7 +15,7 @@ from vsacli.results.plots.figures import (
     plot_stored,
     simulation_drawings,
 )
-from vsacli.results.plots.files import FORMATS, check_figures, save_figures
+from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
 
 __all__ = [
     "COMPARISON",
@@ -23,8 +23,8 @@ __all__ = [
     "FEASIBILITY_VARIABLES",
     "FORMATS",
     "RESULT_DRAWINGS",
+    "FigureFiles",
     "check_drawable",
-    "check_figures",
     "compare_files",
     "drawable_figures",
     "drawings_of",

@@ -7,16 +7,16 @@ import io
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, Self
 
 import h5py
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.atomic_files import AtomicFile, check_free_space, reporting_storage_errors, storage_error
+from vsacli.base.atomic_files import check_free_space, reporting_storage_errors, storage_error
 from vsacli.base.errors import InputError
 from vsacli.base.interrupts import interrupts_deferred
+from vsacli.base.outputs import Staged
 from vsacli.base.variables import VARIABLES, Variable, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes
@@ -37,7 +37,7 @@ class Samples(Protocol):
 
 
 class ResultWriter:
-    """Context manager that writes a result file, which exists only after `finish`.
+    """Context manager that writes a result file, which is complete after `finish`.
 
     A subclass writes another format: other variables in the same layout.
 
@@ -45,11 +45,10 @@ class ResultWriter:
     that end the run wait until a block is written.
 
     Args:
-        path: the file to write.
+        file: where it is staged.
         robot: the robot of the run, stored as resolved arrays.
         trajectory: gives the name, the number of samples, and the files that were read.
         variables: names of the variables to store, all there are by default; the coordinates always are.
-        overwrite: whether an existing file may be replaced.
         command_line: what the user typed, for the record.
 
     Raises:
@@ -60,27 +59,25 @@ class ResultWriter:
 
     def __init__(
         self,
-        path: str | Path,
+        file: Staged,
         robot: Robot,
         trajectory: Trajectory,
         variables: Iterable[str] | None = None,
         *,
-        overwrite: bool = False,
         command_line: str = "",
     ) -> None:
-        self.path = Path(path)
+        self._staged = file
         self._robot = robot
         self._trajectory = trajectory
         self._variables = self._selected(variables, trajectory)
-        self._overwrite = overwrite
         self._command_line = command_line
         self._written = 0
 
     def __enter__(self) -> Self:
-        """Create the temporary file, with everything but samples and report.
+        """Create the file, with everything but samples and report.
 
         Raises:
-            StorageError: the target must not be replaced, cannot be written, or does not fit its disk.
+            StorageError: it cannot be written, or does not fit its disk.
         """
         self._cleanup = contextlib.ExitStack()
         try:
@@ -101,27 +98,29 @@ class ResultWriter:
             self._append(block)
 
     def finish(self, report: Mapping[str, Any]) -> None:
-        """Store the report and give the file its name; it holds the steps written so far.
+        """Store the report; the file holds the steps written so far.
 
         Args:
             report: the report as JSON-ready data; `verdict` and `complete` also become root attributes.
 
         Raises:
-            StorageError: the disk is full or fails, or the name has been taken meanwhile.
+            StorageError: the disk is full or fails.
         """
         with self._hdf5():
             self._complete(report)
             self._file.close()
             self._sink.close()
-        self._file_to_be.publish()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
+        unfinished = kind is None and bool(self._file)
         self._discard()
+        if unfinished:
+            raise RuntimeError("a result was left without `finish`")
 
     def _discard(self) -> None:
-        """Close what is open and remove the temporary file, unless it has got its name."""
+        """Close what is open."""
         with interrupts_deferred():
             self._cleanup.close()
 
@@ -135,13 +134,12 @@ class ResultWriter:
                 if self._sink.error is None:
                     raise
             if self._sink.error is not None:
-                raise storage_error(self.path, self._sink.error) from self._sink.error
+                raise storage_error(self._staged.path, self._sink.error) from self._sink.error
 
     def _create(self) -> None:
-        self._file_to_be = self._cleanup.enter_context(AtomicFile(self.path, overwrite=self._overwrite))
-        check_free_space(self.path, self._size())
-        with reporting_storage_errors(self.path):
-            raw = self._file_to_be.temporary.open("r+b", buffering=0)
+        check_free_space(self._staged.path, self._size())
+        with reporting_storage_errors(self._staged.path):
+            raw = self._staged.temporary.open("r+b", buffering=0)
         self._sink = self._cleanup.enter_context(Sink(raw))
         with self._hdf5():
             file = h5py.File(

@@ -1,0 +1,162 @@
+"""What a command writes appears under its names all at once, or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vsacli.base import staging
+from vsacli.base.errors import InputError, StorageError
+from vsacli.base.outputs import Outputs
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """Files by name, hidden ones too."""
+    return {
+        str(path.relative_to(folder)): path.read_text(encoding="utf-8")
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    """A folder with two of the three files that `write` writes."""
+    for name in ("a", "b"):
+        (tmp_path / name).write_text(f"old {name}", encoding="utf-8")
+    return tmp_path
+
+
+def write(folder: Path, **options: object) -> None:
+    with Outputs(**options) as outputs:
+        for name in ("a", "b", "c"):
+            outputs.file(folder / name).write_text(f"new {name}")
+        outputs.folder(folder / "further" / "below")
+        outputs.file(folder / "further" / "below" / "d").write_text("new d")
+
+
+def test_all_files_are_written(project: Path) -> None:
+    write(project, overwrite=True)
+    assert contents(project) == {"a": "new a", "b": "new b", "c": "new c", "further/below/d": "new d"}
+
+
+def test_nothing_is_written_if_one_file_exists(project: Path) -> None:
+    before = contents(project)
+    with pytest.raises(StorageError, match="a: exists already"):
+        write(project)
+    assert contents(project) == before
+    assert not (project / "further").exists()
+
+
+@pytest.mark.parametrize("links", [True, False])
+@pytest.mark.parametrize("call", ["replace", "link", "rename", "fsync"])
+@pytest.mark.parametrize("which", range(6))
+def test_nothing_is_written_if_any_step_fails(
+    project: Path, monkeypatch: pytest.MonkeyPatch, call: str, which: int, links: bool
+) -> None:
+    """Whichever of the system's calls reports an error: all files are the old ones, or all the new."""
+    before, count = contents(project), iter(range(1000))
+    genuine = getattr(os, call)
+
+    def failing(*arguments: object, **options: object) -> object:
+        if next(count) == which:
+            raise OSError(errno.EIO, "Input/output error")
+        return genuine(*arguments, **options)
+
+    if not links:
+        monkeypatch.setattr(os, "link", no_links)
+    if links or call != "link":
+        monkeypatch.setattr(os, call, failing)
+    message = ""
+    try:
+        write(project, overwrite=True)
+    except StorageError as error:
+        message = str(error)
+    if message:
+        assert "nothing was changed there" in message
+        assert contents(project) == before
+        assert not (project / "further").exists()
+    else:
+        assert contents(project) == {"a": "new a", "b": "new b", "c": "new c", "further/below/d": "new d"}
+
+
+def no_links(*_: object, **__: object) -> None:
+    raise PermissionError(errno.EPERM, "Operation not permitted")
+
+
+def test_an_exception_of_the_caller_leaves_nothing(project: Path) -> None:
+    before = contents(project)
+
+    def run() -> None:
+        with Outputs(overwrite=True) as outputs:
+            outputs.file(project / "a").write_text("new a")
+            outputs.folder(project / "new")
+            outputs.file(project / "new" / "d")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run()
+    assert contents(project) == before
+    assert not (project / "new").exists()
+
+
+def test_inputs_are_never_replaced(project: Path) -> None:
+    (project / "link").symlink_to("a")
+    with (
+        pytest.raises(InputError, match="link: is read by this command; choose another name for its output"),
+        Outputs(overwrite=True, inputs=[project / "a"]) as outputs,
+    ):
+        outputs.file(project / "link")
+
+
+def test_two_files_of_one_name_are_refused(project: Path) -> None:
+    with Outputs() as outputs:
+        outputs.file(project / "c")
+        with pytest.raises(InputError, match="c: would be written twice"):
+            outputs.file(project / "c")
+
+
+def test_a_folder_where_a_file_stands_is_refused(project: Path) -> None:
+    with pytest.raises(StorageError, match="a: is a file; name a folder"), Outputs() as outputs:
+        outputs.folder(project / "a")
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_content_is_on_the_disk_before_the_file_has_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overwrite: bool
+) -> None:
+    target, synced = tmp_path / "r.txt", []
+
+    def sync(descriptor: int) -> None:
+        status = os.fstat(descriptor)
+        synced.append(("folder" if stat.S_ISDIR(status.st_mode) else status.st_size, target.exists()))
+
+    monkeypatch.setattr(os, "fsync", sync)
+    with Outputs(overwrite=overwrite) as outputs:
+        outputs.file(target).write_text("content")
+    assert synced == [(len("content"), False), ("folder", True)]
+
+
+def test_the_leavings_of_dead_processes_are_swept_and_no_others(tmp_path: Path) -> None:
+    script = "from vsacli.base.staging import staging_name; print(staging_name())"
+    dead = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    left = dead.stdout.strip()
+    living = staging.staging_name()
+    elsewhere = left.replace(left.split("-")[1], "0" * 12)
+    used_again = "-".join([*living.split("-")[:3], "1", living.split("-")[4]])
+    strange = [".vsacli-1.tmp", "vsacli.tmp", left + "x"]
+    for name in (left, living, elsewhere, used_again, *strange):
+        (tmp_path / name).write_text("half", encoding="utf-8")
+    (tmp_path / left.replace(left[-20:-4], "0" * 16)).mkdir()
+    with Outputs() as outputs:
+        outputs.file(tmp_path / "a")
+    kept = {living, elsewhere, *strange, "a"}
+    if staging._start(os.getpid()) == staging.UNKNOWN_START:
+        kept.add(used_again)  # a system that does not say when a process began
+    assert {path.name for path in tmp_path.iterdir()} == kept

@@ -1,0 +1,222 @@
+"""All files that a command writes: staged beside their targets, and published together or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TextIO
+
+from vsacli.base.atomic_files import already_there, check_target, reporting_storage_errors
+from vsacli.base.errors import InputError, StorageError
+from vsacli.base.interrupts import interrupts_deferred
+from vsacli.base.staging import remove, staging_name, sweep
+
+
+@dataclass(frozen=True)
+class Staged:
+    """A file to be.
+
+    Attributes:
+        path: what it is called by the user.
+        target: what that means, links followed.
+        temporary: what to write meanwhile; it exists and obeys the umask.
+    """
+
+    path: Path
+    target: Path
+    temporary: Path
+
+    def write_text(self, text: str) -> None:
+        """Write a text.
+
+        Raises:
+            StorageError: the disk is full or fails.
+        """
+        self.write_bytes(text.encode("utf-8"))
+
+    @contextlib.contextmanager
+    def opened(self) -> Iterator[TextIO]:
+        """Open for text whose lines end as the writer says.
+
+        Raises:
+            StorageError: the disk is full or fails.
+        """
+        with (
+            reporting_storage_errors(self.path),
+            self.temporary.open("w", encoding="utf-8", newline="") as stream,
+        ):
+            yield stream
+
+    def write_bytes(self, content: bytes) -> None:
+        """Write bytes.
+
+        Raises:
+            StorageError: the disk is full or fails.
+        """
+        with reporting_storage_errors(self.path):
+            self.temporary.write_bytes(content)
+
+
+class Outputs:
+    """Context manager around all files that a command writes.
+
+    They are checked and staged when they are named, before anything is computed, and get their names when the
+    context is left without an exception: all of them, or none if one cannot. A folder that is new appears
+    whole. A process that is killed leaves hidden files at most, which the next one in that folder removes;
+    and while files get their names in a folder that was there, some of them before the others.
+
+    Args:
+        overwrite: whether files that exist may be replaced.
+        inputs: files that the command reads, which it never replaces.
+    """
+
+    def __init__(self, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()) -> None:
+        self._overwrite = overwrite
+        self._inputs = tuple(inputs)
+        self._files: list[Staged] = []
+        self._folders: dict[Path, Path] = {}
+        self._temporaries: list[Path] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def file(self, path: str | Path) -> Staged:
+        """Stage a file.
+
+        Raises:
+            StorageError: it exists and must not be replaced, is no regular file, or its folder does not exist
+                and was not asked for, or cannot be written.
+            InputError: the command reads it, or writes another file of this name.
+        """
+        with reporting_storage_errors(path):
+            target = Path(os.path.realpath(path))
+        if any(target == each.target for each in self._files):
+            raise InputError.one("would be written twice by this command; choose different names", path)
+        staged = self._in_new_folder(target)
+        if staged is None:
+            self._check_inputs(path)
+            check_target(path, overwrite=self._overwrite)
+            staged = self._staging(target)
+        with reporting_storage_errors(path):
+            staged.open("xb").close()
+        self._files.append(Staged(Path(path), target, staged))
+        return self._files[-1]
+
+    def folder(self, path: str | Path) -> None:
+        """Ask for a folder, which is made if it does not exist.
+
+        Raises:
+            StorageError: there is a file of that name, or it cannot be made.
+        """
+        with reporting_storage_errors(path):
+            target = Path(os.path.realpath(path))
+            if target.is_dir():
+                return
+            staged = self._in_new_folder(target)
+            if staged is None:
+                above = itertools.pairwise([target, *target.parents])
+                first = next(each for each, parent in above if parent.is_dir())
+                if first.exists():
+                    what = "is a file" if first == target else f"{first.name} is a file"
+                    raise StorageError(path, f"{what}; name a folder")
+                self._folders[first] = self._staging(first)
+                staged = self._folders[first] / target.relative_to(first)
+            staged.mkdir(parents=True, exist_ok=True)
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """The files, in the order in which they were named."""
+        return tuple(file.path for file in self._files)
+
+    def _in_new_folder(self, target: Path) -> Path | None:
+        """Where a file or folder is staged as part of a folder that is new."""
+        for folder, staged in self._folders.items():
+            if target.is_relative_to(folder):
+                return staged / target.relative_to(folder)
+        return None
+
+    def _staging(self, target: Path) -> Path:
+        """A name in the folder of a target, from which earlier runs' leavings are removed."""
+        if all(target.parent != each.parent for each in self._temporaries):
+            sweep(target.parent)
+        self._temporaries.append(target.with_name(staging_name()))
+        return self._temporaries[-1]
+
+    def _check_inputs(self, path: str | Path) -> None:
+        there = [each for each in self._inputs if os.path.exists(each)]
+        if os.path.exists(path) and any(os.path.samefile(path, each) for each in there):
+            raise InputError.one("is read by this command; choose another name for its output", path)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._publish()
+        finally:
+            for path in self._temporaries:
+                remove(path)
+
+    def _publish(self) -> None:
+        """Name everything, once it has reached the disk; where one cannot be named, none keeps its name."""
+        for file in self._files:
+            with reporting_storage_errors(file.path):
+                _sync(file.temporary, os.O_RDWR)
+        with interrupts_deferred(), contextlib.ExitStack() as undo:
+            for folder, staged in self._folders.items():
+                with reporting_storage_errors(folder):
+                    staged.rename(folder)
+                undo.callback(folder.rename, staged)
+            for file in self._files:
+                if file.temporary in self._temporaries:
+                    with reporting_storage_errors(file.path):
+                        self._name(file, undo)
+            undo.pop_all()
+        for parent in {path.parent for path in self._temporaries}:
+            with contextlib.suppress(OSError):  # some file systems cannot sync a folder
+                _sync(parent, os.O_RDONLY)
+
+    def _name(self, file: Staged, undo: contextlib.ExitStack) -> None:
+        if self._overwrite and file.target.exists():
+            kept = self._staging(file.target)
+            _keep(file.target, kept)
+            file.temporary.replace(file.target)
+            undo.callback(kept.replace, file.target)
+        else:
+            _name_without_replacing(file)
+            undo.callback(file.target.unlink)
+
+
+def _keep(path: Path, kept: Path) -> None:
+    """A second name for a file, or a copy where the file system has none (exFAT, some network shares)."""
+    try:
+        os.link(path, kept)
+    except OSError:
+        import shutil
+
+        shutil.copy2(path, kept)
+
+
+def _name_without_replacing(file: Staged) -> None:
+    """Name a file without ever replacing another one, which a rename would."""
+    try:
+        os.link(file.temporary, file.target)
+    except FileExistsError as error:
+        raise already_there(file.path) from error
+    except OSError as error:  # no hard links here
+        if file.target.exists():
+            raise already_there(file.path) from error
+        file.temporary.replace(file.target)
+
+
+def _sync(path: Path, mode: int) -> None:
+    descriptor = os.open(path, mode)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
