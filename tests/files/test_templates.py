@@ -167,3 +167,12 @@ def test_help_of_both(vsacli: Any, command: str) -> None:
     done = vsacli("new", command, "-h")
     assert done.code == 0
     assert f"vsacli new {command} " in done.out
+
+
+def test_a_new_trajectory_never_replaces_its_robot(vsacli: Any) -> None:
+    Path("arm.yaml").write_text(robot_template("RP"))
+    for output in ("arm.yaml", "./arm.yaml"):
+        done = vsacli("new", "trajectory", "--robot", "arm.yaml", "-o", output, "--overwrite")
+        assert done.code == 2
+        assert done.err.endswith("is read by this command; choose another name for its output\n")
+    assert Path("arm.yaml").read_text() == robot_template("RP")
