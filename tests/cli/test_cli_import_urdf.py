@@ -98,6 +98,18 @@ def test_the_report(vsacli):
     assert "dry friction left out: turn" in lines
 
 
+def test_side_branches_are_held(vsacli, tmp_path):
+    done = converted(vsacli, "--hold", "left_finger=0.01 + 0.01")
+    held = "left_finger at 0.02 m, right_finger at 0.02 m (follows left_finger)"
+    assert f"held beside the chain, their links lumped: {held}" in done.out.splitlines()
+    assert (
+        load_robot(tmp_path / "arm.yaml")
+        == import_urdf(DESK_ARM, None, "flange", hold={"left_finger": 0.02}).robot
+    )
+    outside = converted(vsacli, "--hold", "left_finger=0.04", "--overwrite").out
+    assert "warning: left_finger at 0.04 m is outside its limits, 0 to 0.03 m" in outside
+
+
 def test_a_snapped_axis_is_reported(vsacli, tmp_path):
     write(tmp_path / "arm.urdf", serial("RR", ["0 0 0", "0 1e-5 0"]))
     done = vsacli("import-urdf", "arm.urdf")
@@ -154,6 +166,12 @@ def test_overwriting(vsacli, tmp_path):
         (["--spring", "0,1"], "k: must be positive, not 0"),
         (["--snap", "1"], "1.0 is not in the range 0<=x<=0.1"),
         (["--actuator", "hydraulic"], "'hydraulic' is not one of 'antagonistic', 'elastic', 'rigid'"),
+        (["--hold", "left_finger"], "expected JOINT=VALUE, e.g. finger=0.02, found 'left_finger'"),
+        (["--hold", "left_finger=0", "--hold", "left_finger=1"], "'left_finger' is held twice"),
+        (
+            ["--hold", "left_finger=1 deg"],
+            "expected a number in m, found '1 deg': degrees are for angles only",
+        ),
         (["--tip", "flang"], "tip: there is no link 'flang'; did you mean 'flange'?"),
     ],
 )

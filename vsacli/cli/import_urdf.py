@@ -19,6 +19,18 @@ def _spring(_context: click.Context, _parameter: click.Parameter, written: str) 
     return k, k_c
 
 
+def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[str, ...]) -> dict[str, str]:
+    positions = {}
+    for word in written:
+        joint, equals, value = word.rpartition("=")
+        if not equals:
+            raise click.BadParameter(f"expected JOINT=VALUE, e.g. finger=0.02, found {word!r}")
+        if joint in positions:
+            raise click.BadParameter(f"{joint!r} is held twice")
+        positions[joint] = value
+    return positions
+
+
 @click.command(
     "import-urdf",
     short_help="Make a robot file from a serial chain of a URDF.",
@@ -60,6 +72,14 @@ def _spring(_context: click.Context, _parameter: click.Parameter, written: str) 
     help="Placeholder: cubic springs of antagonistic joints.",
 )
 @click.option(
+    "--hold",
+    metavar="JOINT=VALUE",
+    multiple=True,
+    callback=_hold,
+    help="Where a joint beside the chain stands, in rad or m, or as in elbow='30 deg'; by default at zero. "
+    "May be repeated.",
+)
+@click.option(
     "--snap",
     metavar="RAD",
     type=click.FloatRange(0, 0.1),
@@ -78,13 +98,14 @@ def import_urdf(
     motor_inertia: float,
     stiffness: float,
     spring: tuple[float, float],
+    hold: dict[str, str],
     snap: float,
     overwrite: bool,
     talk: Talk,
 ) -> None:
     """Make a robot file with standard Denavit-Hartenberg rows from a serial chain of a URDF.
 
-    Links behind fixed joints, and side branches at position zero, are lumped with the link that carries them.
+    Links behind fixed joints, and side branches, which stand still, are lumped with the link they hang on.
     Prints the rows, what was left out or changed, and how far the kinematics stray from the URDF's. A URDF
     says nothing about motors and springs: these are placeholders, marked in the file.
     """
@@ -95,7 +116,7 @@ def import_urdf(
     placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)
     with Outputs(overwrite=overwrite, inputs=[urdf]) as outputs:
         file = outputs.file(path)
-        conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap)
+        conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold)
         file.write_text(conversions.robot_text(conversion))
     click.echo(conversions.render(conversion))
     talk.wrote(outputs)

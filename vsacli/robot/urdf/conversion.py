@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,7 @@ from vsacli.documents.tree import quoted
 from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Inertia, Joint, Limits, Link, Pose
 from vsacli.robot.model import Robot
 from vsacli.robot.urdf.dh import SNAP_ANGLE, Frames, Snap, dh_frames, tidy, tidy_angle
+from vsacli.robot.urdf.held_joints import HeldJoint, Hold
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.residual import Residual, kinematic_residual
 from vsacli.robot.urdf.rigid_motion import Body, inverse, roll_pitch_yaw
@@ -49,19 +50,31 @@ class Conversion:
     snaps: tuple[Snap, ...]
     residual: Residual
 
-    def notes(self) -> Iterable[str]:
+    def warnings(self) -> Iterator[str]:
+        """What may not be what was meant, one sentence each."""
+        yield from (warning for held in self.chain.held for warning in held.warnings())
+        yield from self.robot.warnings
+
+    def notes(self) -> Iterator[str]:
         """What a user should know about what was left out or changed, one sentence each."""
         chain = self.chain
-        if chain.held_below:
-            yield f"held at zero below the base: {', '.join(chain.held_below)}"
-        if chain.held_beside:
-            yield f"held at zero beside the chain, their links lumped: {', '.join(chain.held_beside)}"
+        yield from _held("below the base", chain.held_below)
+        yield from _held("beside the chain, their links lumped", chain.held_beside)
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
         friction = [joint.urdf.name for joint in chain.joints if joint.urdf.friction]
         if friction:
             yield f"dry friction left out: {', '.join(friction)}"
-        yield from self.robot.warnings
+
+
+def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
+    """Which joints stand at zero, and which elsewhere."""
+    at_zero = [joint.urdf.name for joint in joints if joint.position == 0]
+    elsewhere = [str(joint) for joint in joints if joint.position != 0]
+    if at_zero:
+        yield f"held at zero {place}: {', '.join(at_zero)}"
+    if elsewhere:
+        yield f"held {place}: {', '.join(elsewhere)}"
 
 
 def import_urdf(
@@ -70,6 +83,7 @@ def import_urdf(
     tip: str | None = None,
     placeholders: Placeholders | None = None,
     snap: float = SNAP_ANGLE,
+    hold: Hold | None = None,
 ) -> Conversion:
     """A robot from a serial chain of a URDF file.
 
@@ -79,11 +93,12 @@ def import_urdf(
         tip: name of the end effector's link; by default the only one that can be.
         placeholders: the actuators, of which a URDF says nothing.
         snap: angle in rad; axes closer to parallel are made parallel if their common normal is far away.
+        hold: where joints beside the chain stand, by name, in rad (m) or as "30 deg"; others stand at zero.
 
     Raises:
-        InputError: the file is no URDF, or has no such chain.
+        InputError: the file is no URDF, has no such chain, or its joints cannot be held like this.
     """
-    chain = serial_chain(read_urdf(path), base, tip)
+    chain = serial_chain(read_urdf(path), base, tip, hold)
     frames = dh_frames(chain.joints, chain.tip_pose, snap)
     robot = _robot(os.fspath(path), chain, frames, placeholders or Placeholders())
     return Conversion(os.fspath(path), chain, robot, frames.snaps, kinematic_residual(chain, robot))
@@ -99,12 +114,20 @@ def _robot(path: str, chain: SerialChain, frames: Frames, placeholders: Placehol
     x, y, z = (-STANDARD_GRAVITY * tidy(chain.up, 1.0) + 0.0).tolist()
     return Robot(
         name=chain.robot_name,
-        description=f"converted from {os.path.basename(path)}, from link {chain.base} to link {chain.tip}",
+        description=_description(path, chain),
+        placeholder=True,
         gravity=(x, y, z),
         base=_pose(frames.base, frames.scale),
         tool=_pose(frames.tool, frames.scale),
         joints=tuple(joints),
     )
+
+
+def _description(path: str, chain: SerialChain) -> str:
+    """Where the robot comes from; that joints do not stand at zero can be seen nowhere else in it."""
+    held = [f", {each}" for each in chain.held if each.position != 0]
+    origin = f"converted from {os.path.basename(path)}, from link {chain.base} to link {chain.tip}"
+    return f"{origin}{''.join(held)}"
 
 
 def _joint(

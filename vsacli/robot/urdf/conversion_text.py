@@ -40,6 +40,7 @@ def _lines(conversion: Conversion) -> Iterator[str]:
     yield from _aligned(_table(conversion))
     yield f"total mass of the moving links: {sum(joint.link.mass for joint in robot.joints):.6g} kg"
     yield _exactness(conversion.residual)
+    yield from (f"warning: {warning}" for warning in conversion.warnings())
     yield from conversion.notes()
 
 
@@ -77,6 +78,7 @@ def robot_text(conversion: Conversion) -> str:
         f"format: {FORMAT}",
         f"name: {json.dumps(robot.name)}",
         f"description: {json.dumps(robot.description)}",
+        "placeholder: true",
         _commented(f"gravity: {_numbers(robot.gravity)}", "# m/s^2, in the axes of the base link"),
         _commented(f"base: {_pose(robot.base)}", "# DH frame 0 in the base link; m, rad"),
         _commented(f"tool: {_pose(robot.tool)}", "# tip link in the last DH frame"),

@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.urdf.rigid_motion import Body
+from vsacli.base.units import POSITION
+from vsacli.robot.urdf.rigid_motion import Body, cross_matrix
 
 ROTATING = ("revolute", "continuous")
 MOVING = (*ROTATING, "prismatic")
 """Types of joints with one degree of freedom."""
 
 TYPES = (*MOVING, "fixed", "floating", "planar")
+
+LARGEST_NUMBER = 1e9
+"""Numbers beyond are no length, mass or inertia of a robot, and products of them would overflow."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,15 @@ class UrdfLimit:
 
 
 @dataclass(frozen=True)
+class Mimic:
+    """How a joint follows another: to `multiplier` times the position of joint `leader`, plus `offset`."""
+
+    leader: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
 class UrdfJoint:
     """A joint; at position zero its child has the pose `placement` in its parent."""
 
@@ -47,12 +62,33 @@ class UrdfJoint:
     limit: UrdfLimit
     damping: float
     friction: float
-    mimics: str | None
+    mimic: Mimic | None
 
     @property
     def is_fixed(self) -> bool:
         """Whether it joins its links rigidly."""
         return self.type == "fixed"
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether it turns."""
+        return self.type in ROTATING
+
+    @property
+    def unit(self) -> str:
+        """Unit of its position."""
+        return POSITION.unit("revolute" if self.is_revolute else "prismatic")
+
+    def motions(self, positions: FloatArray) -> FloatArray:
+        """How its child moves at positions (samples,), (samples, 4, 4); by Rodrigues' formula if it turns."""
+        poses = np.tile(np.eye(4), (len(positions), 1, 1))
+        if not self.is_revolute:
+            poses[:, :3, 3] = np.outer(positions, self.axis)
+            return poses
+        cross = cross_matrix(self.axis)
+        angle = positions[:, None, None]
+        poses[:, :3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+        return poses
 
 
 @dataclass(frozen=True)
@@ -81,6 +117,16 @@ class Urdf:
             path.append(parents[link])
             link = parents[link].parent
         return path[::-1]
+
+    def followed(self, joint: UrdfJoint) -> Mimic:
+        """The joint that a joint follows in the end, itself if it follows none that there is."""
+        mimic = Mimic(joint.name)
+        while (further := self.joints[mimic.leader].mimic) is not None and further.leader in self.joints:
+            multiplier, offset = mimic.multiplier, mimic.offset
+            mimic = Mimic(
+                further.leader, multiplier * further.multiplier, multiplier * further.offset + offset
+            )
+        return mimic
 
 
 def below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:

@@ -13,15 +13,22 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.tree import quoted
-from vsacli.robot.urdf.link_tree import MOVING, TYPES, Urdf, UrdfJoint, UrdfLimit, UrdfLink, below
+from vsacli.robot.urdf.link_tree import (
+    LARGEST_NUMBER,
+    MOVING,
+    TYPES,
+    Mimic,
+    Urdf,
+    UrdfJoint,
+    UrdfLimit,
+    UrdfLink,
+    below,
+)
 from vsacli.robot.urdf.rigid_motion import Body, pose_matrix
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
 MAX_BYTES = 10_000_000
 MAX_LINKS = 1000
-LARGEST_NUMBER = 1e9
-"""Numbers beyond are no length, mass or inertia of a robot, and products of them would overflow."""
-
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _Named = TypeVar("_Named", UrdfLink, UrdfJoint)
 
@@ -47,6 +54,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     if not links:
         problems.fail(root.line, "the file describes no links")
     _check_ends(links, joints, problems)
+    _check_leaders(joints, problems)
     problems.check()
     return Urdf(source.path, name, links, joints, _root(links, joints, problems))
 
@@ -84,6 +92,23 @@ def _check_ends(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], 
             both = f"the joints {quoted(other.name)} and {quoted(joint.name)}"
             message = f"the link {quoted(joint.child)} is the child of {both}; closed loops are not read"
             problems.add(joint.line, message)
+
+
+def _check_leaders(joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
+    """No joint may follow itself."""
+    for joint in joints.values():
+        if joint.name in _leaders(joint, joints):
+            message = "follows itself: the <mimic> of joints form a circle"
+            problems.add(joint.line, f"joint {quoted(joint.name)} {message}")
+
+
+def _leaders(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
+    """Names of the joints that a joint follows, directly or by way of others."""
+    leaders: set[str] = set()
+    while joint.mimic is not None and joint.mimic.leader in joints.keys() - leaders:
+        joint = joints[joint.mimic.leader]
+        leaders.add(joint.name)
+    return leaders
 
 
 def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> str:
@@ -139,8 +164,12 @@ class _Reader:
             limit=self._limit(element, kind),
             damping=0.0 if dynamics is None else self._non_negative(dynamics, "damping", 0.0),
             friction=0.0 if dynamics is None else self._non_negative(dynamics, "friction", 0.0),
-            mimics=None if mimic is None else self.word(mimic, "joint"),
+            mimic=None if mimic is None else self._mimic(mimic),
         )
+
+    def _mimic(self, element: Element) -> Mimic:
+        multiplier, offset = self._number(element, "multiplier", 1.0), self._number(element, "offset", 0.0)
+        return Mimic(self.word(element, "joint"), multiplier, offset)
 
     def _end(self, joint: Element, tag: str) -> str:
         end = self._child(joint, tag)

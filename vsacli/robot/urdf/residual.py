@@ -11,7 +11,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import Pose
 from vsacli.robot.kinematics import frames
 from vsacli.robot.model import Robot
-from vsacli.robot.urdf.rigid_motion import cross_matrix, inverse, pose_matrix
+from vsacli.robot.urdf.rigid_motion import inverse, pose_matrix
 from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
 
 SAMPLES = 256
@@ -51,22 +51,10 @@ def _chain_tips(chain: SerialChain, q: FloatArray) -> FloatArray:
     poses = np.broadcast_to(np.eye(4), (len(q), 4, 4))
     before = np.eye(4)
     for joint, positions in zip(chain.joints, q.T, strict=True):
-        poses = poses @ (inverse(before) @ joint.frame) @ _motions(joint, positions)
+        poses = poses @ (inverse(before) @ joint.frame) @ joint.urdf.motions(positions)
         before = joint.frame
     result: FloatArray = poses @ (inverse(before) @ chain.tip_pose)
     return result
-
-
-def _motions(joint: ChainJoint, positions: FloatArray) -> FloatArray:
-    """The motion of a joint about or along its axis, (samples, 4, 4); Rodrigues' formula if it turns."""
-    poses = np.tile(np.eye(4), (len(positions), 1, 1))
-    if not joint.is_revolute:
-        poses[:, :3, 3] = np.outer(positions, joint.urdf.axis)
-        return poses
-    cross = cross_matrix(joint.urdf.axis)
-    angle = positions[:, None, None]
-    poses[:, :3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
-    return poses
 
 
 def _robot_tips(robot: Robot, q: FloatArray) -> FloatArray:

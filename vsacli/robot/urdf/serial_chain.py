@@ -1,27 +1,23 @@
 """From a tree of links to one serial chain: which joints move, and what each of them carries.
 
-Everything is given at the zero position of all joints, in the axes of the base link, so that the chain is a
-list of lines in space, a body for each, and the pose of the tip.
+Everything is given at position zero of the chain, in the axes of the base link, so that the chain is a list
+of lines in space, a body for each, and the pose of the tip.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.did_you_mean import did_you_mean
-from vsacli.base.errors import InputError
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
-from vsacli.robot.urdf.link_tree import MOVING, ROTATING, Urdf, UrdfJoint, UrdfLink, below
+from vsacli.robot.urdf.chain_path import ChainPath, find_path
+from vsacli.robot.urdf.held_joints import HeldJoint, Hold, held_joints
+from vsacli.robot.urdf.link_tree import MOVING, Urdf, UrdfJoint, UrdfLink, below
 from vsacli.robot.urdf.rigid_motion import Body, inverse, welded
-
-MAX_TIPS = 12
-"""Links that a message offers as tip."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +39,7 @@ class ChainJoint:
     @property
     def is_revolute(self) -> bool:
         """Whether it turns."""
-        return self.urdf.type in ROTATING
+        return self.urdf.is_revolute
 
     @property
     def origin(self) -> FloatArray:
@@ -78,21 +74,38 @@ class SerialChain:
     up: FloatArray
     joints: tuple[ChainJoint, ...]
     tip_pose: FloatArray
-    held_below: tuple[str, ...]
-    held_beside: tuple[str, ...]
+    held_below: tuple[HeldJoint, ...]
+    held_beside: tuple[HeldJoint, ...]
+
+    @property
+    def held(self) -> tuple[HeldJoint, ...]:
+        """All joints that could move and affect the chain, but stand still."""
+        return (*self.held_below, *self.held_beside)
 
 
-def serial_chain(urdf: Urdf, base: str | None = None, tip: str | None = None) -> SerialChain:
+def serial_chain(
+    urdf: Urdf, base: str | None = None, tip: str | None = None, hold: Hold | None = None
+) -> SerialChain:
     """The chain from a base link (the root if None) to a tip link (the only one there is if None).
 
+    Args:
+        urdf: the robot.
+        base: name of a link.
+        tip: name of a link.
+        hold: where joints stand that are not on the chain, by name; zero for others.
+
     Raises:
-        InputError: there is no such chain, or it has joints that no serial robot can have.
+        InputError: there is no such chain, it has joints that no serial robot can have, or joints cannot be
+            held like this.
     """
-    path = _find_path(urdf, base, tip)
+    path = find_path(urdf, base, tip)
     carried = _carried(urdf, path)
-    beside = _held_beside(urdf, carried, path)
-    _check_joints(urdf, path, beside)
-    poses = _poses(urdf)
+    below_base = [joint for joint in urdf.above(path.base) if not joint.is_fixed]
+    beside = _beside(urdf, carried, path)
+    _check_joints(urdf, path, below_base, beside)
+    names = [joint.name for joint in path.moving]
+    held = held_joints(urdf, [*below_base, *beside], names, hold or {})
+    poses = _poses(urdf, held)
     to_base = inverse(poses[path.base])
     return SerialChain(
         robot_name=urdf.name,
@@ -104,35 +117,45 @@ def serial_chain(urdf: Urdf, base: str | None = None, tip: str | None = None) ->
             for joint, links in zip(path.moving, carried, strict=True)
         ),
         tip_pose=to_base @ poses[path.tip],
-        held_below=tuple(joint.name for joint in urdf.above(path.base) if not joint.is_fixed),
-        held_beside=tuple(joint.name for joint in beside),
+        held_below=tuple(held[: len(below_base)]),
+        held_beside=tuple(held[len(below_base) :]),
     )
 
 
-def _check_joints(urdf: Urdf, path: ChainPath, beside: list[UrdfJoint]) -> None:
-    """Refuse joints without a drive of their own, and side branches that such a drive moves along."""
+def _check_joints(
+    urdf: Urdf, path: ChainPath, below_base: Iterable[UrdfJoint], beside: Iterable[UrdfJoint]
+) -> None:
+    """Refuse joints without a drive of their own, and others that move along with the chain."""
     problems = Problems(urdf.file)
     for joint in path.moving:
         name = f"joint {quoted(joint.name)}"
         if joint.type not in MOVING:
             reason = f"is {joint.type}; a chain has revolute, continuous and prismatic joints"
             problems.add(joint.line, f"{name} {reason}; choose base and tip beside it")
-        if joint.mimics is not None:
-            reason = f"follows {quoted(joint.mimics)} (<mimic>), so it has no drive of its own"
+        if joint.mimic is not None:
+            reason = f"follows {quoted(joint.mimic.leader)} (<mimic>), so it has no drive of its own"
             problems.add(joint.line, f"{name} {reason}; choose a tip before it")
     on_chain = {joint.name for joint in path.moving}
-    for joint in beside:
-        if joint.mimics in on_chain:
-            reason = f"beside the chain follows {quoted(joint.mimics or '')} on it (<mimic>)"
-            problems.add(joint.line, f"joint {quoted(joint.name)} {reason}; choose a tip before these two")
+    choices = (
+        ("beside the chain", beside, "choose a tip before these two"),
+        ("below the base", below_base, "choose a base before these two, or a tip"),
+    )
+    for place, joints, choice in choices:
+        for joint in joints:
+            leader = urdf.followed(joint).leader
+            if leader in on_chain:
+                reason = f"{place} follows {quoted(leader)} on it (<mimic>)"
+                problems.add(joint.line, f"joint {quoted(joint.name)} {reason}; {choice}")
     problems.check()
 
 
-def _poses(urdf: Urdf) -> dict[str, FloatArray]:
-    """The pose of every link in the root, at position zero."""
+def _poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
+    """The pose of every link in the root, where some joints are held and all others stand at zero."""
+    positions = {each.urdf.name: each.position for each in held}
     poses = {urdf.root: np.eye(4)}
     for joint in below(urdf.root, urdf.joints.values()):
-        poses[joint.child] = poses[joint.parent] @ joint.placement
+        (motion,) = joint.motions(np.array([positions.get(joint.name, 0.0)]))
+        poses[joint.child] = poses[joint.parent] @ joint.placement @ motion
     return poses
 
 
@@ -148,7 +171,7 @@ def _carried(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
     return [tuple(links) for links in carried]
 
 
-def _held_beside(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
+def _beside(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
     """Joints that could move on side branches."""
     names = {link.name for links in carried for link in links}
     moving = {joint.name for joint in path.moving}
@@ -158,85 +181,3 @@ def _held_beside(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPat
 
 def _body(links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray) -> Body:
     return welded([link.body.moved(to_base @ poses[link.name]) for link in links if link.body is not None])
-
-
-class ChainPath(NamedTuple):
-    """The joints from one link to another, fixed ones included."""
-
-    base: str
-    tip: str
-    joints: tuple[UrdfJoint, ...]
-
-    @property
-    def moving(self) -> tuple[UrdfJoint, ...]:
-        """Joints of the path that are not fixed."""
-        return tuple(joint for joint in self.joints if not joint.is_fixed)
-
-
-def _find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
-    """The path from a base link (the root if None) to a tip link (the only one there can be if None).
-
-    Raises:
-        InputError: there is no such link or path, or no joint moves on it.
-    """
-    start = urdf.root if base is None else _known(urdf, base, "base")
-    end = _only_tip(urdf, start) if tip is None else _known(urdf, tip, "tip")
-    path = _path(urdf, start, end)
-    if not path.moving:
-        raise InputError.one(f"no joint moves between {quoted(start)} and {quoted(end)}", urdf.file)
-    return path
-
-
-def _known(urdf: Urdf, name: str, end: str) -> str:
-    if name not in urdf.links:
-        near = did_you_mean(name, urdf.links)
-        raise InputError.one(f"{end}: there is no link {quoted(name)}{near}", urdf.file)
-    return name
-
-
-def _path(urdf: Urdf, base: str, tip: str) -> ChainPath:
-    above = urdf.above(tip)
-    links = [joint.parent for joint in above] + [tip]
-    if base not in links:
-        raise InputError.one(f"the link {quoted(tip)} does not hang below {quoted(base)}", urdf.file)
-    return ChainPath(base, tip, tuple(above[links.index(base) :]))
-
-
-def _only_tip(urdf: Urdf, base: str) -> str:
-    """The end of the only branch that moves, if only one link could be meant by that."""
-    leaves = {leaf: _path(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
-    longest = max(leaves.values(), key=len, default=())
-    tips = [leaf for leaf, moving in leaves.items() if moving and moving == longest]
-    straight = all(moving == longest[: len(moving)] for moving in leaves.values())
-    if not longest:
-        raise InputError.one(f"no joint moves below {quoted(base)}", urdf.file)
-    if not straight or len(tips) > 1:
-        offered = [*_forks(urdf, base), *(leaf for leaf, moving in leaves.items() if moving)]
-        raise InputError.one(_ambiguous(urdf, base, list(dict.fromkeys(offered))), urdf.file)
-    return tips[0]
-
-
-def _leaves(urdf: Urdf, base: str) -> list[str]:
-    joints = list(below(base, urdf.joints.values()))
-    parents = {joint.parent for joint in joints}
-    return [joint.child for joint in joints if joint.child not in parents]
-
-
-def _forks(urdf: Urdf, base: str) -> Iterator[str]:
-    """Links behind a moving joint from which more than one branch with moving joints goes on."""
-    branches: dict[str, set[str]] = {}
-    for moving in (joint for joint in below(base, urdf.joints.values()) if not joint.is_fixed):
-        for joint in _path(urdf, base, moving.child).joints:
-            branches.setdefault(joint.parent, set()).add(joint.child)
-    for link, ways in branches.items():
-        if len(ways) > 1 and _path(urdf, base, link).moving:
-            yield link
-
-
-def _ambiguous(urdf: Urdf, base: str, tips: list[str]) -> str:
-    counts = [len(_path(urdf, base, tip).moving) for tip in tips]
-    found = [f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)]
-    more = f" and {len(found) - MAX_TIPS} more" if len(found) > MAX_TIPS else ""
-    offered = ", ".join(found[:MAX_TIPS])
-    which = f"several links below {quoted(base)} could be the end effector"
-    return f"{which}; choose one with --tip: {offered}{more}"

@@ -1,0 +1,169 @@
+"""Joints of a URDF that stand still: at zero, where they are held, or where they follow another one to."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+import pytest
+from oracles.urdf_pinocchio import UrdfOracle
+from samples.urdf import joint, link, robot, write
+
+from vsacli.base.errors import InputError
+from vsacli.dynamics.elastic_torques import link_torques
+from vsacli.robot.urdf import import_urdf
+
+LIMIT = '<limit lower="-3" upper="3" velocity="1" effort="1"/>'
+LEFT = LIMIT.replace('"-3" upper="3"', '"0.01" upper="0.05"')
+FOLLOWS_LEFT = '<mimic joint="left" multiplier="-2" offset="0.3"/>' + LIMIT.replace("3", "1")
+FOLLOWS_RIGHT = '<mimic joint="right" multiplier="0.5" offset="0.2"/>'
+TREE = robot(
+    *(link(name) for name in ("world", "torso", "arm", "hand", "pad", "thumb", "tip", "box")),
+    joint("lean", "world", "torso", "R", rpy="1 0 0", rest=LIMIT),
+    joint("shoulder", "torso", "arm", "R", rpy="0.7 0 0", rest=LIMIT),
+    joint("wrist", "arm", "hand", "R", rpy="0 1 0", rest=LIMIT),
+    joint("left", "hand", "pad", "P", rpy="0 0.4 1", rest=LEFT),
+    joint("right", "hand", "thumb", "R", rpy="0.5 0 0", rest=FOLLOWS_LEFT),
+    joint("bend", "thumb", "tip", "C", rpy="0 0.3 0", rest=FOLLOWS_RIGHT),
+    joint("drawer", "world", "box", "P", rest=LIMIT),
+)
+"""Two links of the hand stand by a chain of <mimic>: right = 0.3 - 2 left, bend = 0.2 + right/2."""
+
+ROUNDING = 1e-13
+"""Relative, of torques; no angle of the file is near a right one, which import would make exact."""
+
+
+@pytest.fixture
+def urdf(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return lambda text: write(tmp_path / "arm.urdf", text).name
+
+
+def positions(conversion):
+    return {held.urdf.name: held.position for held in conversion.chain.held}
+
+
+@pytest.mark.parametrize(
+    ("hold", "expected"),
+    [
+        ({}, {"left": 0, "right": 0.3, "bend": 0.35}),
+        ({"left": 0.04}, {"left": 0.04, "right": 0.22, "bend": 0.31}),
+        ({"left": "0.02 + 0.02"}, {"left": 0.04, "right": 0.22, "bend": 0.31}),
+    ],
+)
+def test_joints_that_follow_others_stand_where_those_take_them(urdf, hold, expected):
+    conversion = import_urdf(urdf(TREE), base="torso", tip="hand", hold=hold)
+    assert positions(conversion) == pytest.approx({"lean": 0, **expected}, rel=1e-15)
+
+
+@pytest.mark.parametrize("hold", [{}, {"left": 0.04}, {"lean": "-30 deg", "left": 0.02}])
+def test_torques_with_held_joints(urdf, hold):
+    path = urdf(TREE)
+    conversion = import_urdf(path, base="torso", tip="hand", hold=hold)
+    held = {"lean": math.radians(-30), "left": 0.02} if "lean" in hold else hold
+    q, dq, ddq = np.random.default_rng(1).uniform(-2, 2, (3, 5, 2))
+    found = link_torques(conversion.robot, q, dq, ddq, 0 * q, 0 * q)[0]
+    oracle, chain = UrdfOracle(path), ["shoulder", "wrist"]
+    expected = np.array([oracle.torques(chain, *row, held) for row in zip(q, dq, ddq, strict=True)])
+    np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
+
+
+def test_what_does_not_stand_at_zero_is_told(urdf):
+    conversion = import_urdf(urdf(TREE), base="torso", tip="hand", hold={"lean": "-30 deg"})
+    right, bend = "right at 0.3 rad (follows left)", "bend at 0.35 rad (follows left)"
+    assert list(conversion.notes()) == [
+        "held below the base: lean at -0.523599 rad",
+        "held at zero beside the chain, their links lumped: left",
+        f"held beside the chain, their links lumped: {right}, {bend}",
+    ]
+    assert conversion.robot.description.endswith(f"to link hand, lean at -0.523599 rad, {right}, {bend}")
+
+
+@pytest.mark.parametrize(
+    ("hold", "warnings"),
+    [
+        ({}, ["left at 0 m is outside its limits, 0.01 to 0.05 m; hold it elsewhere by --hold left=0.01"]),
+        ({"left": 0.01}, []),
+        ({"left": 0.05}, []),
+        (
+            {"left": -1},
+            [
+                "left at -1 m is outside its limits, 0.01 to 0.05 m; hold it elsewhere by --hold left=0.01",
+                "right at 2.3 rad (follows left) is outside its limits, -1 to 1 rad; "
+                "hold it elsewhere by --hold left=VALUE",
+            ],
+        ),
+    ],
+)
+def test_a_joint_outside_its_limits_is_warned_of(urdf, hold, warnings):
+    conversion = import_urdf(urdf(TREE), base="torso", tip="hand", hold=hold)
+    assert [warning for warning in conversion.warnings() if "placeholder" not in warning] == warnings
+
+
+def test_a_joint_whose_leader_is_missing_stands_as_if_that_stood_at_zero(urdf):
+    path = urdf(TREE.replace('mimic joint="left"', 'mimic joint="gone"'))
+    conversion = import_urdf(path, base="torso", tip="hand", hold={"left": 0.01})
+    assert positions(conversion) == {"lean": 0, "left": 0.01, "right": 0.3, "bend": 0.35}
+    assert next(conversion.warnings()) == (
+        "right at 0.3 rad: there is no joint 'gone', which it should follow (<mimic>); "
+        "if it stands elsewhere, say so by --hold right=VALUE"
+    )
+    held = import_urdf(path, base="torso", tip="hand", hold={"left": 0.01, "right": -0.2})
+    assert positions(held) == {"lean": 0, "left": 0.01, "right": -0.2, "bend": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("hold", "reason"),
+    [
+        ({"lft": 0}, "there is no joint 'lft'; did you mean 'left'?"),
+        ({"wrist": 0}, "'wrist' belongs to the chain, where it moves"),
+        ({"bend": 0}, "'bend' follows 'left' (<mimic>); hold that one"),
+        ({"drawer": 0}, "'drawer' is neither beside the chain nor below its base, so that it has no effect"),
+        ({"left": "1 deg"}, "'left': expected a number in m, found '1 deg': degrees are for angles only"),
+        ({"left": "a"}, "'left': expected a number in m, found 'a': unknown word 'a'"),
+        ({"left": math.nan}, "'left': expected a number in m, found 'nan': only finite numbers can be used"),
+        ({"left": True}, "'left': expected a number in m, found 'True'"),
+    ],
+)
+def test_what_cannot_be_held(urdf, hold, reason):
+    with pytest.raises(InputError, match=f"^arm.urdf: hold: {re.escape(reason)}"):
+        import_urdf(urdf(TREE), base="torso", tip="hand", hold=hold)
+
+
+@pytest.mark.parametrize(
+    ("changes", "options", "problem"),
+    [
+        (
+            [('joint="left"', 'joint="bend"')],
+            {},
+            r"14: joint 'right' follows itself: the <mimic> of joints form a circle\n"
+            r"arm.urdf:15: joint 'bend' follows itself",
+        ),
+        ([('joint="right"', 'joint="bend"')], {}, "15: joint 'bend' follows itself"),
+        (
+            [('joint="left"', 'joint="wrist"')],
+            {},
+            r"14: joint 'right' beside the chain follows 'wrist' on it .*\n"
+            r"arm.urdf:15: joint 'bend' beside the chain follows 'wrist' on it .* choose a tip before",
+        ),
+        (
+            [(f' rpy="1 0 0"/><axis xyz="0 0 1"/>{LIMIT}', ' rpy="1 0 0"/><mimic joint="wrist"/>')],
+            {},
+            "10: joint 'lean' below the base follows 'wrist' on it .* choose a base before",
+        ),
+        (
+            [('multiplier="-2"', 'multiplier="-1e9"'), ('multiplier="0.5"', 'multiplier="1e9"')],
+            {"left": 1},
+            "15: joint 'bend': following 'left' it stands at -1e.18 rad, more than can be computed with",
+        ),
+        ([('multiplier="-2"', 'multiplier="x"')], {}, "14: multiplier: expected a number"),
+    ],
+)
+def test_joints_that_cannot_follow(urdf, changes, options, problem):
+    text = TREE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    with pytest.raises(InputError, match=f"^arm.urdf:{problem}"):
+        import_urdf(urdf(text), base="torso", tip="hand", hold=options)
