@@ -159,7 +159,7 @@ def test_undefined_samples_are_refused_with_joint_time_and_number(stored, block)
     assert stream.getvalue() == ""
     assert [dataclasses.astuple(gap) for gap in caught.value.gaps] == [("tau_motor", "j1", 0.03, 12)]
     assert str(caught.value).endswith(
-        "0.h5: j1.tau_motor has no value at 12 samples, first at t = 0.03 s\n"
+        "0.h5: j1.tau_motor has no value at 12 samples, first at t = 0.030 s\n"
         "nothing was exported; mend the steps the report names, or get empty cells with --allow-nan"
     )
 

@@ -79,7 +79,7 @@ def test_amounts_and_time_of_a_local_mismatch():
     dq[2300, 0] += 0.5
     (sentence,) = complaints(dq)
     assert sentence.startswith("dq of base does not follow from q: it differs by up to 2.5 (")
-    assert sentence.endswith(" at t = 2.3 s)")
+    assert sentence.endswith(" at t = 2.300 s)")
 
 
 def test_columns_of_joints_that_were_exchanged():

@@ -155,8 +155,8 @@ def test_all_problems_of_the_rows_at_once(csv):
     content["base.stiffness"][0] = 0.0
     assert problems(csv(content)) == [
         (6, "time must increase strictly, but 0.25 s follows 0.3 s"),
-        (2, "base.stiffness must be positive, not 0 (t = 0 s)"),
-        (5, "elbow.stiffness must be positive, not -1 (t = 0.3 s; 2 such samples)"),
+        (2, "base.stiffness must be positive, not 0 (t = 0.000 s)"),
+        (5, "elbow.stiffness must be positive, not -1 (t = 0.300 s; 2 such samples)"),
     ]
 
 

@@ -145,9 +145,9 @@ def test_value_problems_name_the_first_sample_of_each_column():
     rates[2, 0] = np.inf
     problems = [str(problem) for problem in value_problems(record(STIFFNESS, time, values, rates))]
     assert problems == [
-        "stiffness[6, 0] must be finite, not nan (t = 0.6 s)",
-        "dstiffness[2, 0] must be finite, not inf (t = 0.2 s)",
-        "stiffness[3, 1] must be positive, not 0 (t = 0.3 s; 2 such samples)",
+        "stiffness[6, 0] must be finite, not nan (t = 0.600 s)",
+        "dstiffness[2, 0] must be finite, not inf (t = 0.200 s)",
+        "stiffness[3, 1] must be positive, not 0 (t = 0.300 s; 2 such samples)",
     ]
 
 
@@ -221,5 +221,5 @@ def test_no_record_breaks_a_fit(seed, count, size, scale, spread, decimals, meth
     if not [*time_problems(time), *value_problems(samples)]:
         found = SampledProfile.of(samples, method)
         with np.errstate(over="ignore", invalid="ignore"):  # 1e99 in 1e-29 s, to the fourth power
-            assert found.samples(0, count, time).shape == (5, 2, count)
-        assert found.breakpoints[[0, -1]].tolist() == time[[0, -1]].tolist()
+            assert found.samples(0, count, samples.time).shape == (5, 2, count)
+        assert found.breakpoints[[0, -1]].tolist() == samples.time[[0, -1]].tolist()

@@ -16,13 +16,13 @@ FACTOR = 1.7
 
 
 def polynomial(times):
-    first, last = times.span
+    span = (0.0, times.span[1] - times.span[0])
     return Trajectory(
         times,
-        RestToRest(signal=POSITION, span=(first, last), degree=7, start=(0.0, 1.0), end=(1.0, -1.0)),
+        RestToRest(signal=POSITION, span=span, degree=7, start=(0.0, 1.0), end=(1.0, -1.0)),
         {
             "stiffness": RestToRest(
-                signal=STIFFNESS, span=(first, last), degree=3, start=(850.0,) * 2, end=(900.0, 800.0)
+                signal=STIFFNESS, span=span, degree=3, start=(850.0,) * 2, end=(900.0, 800.0)
             )
         },
         name="test",

@@ -178,7 +178,8 @@ def test_check_points_keep_within_one_analytic_piece(samples, count):
     assert time.shape == reach.shape == (count,)
     assert np.all(np.diff(time) > 0) or samples < count
     assert np.all(reach > 0)
-    knots = np.concatenate([trajectory.position.breakpoints, trajectory.commanded["stiffness"].breakpoints])
+    profiles = trajectory.position, trajectory.commanded["stiffness"]
+    knots = trajectory.start + np.concatenate([profile.breakpoints for profile in profiles])
     nearest = np.abs(knots[:, None] - time).min(axis=0)
     np.testing.assert_allclose(reach, nearest, rtol=1e-12)  # differences of times up to 45
     # no point is lost in a corner of its piece: it has at least half an even share
@@ -213,8 +214,8 @@ def test_from_samples_names_everything_that_does_not_fit():
         Trajectory.from_samples(time, q, stiffness)
     assert str(caught.value).splitlines() == [
         "time[3] must increase strictly, but 0.2 s follows 0.2 s",
-        "q[4, 1] must be finite, not nan (t = 0.4 s)",
-        "stiffness[1, 0] must be positive, not -3 (t = 0.1 s)",
+        "q[4, 1] must be finite, not nan (t = 0.400 s)",
+        "stiffness[1, 0] must be positive, not -3 (t = 0.100 s)",
     ]
 
 

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.joint_report import JointDrift, JointReport, Worst
-from vsacli.analysis.self_check import LADDER_BOUND, SelfCheck
+from vsacli.analysis.self_check import SelfCheck
 from vsacli.base.flags import Flag
-from vsacli.base.units import POSITION, TORQUE, VELOCITY
+from vsacli.base.units import POSITION, TORQUE, VELOCITY, time_text
 from vsacli.dynamics.energy import JointEnergy
 
 WIDTH = 78
@@ -121,11 +121,6 @@ def _rounded(value: float, digits: int) -> str:
     return f"{value:.{max(digits, len(f'{abs(value):.0f}'))}g}"
 
 
-def _time(time: float) -> str:
-    """Milliseconds, or microseconds where steps are that short."""
-    return f"{time:.3f} s" if abs(time - round(time, 3)) < 5e-7 else f"{time:.6f} s"
-
-
 def count(steps: int) -> str:
     """Steps by number."""
     return f"{steps} step" if steps == 1 else f"{steps} steps"
@@ -133,7 +128,7 @@ def count(steps: int) -> str:
 
 def _steps(joint: JointReport, kind: str) -> str:
     found = joint.steps[kind]
-    return count(found) if found == 1 else f"{count(found)}, from {_time(joint.first_time[kind])}"
+    return count(found) if found == 1 else f"{count(found)}, from {time_text(joint.first_time[kind])}"
 
 
 def _infeasible(joint: JointReport, worst: Worst) -> str:
@@ -142,13 +137,12 @@ def _infeasible(joint: JointReport, worst: Worst) -> str:
     preload = "; the opposite preload would reach it" if joint.other_preload else ""
     hints = f"({steps}){slack}{preload}"
     if math.isnan(worst.bound):
-        return (
-            f"its springs cannot carry the elastic torque at t = {_time(worst.time)} at any stiffness {hints}"
-        )
+        when = f"at t = {time_text(worst.time)}"
+        return f"its springs cannot carry the elastic torque {when} at any stiffness {hints}"
     value, bound = _apart(worst.value, worst.bound)
     relation, remedy = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
     return (
-        f"stiffness {value} {worst.unit} at t = {_time(worst.time)} is {relation} the {bound} "
+        f"stiffness {value} {worst.unit} at t = {time_text(worst.time)} is {relation} the {bound} "
         f"its load allows, {remedy} it {hints}"
     )
 
@@ -156,15 +150,15 @@ def _infeasible(joint: JointReport, worst: Worst) -> str:
 def _singular(joint: JointReport, worst: Worst) -> str:
     remedy = "lower" if worst.bound == joint.reachable[1] else "raise"
     return (
-        f"stiffness {worst.value:.6g} {worst.unit} at t = {_time(worst.time)} is singular: "
+        f"stiffness {worst.value:.6g} {worst.unit} at t = {time_text(worst.time)} is singular: "
         f"motor torques are undefined at the end of its range, {remedy} it ({_steps(joint, 'singular')})"
     )
 
 
 def _near_singular(joint: JointReport, worst: Worst) -> str:
-    gap = abs(worst.value - worst.bound) / worst.value
+    gap, when = abs(worst.value - worst.bound) / worst.value, f"at t = {time_text(worst.time)}"
     return (
-        f"warning: stiffness {worst.value:.6g} {worst.unit} at t = {_time(worst.time)} is {100 * gap:.2g} % "
+        f"warning: stiffness {worst.value:.6g} {worst.unit} {when} is {100 * gap:.2g} % "
         f"from singular, where motor torques grow without bound ({_steps(joint, 'near_singular')})"
     )
 
@@ -182,8 +176,8 @@ def _limit(joint: JointReport, worst: Worst) -> str:
     relation = "below" if worst.value < worst.bound else "above"
     first = joint.first_time[worst.kind]
     return (
-        f"{whose} is {value} {worst.unit} at t = {_time(worst.time)}, {relation} its limit {bound} "
-        f"(first at {_time(first)})"
+        f"{whose} is {value} {worst.unit} at t = {time_text(worst.time)}, {relation} its limit {bound} "
+        f"(first at {time_text(first)})"
     )
 
 
@@ -265,7 +259,7 @@ def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterat
     infeasible = {joint.name: joint.steps["infeasible"] for joint in joints}
     for drift in drifts:
         if drift.stop is not None:
-            time, reason = _time(drift.stop.time), drift.stop.reason
+            time, reason = time_text(drift.stop.time), drift.stop.reason
             steps = f"infeasible: {count(infeasible[drift.joint])}"
             yield f"{drift.joint}: its deflections cannot be followed beyond t = {time}: {reason} ({steps})"
 
@@ -279,7 +273,7 @@ def drift_lines(drifts: Sequence[JointDrift]) -> Iterator[str]:
 def _drift_of(drift: JointDrift) -> str:
     if math.isnan(drift.largest):
         return f"{drift.joint} none (no step followed)"
-    return f"{drift.joint} {drift.largest:.1e} {drift.unit} at {_time(drift.time)}"
+    return f"{drift.joint} {drift.largest:.1e} {drift.unit} at {time_text(drift.time)}"
 
 
 def _by_joint(label: str, entries: Sequence[str]) -> str:
@@ -294,8 +288,8 @@ def _by_joint(label: str, entries: Sequence[str]) -> str:
 def self_check_line(check: SelfCheck) -> str:
     """Whether the self-check passed, and by how much."""
     if check.passed:
-        return f"self-check passed ({check.ladder:.1g}, bound {LADDER_BOUND:.0e})"
+        return f"self-check passed ({check.ladder:.1g}, bound {check.ladder_bound:.0e})"
     return (
-        f"SELF-CHECK FAILED: derivatives are off by {check.ladder:.1e} (bound {LADDER_BOUND:.0e}), "
+        f"SELF-CHECK FAILED: derivatives are off by {check.ladder:.1e} (bound {check.ladder_bound:.0e}), "
         f"springs by {check.spring_residual:.1e} (bound {check.spring_bound:.0e}); do not use these torques"
     )

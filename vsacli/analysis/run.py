@@ -123,8 +123,8 @@ class Run:
     def _self_check(self) -> SelfCheck:
         """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
         bound = SPRING_BOUND if self._deflections is None else DRIFT_BOUND
-        found = ladder(self.robot, self.trajectory, self.choice.engine)
-        return SelfCheck(self._spring_residual, found, bound)
+        error, error_bound = ladder(self.robot, self.trajectory, self.choice.engine)
+        return SelfCheck(self._spring_residual, error, bound, error_bound)
 
 
 def inverse_dynamics(

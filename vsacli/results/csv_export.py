@@ -15,6 +15,7 @@ import numpy as np
 from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError, VsacliError
+from vsacli.base.units import time_text
 from vsacli.base.variables import VARIABLES, Variable, column_names, select_variables
 from vsacli.results.store.reader import StoredResult
 
@@ -45,7 +46,7 @@ class Gap:
 
     def __str__(self) -> str:
         samples = "1 sample" if self.count == 1 else f"{self.count} samples"
-        return f"{self.joint}.{self.variable} has no value at {samples}, first at t = {self.time:.6g} s"
+        return f"{self.joint}.{self.variable} has no value at {samples}, first at t = {time_text(self.time)}"
 
 
 class UndefinedSamplesError(VsacliError):
@@ -156,7 +157,7 @@ def _stored_rate(result: StoredResult) -> float:
     step = float(time[-1] - time[0]) / steps
     error = np.abs(time - (time[0] + step * np.arange(result.samples)))
     if error.max() > STEP_TOLERANCE * step:
-        place = f"near t = {time[error.argmax()]:.6g} s"
+        place = f"near t = {time_text(float(time[error.argmax()]))}"
         message = f"the stored times are not equally spaced ({place}); export without --rate"
         raise InputError.one(message, result.path)
     return 1 / step

@@ -141,8 +141,9 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     times = _times(document, recordings, source.path)
     if recordings:
         _check_lasting(document, times, source.path, joints.names)
+    first, last = times.span
     profiles: dict[str, Profile] = {
-        signal.key: formula.over(times.span) for signal, formula in document.formulas.items()
+        signal.key: formula.over((0.0, last - first)) for signal, formula in document.formulas.items()
     }
     profiles |= {each.signal.key: each for recording in recordings for each in recording.profiles}
     wrench = document.declared.get(WRENCH)

@@ -35,6 +35,9 @@ class Times(Protocol):
     def block(self, start: int, stop: int) -> FloatArray:
         """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
 
+    def from_zero(self) -> Times:
+        """The same times, counted from the first."""
+
     def stretched(self, factor: float) -> Times:
         """The times of the same motion made slower by a factor, from the same first time on."""
 
@@ -94,6 +97,10 @@ class UniformTimes:
             time[-1] = self.duration
         return time
 
+    def from_zero(self) -> UniformTimes:
+        """They are."""
+        return self
+
     def stretched(self, factor: float) -> UniformTimes:
         """A longer duration at the same rate."""
         return UniformTimes(stretch(self.duration, 0.0, factor), self.rate)
@@ -124,6 +131,10 @@ class RecordedTimes:
     def block(self, start: int, stop: int) -> FloatArray:
         """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
         return self.time[start:stop]
+
+    def from_zero(self) -> RecordedTimes:
+        """The same times, counted from the first."""
+        return RecordedTimes(self.time - self.time[0], self.notes)
 
     def stretched(self, factor: float) -> RecordedTimes:
         """As many steps, further apart."""

@@ -22,13 +22,17 @@ from vsacli.trajectory.times import Times
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
+NARROWEST_PIECE = 1e-9
+"""Share of the duration; pieces below arise where knots of two splines coincide but for rounding."""
+
 
 class Trajectory:
     """Motion and commanded signals of all joints, and the wrench at the end effector, over the same times.
 
     Attributes:
         times: the steps.
-        position: the motion at them and between them.
+        position: the motion at them and between them. All profiles count from the first step: stamps since
+            1970 are rounded to 2.4e-7 s, too coarse for knots, integrators and differences.
         commanded: each signal of `COMMANDED` by its key, e.g. `stiffness`; NaN for a joint for which none is
             chosen.
         wrench: what the environment exerts meanwhile; None if nothing.
@@ -50,7 +54,7 @@ class Trajectory:
         notes: Iterable[str] = (),
         sources: Iterable[Source] = (),
     ) -> None:
-        """Join profiles that have the same joints and the span of the times.
+        """Join profiles that have the same joints, and go from zero to the duration.
 
         A signal that is not among `commanded` is chosen for no joint.
 
@@ -59,7 +63,7 @@ class Trajectory:
         """
         self.times, self.position, self.wrench, self.name = times, position, wrench, name
         self.commanded = {
-            key: commanded[key] if key in commanded else _nothing(signal, position.components, times)
+            key: commanded[key] if key in commanded else self._nothing(signal)
             for key, signal in COMMANDED.items()
         }
         profiles = [profile for _, profile in self._profiles()]
@@ -87,13 +91,17 @@ class Trajectory:
         for key, profile in self.commanded.items():
             if self.joints != profile.components:
                 raise InputError.one(f"the position has {self.joints} joints, the {key} {profile.components}")
-        first, last = self.times.span
+        rounding = np.spacing(max(map(abs, self.times.span)))
         for part, profile in self._profiles():
             start, end = profile.breakpoints[[0, -1]]
-            if (start, end) != (first, last):
+            if start != 0 or abs(end - self.duration) > 2 * rounding:
                 raise InputError.one(
-                    f"the {part} spans {start:g} to {end:g} s, the steps {first:g} to {last:g} s"
+                    f"the {part} spans {start:g} to {end:g} s, the steps 0 to {self.duration:g} s"
                 )
+
+    def _nothing(self, signal: Signal) -> Constant:
+        """The profile of a signal that is chosen for no joint."""
+        return Constant(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
 
     @classmethod
     def from_samples(
@@ -176,6 +184,11 @@ class Trajectory:
         return self.times.samples
 
     @property
+    def start(self) -> float:
+        """Time of the first step, s."""
+        return self.times.span[0]
+
+    @property
     def duration(self) -> float:
         """Time from the first step to the last, s."""
         first, last = self.times.span
@@ -184,12 +197,13 @@ class Trajectory:
     def block(self, start: int, stop: int) -> Motion:
         """The steps start..stop-1; like a slice, it ends where the steps end."""
         time = self.times.block(start, stop)
-        return self._motion(time, lambda profile: profile.samples(start, stop, time))
+        return self._motion(time, lambda profile: profile.samples(start, stop, time - self.start))
 
     def at(self, time: ArrayLike) -> Motion:
         """The smooth functions at any times of the span, (samples,) or (); given derivatives play no part."""
         times = np.asarray(time, dtype=np.float64)
-        motion = self._motion(np.atleast_1d(times), lambda profile: profile.at(np.atleast_1d(times)))
+        elapsed = np.atleast_1d(times) - self.start
+        motion = self._motion(np.atleast_1d(times), lambda profile: profile.at(elapsed))
         return motion if times.ndim else motion.mapped(times, lambda rows, _: rows[0])
 
     def _motion(self, time: FloatArray, rows: Callable[[Profile], FloatArray]) -> Motion:
@@ -221,12 +235,23 @@ class Trajectory:
             sources=self.sources,
         )
 
+    def from_zero(self) -> Trajectory:
+        """The same from time zero on, for what needs times between the steps as exact as can be."""
+        return Trajectory(
+            self.times.from_zero(),
+            self.position,
+            self.commanded,
+            wrench=self.wrench,
+            name=self.name,
+            sources=self.sources,
+        )
+
     @property
     def breakpoints(self) -> FloatArray:
         """Ascending times between which all its functions are analytic; the first and last are its span."""
         times = np.sort(np.concatenate([profile.breakpoints for _, profile in self._profiles()]))
         distinct: FloatArray = times[np.append(True, np.diff(times) > 0)]  # np.unique would import numpy.ma
-        return distinct
+        return self.start + distinct
 
     def check_points(self, count: int) -> tuple[FloatArray, FloatArray]:
         """`count` times all over the span at which the derivatives can be checked by finite differences.
@@ -234,18 +259,15 @@ class Trajectory:
         Returns:
             Times (count,), respaced evenly within the pieces of the functions that evenly spread times fall
             into, and for each the distance to the nearest end of its piece, within which all is analytic.
+            Pieces too narrow for differences are passed over.
         """
         ends = self.breakpoints
+        wide = np.diff(ends) > NARROWEST_PIECE * self.duration
+        starts, stops = ends[:-1][wide], ends[1:][wide]
         spread = ends[0] + self.duration * (np.arange(count) + 0.5) / count
-        piece, which, hits = np.unique(
-            np.searchsorted(ends, spread, side="right") - 1, return_inverse=True, return_counts=True
-        )
+        after = np.searchsorted(starts, spread, side="right") - 1
+        piece, which, hits = np.unique(np.maximum(after, 0), return_inverse=True, return_counts=True)
         rank = np.arange(count) - (np.cumsum(hits) - hits)[which]
-        left, right = ends[piece][which], ends[piece + 1][which]
+        left, right = starts[piece][which], stops[piece][which]
         time = left + (right - left) * (rank + 0.5) / hits[which]
         return time, np.minimum(time - left, right - time)
-
-
-def _nothing(signal: Signal, joints: int, times: Times) -> Constant:
-    """The profile of a signal that is chosen for no joint."""
-    return Constant(signal=signal, span=times.span, value=(math.nan,) * joints)

@@ -44,6 +44,7 @@ class IntegratedDeflections:
 
     stops: tuple[Stop | None, ...]
     _ways: tuple[_Way, ...] = field(repr=False)
+    _start: float
 
     def at(self, time: FloatArray) -> FloatArray:
         """Deflections of all joints at any times of the span, (joints, 2, samples).
@@ -51,10 +52,11 @@ class IntegratedDeflections:
         NaN from a stop on, and at joints that are not antagonistic.
         """
         phi = np.full((len(self.stops), 2, len(time)), np.nan)
+        elapsed = time - self._start
         for way in self._ways:
-            here = (way.solution.t_min <= time) & (time <= way.solution.t_max)
+            here = (way.solution.t_min <= elapsed) & (elapsed <= way.solution.t_max)
             if here.any():
-                for joint, deflections in zip(way.joints, way.deflections(time[here]), strict=True):
+                for joint, deflections in zip(way.joints, way.deflections(elapsed[here]), strict=True):
                     phi[joint][:, here] = deflections
         for joint, stop in enumerate(self.stops):
             if stop is not None:
@@ -76,16 +78,17 @@ def integrate_deflections(
         trajectory: what it is asked to do.
         tolerance: relative error admitted in an integration step, at least 1e-13.
     """
+    first, trajectory = trajectory.start, trajectory.from_zero()
     task = Task(robot, trajectory)
     if not task.joints:
-        return IntegratedDeflections((None,) * trajectory.joints, ())
+        return IntegratedDeflections((None,) * trajectory.joints, (), first)
     time, end = trajectory.times.span
     pieces = Pieces.of(trajectory, tolerance)
     phi = np.full((trajectory.joints, SIDES, 1), np.nan)
     phi[list(task.joints)] = task.roots(task.joints, np.array([time]))
     hindrances = task.hindrances(task.joints, np.array([time]), phi[list(task.joints)])[:, 0]
     found = zip(task.joints, hindrances.tolist(), strict=True)
-    stops = {joint: Stop(time, REASONS[reason]) for joint, reason in found if reason}
+    stops = {joint: Stop(first + time, REASONS[reason]) for joint, reason in found if reason}
     ways = []
     while time < end and len(stops) < len(task.joints):
         going = [joint for joint in task.joints if joint not in stops]
@@ -94,5 +97,5 @@ def integrate_deflections(
             time = integration.times[-1]
             ways.append(_Way(going, integration.solution()))
             phi[going] = ways[-1].deflections(np.array([time]))
-        stops |= {joint: Stop(time, reason) for joint, reason in integration.stopped.items()}
-    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(ways))
+        stops |= {joint: Stop(first + time, reason) for joint, reason in integration.stopped.items()}
+    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(ways), first)

@@ -159,14 +159,12 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
             steps, (3, steps), N m/rad (N/m) per s^k.
     """
     time = trajectory.times.block(0, trajectory.samples)
-    rows = trajectory.commanded[STIFFNESS.key].samples(0, trajectory.samples, time).copy()
+    rows = trajectory.commanded[STIFFNESS.key].samples(0, trajectory.samples, time - trajectory.start).copy()
     for joint, change in changes.items():
         rows[:, joint] += change
     values, *derivatives = rows
     labels = tuple(f"column {joint}" for joint in range(len(values)))
-    samples = Samples(
-        signal=STIFFNESS, time=time, values=values, derivatives=tuple(derivatives), labels=labels
-    )
+    samples = Samples.recorded(STIFFNESS, time, values, tuple(derivatives), labels)
     commanded = {**trajectory.commanded, STIFFNESS.key: SampledProfile.of(samples, INTERPOLATE)}
     name = f"{trajectory.name}-fixed"
     return Trajectory(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.units import time_text
 from vsacli.trajectory.fits.fit import Fit, Part
 from vsacli.trajectory.fits.selection import (
     INTERPOLATE,
@@ -149,6 +150,8 @@ def mismatches(
     time: FloatArray,
     derivatives: Sequence[FloatArray | None],
     fit: Fit,
+    *,
+    start: float = 0.0,
 ) -> Iterator[str]:
     """A sentence for each column of given derivatives that does not follow from the fit of the values.
 
@@ -162,9 +165,10 @@ def mismatches(
         time: (samples,), s.
         derivatives: of the signal, each (components, samples) if it is given.
         fit: of the signal.
+        start: stamp of the time zero, s, with which times are told.
     """
-    start, end = np.minimum(fit.doubtful, (time[-1] - time[0]) / 4)
-    inside = (time >= time[0] + start) & (time <= time[-1] - end)
+    first, last = np.minimum(fit.doubtful, (time[-1] - time[0]) / 4)
+    inside = (time >= time[0] + first) & (time <= time[-1] - last)
     if not inside.any() or all(given is None for given in derivatives):
         return
     rows = fit.at(time[inside], len(names))
@@ -173,7 +177,7 @@ def mismatches(
             found = given[:, inside]
             for component in np.flatnonzero(_differ(found, rows, order, fit)).tolist():
                 what = f"{names[order]} of {labels[component]} does not follow from {names[0]}"
-                yield f"{what}: {_extent(time[inside], found[component], rows[order, component])}"
+                yield f"{what}: {_extent(start + time[inside], found[component], rows[order, component])}"
 
 
 def _differ(given: FloatArray, rows: FloatArray, order: int, fit: Fit) -> BoolArray:
@@ -210,7 +214,7 @@ def _extent(time: FloatArray, given: FloatArray, expected: FloatArray) -> str:
         hint = next((hint for ratio, hint in FACTORS.items() if abs(factor / ratio - 1) < SHARE), None)
         return f"it is {factor:.3g} times as large throughout" + (f" ({hint})" if hint else "")
     amounts = f"{given[worst]:.4g} instead of {expected[worst]:.4g}"
-    return f"it differs by up to {difference[worst]:.3g} ({amounts} at t = {time[worst]:.6g} s)"
+    return f"it differs by up to {difference[worst]:.3g} ({amounts} at t = {time_text(time[worst])})"
 
 
 def _factor(given: FloatArray, expected: FloatArray) -> float | None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from vsacli.base.arrays import BoolArray, FloatArray, by_joint
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import Signal
+from vsacli.base.units import time_text
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.fits import METHODS
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
@@ -69,7 +70,7 @@ def samples_of_arrays(
         for name, array in zip(names, derivatives, strict=True)
     )
     labels = tuple(f"column {index}" for index in range(len(rows)))
-    return Samples(signal=signal, time=time, values=rows, derivatives=further, labels=labels)
+    return Samples.recorded(signal, time, rows, further, labels)
 
 
 def checked_array(name: str, array: npt.ArrayLike, *shape: int | None) -> FloatArray:
@@ -126,15 +127,15 @@ def value_problems(samples: Samples) -> Iterator[SampleProblem]:
         yield SampleProblem(
             name, f"needs at least {degree + 1} samples for a C{degree - 1} spline, not {count}"
         )
-    given = np.flatnonzero(samples.given).tolist()
+    given, stamps = np.flatnonzero(samples.given).tolist(), samples.start + samples.time
     for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
         for joint, row in () if rows is None else zip(given, rows[given], strict=True):
-            yield from _breach(column, joint, samples.time, row, np.isfinite(row), "finite")
+            yield from _breach(column, joint, stamps, row, np.isfinite(row), "finite")
             small = ~(np.isfinite(row) & (np.abs(row) > LARGEST_VALUE))
-            yield from _breach(column, joint, samples.time, row, small, f"at most {LARGEST_VALUE:g} in size")
+            yield from _breach(column, joint, stamps, row, small, f"at most {LARGEST_VALUE:g} in size")
     if signal.positive:
         for joint, row in zip(given, samples.values[given], strict=True):
-            yield from _breach(name, joint, samples.time, row, ~(row <= 0), "positive")
+            yield from _breach(name, joint, stamps, row, ~(row <= 0), "positive")
 
 
 def _breach(
@@ -144,6 +145,6 @@ def _breach(
     if holds.all():
         return
     first, count = int(np.argmin(holds)), len(holds) - int(np.count_nonzero(holds))
-    message = f"must be {requirement}, not {row[first]:g} (t = {time[first]:g} s"
+    message = f"must be {requirement}, not {row[first]:g} (t = {time_text(float(time[first]))}"
     message += ")" if count == 1 else f"; {count} such samples)"
     yield SampleProblem(quantity, message, joint, first)

@@ -118,7 +118,7 @@ def _samples(
         for name in signal.names
     )
     assert values is not None, "columns of values are required"
-    return Samples(signal=signal, time=time, values=values, derivatives=tuple(derivatives), labels=labels)
+    return Samples.recorded(signal, time, values, tuple(derivatives), labels)
 
 
 def _rows(table: Table, columns: Mapping[int, Column], components: int) -> FloatArray:

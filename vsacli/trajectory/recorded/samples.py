@@ -21,10 +21,11 @@ class Samples:
 
     Attributes:
         signal: what is described.
-        time: (samples,) in s.
+        time: (samples,) in s, from the first sample on: stamps since 1970 are too coarse for splines.
         values: (components, samples); NaN throughout if the signal is optional and a component has none.
         derivatives: for each derivative of the signal the given values, (components, samples), or None.
         labels: what the components are called in sentences.
+        start: stamp of the first sample, s.
     """
 
     signal: Signal
@@ -32,6 +33,27 @@ class Samples:
     values: FloatArray = field(repr=False)
     derivatives: tuple[FloatArray | None, ...] = field(repr=False)
     labels: tuple[str, ...]
+    start: float = 0.0
+
+    @classmethod
+    def recorded(
+        cls,
+        signal: Signal,
+        stamps: FloatArray,
+        values: FloatArray,
+        derivatives: tuple[FloatArray | None, ...],
+        labels: tuple[str, ...],
+    ) -> Samples:
+        """Samples by their stamps, (samples,) in s, from whatever instant these count."""
+        start = float(stamps[0]) if len(stamps) else 0.0
+        return cls(
+            signal=signal,
+            time=stamps - start,
+            values=values,
+            derivatives=derivatives,
+            labels=labels,
+            start=start,
+        )
 
     @property
     def given(self) -> BoolArray:
@@ -55,7 +77,9 @@ class Samples:
         value, *names = self.signal.names
         yield from fit_sentences(value, names if resampled else self.missing, self.labels, self.time, fit)
         if not resampled:
-            yield from mismatches(self.signal.names, self.labels, self.time, self.derivatives, fit)
+            yield from mismatches(
+                self.signal.names, self.labels, self.time, self.derivatives, fit, start=self.start
+            )
 
     def stretched(self, factor: float) -> Samples:
         """The same values further apart; what was given of derivatives becomes smaller."""
@@ -63,7 +87,7 @@ class Samples:
             None if given is None else given / factor**order
             for order, given in enumerate(self.derivatives, start=1)
         )
-        return replace(self, time=stretch(self.time, self.time[0], factor), derivatives=derivatives)
+        return replace(self, time=stretch(self.time, 0.0, factor), derivatives=derivatives)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
