@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.analysis.report import Report
+from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.drive import Drive, drive
@@ -30,6 +32,8 @@ EXAMPLES = {
     "R-P": ("rp_2", "rp_2"),
 }
 examples = pytest.mark.parametrize("example", EXAMPLES)
+
+EPS = np.finfo(float).eps
 
 ROUNDING = 1e-9
 """Sound results lie ten times below the bound; closed forms do so a thousand times and more."""
@@ -137,6 +141,51 @@ def test_recorded_motion_passes(rate: int):
     q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])
     stiffness = 1000 + 50 * np.sin(0.7 * time[:, None] * [1.0, 1.3, 1.7])
     report = inverse_dynamics(vsa_3r(), Trajectory.from_samples(time, q, stiffness)).report
+    assert report.verdict == "ok"
+    assert_sound(report)
+
+
+def fast_recording(**options: Any) -> Trajectory:
+    """Ten seconds at 10 kHz, interpolated: a knot each 0.1 ms."""
+    time = np.arange(100001) / 10000
+    q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])
+    return Trajectory.from_samples(time, q, np.full_like(q, 1000.0), fit="interpolate", **options)
+
+
+def test_bound_follows_rounding_where_sampling_is_fast():
+    trajectory = fast_recording()
+    error, bound = ladder(vsa_3r(), trajectory)
+    # Steps of a 48th of the knot spans' 1e-4 s; what rounding leaves is a tenth of the bound and less.
+    assert bound == pytest.approx(ROUNDING_GAIN * EPS * 10 * 48 / 1e-4, rel=1e-6)
+    assert LADDER_BOUND < bound < 1e-6
+    assert error < bound / 10
+
+
+@pytest.mark.parametrize("order", [1, 2], ids=["dtau_e", "ddtau_e"])
+@pytest.mark.parametrize("defect", [1e-2, 1e-6])
+def test_wrong_derivative_is_found_where_sampling_is_fast(order: int, defect: float, monkeypatch):
+    spoil_torque(monkeypatch, order, scaled(1 + defect))
+    error, bound = ladder(vsa_3r(), fast_recording())
+    assert error == pytest.approx(defect, rel=0.05)
+    assert error > bound
+
+
+@pytest.mark.slow
+def test_a_million_samples_at_10_khz_pass_and_a_wrong_derivative_does_not(monkeypatch):
+    time = np.arange(1_000_001) / 10000
+    q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])
+    trajectory = Trajectory.from_samples(time, q, np.full_like(q, 1000.0))
+    error, bound = ladder(vsa_3r(), trajectory)
+    assert error < bound < 1e-6
+    spoil_torque(monkeypatch, 2, scaled(1.01))
+    assert ladder(vsa_3r(), trajectory)[0] == pytest.approx(0.01, rel=0.05)
+
+
+def test_stamps_since_1970_pass():
+    time = np.arange(1001) / 1000
+    q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])
+    stiffness = np.full_like(q, 1000.0)
+    report = inverse_dynamics(vsa_3r(), Trajectory.from_samples(1.7e9 + time, q, stiffness)).report
     assert report.verdict == "ok"
     assert_sound(report)
 

@@ -11,6 +11,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.trajectory.curves.piecewise import Chain
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
@@ -185,6 +186,38 @@ def test_check_points_keep_within_one_analytic_piece(samples, count):
     # no point is lost in a corner of its piece: it has at least half an even share
     share = np.minimum(np.diff(np.unique(knots)).min(), trajectory.duration / count)
     assert reach.min() > share / 4
+
+
+def test_check_points_pass_over_pieces_as_narrow_as_rounding():
+    """Knots of two splines coincide but for rounding, and an evenly spread time falls just there."""
+    level = (1.0,) * JOINTS
+
+    def halves(signal, middle):
+        spans = (0.0, middle), (middle, 2.0)
+        parts = tuple(Constant(signal=signal, span=span, value=level) for span in spans)
+        return Chain(signal=signal, span=(0.0, 2.0), parts=parts)
+
+    stiffness = halves(STIFFNESS, 1.0 + EPS)
+    trajectory = Trajectory(
+        UniformTimes(2.0, 50.0), halves(POSITION, 1.0), {"stiffness": stiffness}, name="halves"
+    )
+    time, reach = trajectory.check_points(1)
+    assert (time.item(), reach.item()) == (0.5, 0.5)
+
+
+def test_stamps_since_1970_give_the_motion_from_zero():
+    time = np.arange(1001) / 1000
+    q, stiffness = np.sin(3 * time)[:, None], 900 + 10 * np.cos(2 * time)[:, None]
+    zero, late = (Trajectory.from_samples(start + time, q, stiffness, fit="lsq") for start in (0, 1.7e9))
+    here, there = zero.block(0, 1001), late.block(0, 1001)
+    np.testing.assert_array_equal(there.time, 1.7e9 + time)
+    inside = slice(300, 700)
+    # stamps are rounded by up to 1.2e-7 s, the values so by 3e-7; least squares leave 1e-4 of d4q's 81
+    np.testing.assert_allclose(there.d4q[inside], here.d4q[inside], atol=0.02)
+    # between the steps: times are rounded as well
+    between = late.at(1.7e9 + time[inside] + 5e-4)
+    np.testing.assert_allclose(between.d4q, zero.at(between.time - 1.7e9).d4q, atol=0.02)
+    assert late.from_zero().times.span == (0.0, pytest.approx(1.0, abs=2.4e-7))
 
 
 def test_differences_within_reach_confirm_the_derivatives():

@@ -165,8 +165,8 @@ def _near_singular(joint: JointReport, worst: Worst) -> str:
 
 def _not_finite(joint: JointReport, worst: Worst) -> str:
     return (
-        f"a number of its motors is not finite at t = {_time(worst.time)}: motion, stiffness or load are too "
-        f"large, or no numbers (infeasible: {_steps(joint, 'infeasible')})"
+        f"a number of its motors is not finite at t = {time_text(worst.time)}: motion, stiffness or load are "
+        f"too large, or no numbers (infeasible: {_steps(joint, 'infeasible')})"
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import copy
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -237,14 +238,9 @@ class Trajectory:
 
     def from_zero(self) -> Trajectory:
         """The same from time zero on, for what needs times between the steps as exact as can be."""
-        return Trajectory(
-            self.times.from_zero(),
-            self.position,
-            self.commanded,
-            wrench=self.wrench,
-            name=self.name,
-            sources=self.sources,
-        )
+        same = copy(self)
+        same.times = self.times.from_zero()
+        return same
 
     @property
     def breakpoints(self) -> FloatArray:
