@@ -68,7 +68,7 @@ def test_a_file_that_may_not_be_read(monkeypatch):
 
 
 def test_a_path_with_a_nul():
-    assert only_problem("a\0b") == "a\0b: the path holds a NUL character"
+    assert only_problem("a\0b") == "a\\x00b: the path holds a NUL character"
 
 
 @pytest.mark.parametrize("content", ["", " \n\n"])

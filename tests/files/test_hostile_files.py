@@ -132,5 +132,5 @@ def test_devices_and_folders_are_no_files(vsacli: Any) -> None:
     assert done.out.splitlines() == [
         "/dev/zero: is no regular file (a device, pipe or socket)",
         "folder: is a directory, expected a file",
-        "a\0b: the path holds a NUL character",
+        "a\\x00b: the path holds a NUL character",
     ]

@@ -251,4 +251,4 @@ def test_a_link_to_another_file_is_not_followed(vsacli: Any, small_result: Path)
 
 def test_a_path_with_a_nul(vsacli: Any) -> None:
     done = vsacli("export", "a\0b.h5")
-    assert (done.code, done.err) == (2, "a\0b.h5: the path holds a NUL character\n")
+    assert (done.code, done.err) == (2, "a\\x00b.h5: the path holds a NUL character\n")

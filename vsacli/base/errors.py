@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from vsacli.base.texts import one_line
+
 
 class VsacliError(Exception):
     """Root of every error the tool raises on purpose."""
@@ -27,7 +29,7 @@ class Problem(NamedTuple):
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}: " if self.line else f"{self.file}: " if self.file else ""
-        return place + self.message
+        return one_line(place + self.message)
 
 
 class InputError(VsacliError, ValueError):
@@ -128,4 +130,4 @@ class StorageError(VsacliError):
 
     def __init__(self, path: str | Path, message: str) -> None:
         self.path = str(path)
-        super().__init__(f"{path}: {message}")
+        super().__init__(one_line(f"{path}: {message}"))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self, TextIO, cast
 import click
 
 from vsacli.base.errors import StorageError
+from vsacli.base.texts import for_terminal
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -65,7 +66,7 @@ class OutputClosedError(OutputError):
 def tell(message: str) -> None:
     """Print a message on stderr; a run does not fail because nobody can read it."""
     with suppress(OSError):
-        click.echo(message, err=True)
+        click.echo(for_terminal(message), err=True)
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,7 @@ class _CheckedOutput:
 
     def write(self, text: str) -> int:
         with _raising_output_errors():
-            return self._stream.write(text)
+            return self._stream.write(for_terminal(text))
 
     def flush(self) -> None:
         with _raising_output_errors():

@@ -13,7 +13,7 @@ from typing import Any
 from vsacli.base.units import Quantity
 from vsacli.documents.kinds.lists import Items, Pair
 from vsacli.documents.kinds.nested import OneOf, Record
-from vsacli.documents.kinds.single import IDENTIFIER, Boolean, Choice, Integer, Number, TableFile, Text
+from vsacli.documents.kinds.single import IDENTIFIER, Boolean, Choice, Integer, Name, Number, TableFile, Text
 from vsacli.documents.kinds.vectors import Interval, PerJoint, Vector
 from vsacli.documents.records import LARGEST, REQUIRED, SMALLEST, Check, Field, Kind, check_fields, declared
 
@@ -34,6 +34,7 @@ __all__ = [
     "Interval",
     "Items",
     "Kind",
+    "Name",
     "Number",
     "OneOf",
     "Pair",

@@ -170,7 +170,7 @@ def chain_of(robot: Robot, frame: str | None = None) -> Chain:
     """
     joints = tuple(replace(joint, actuator=_ANY_DRIVE, limits=Limits()) for joint in robot.joints)
     return _recorded(
-        Robot(name="", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints), frame
+        Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints), frame
     )
 
 

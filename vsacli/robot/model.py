@@ -12,6 +12,7 @@ from vsacli.base.errors import check_type
 from vsacli.base.tables import aligned, html_table
 from vsacli.documents.fields import (
     Items,
+    Name,
     Record,
     boolean,
     check_fields,
@@ -32,7 +33,7 @@ OF_PLACEHOLDERS = (
 class Robot:
     """A serial chain of joints from a fixed base."""
 
-    name: str = text("name of the robot")
+    name: str = value(Name(), "name of the robot")
     description: str = text("what the robot is and where its numbers come from", default="")
     placeholder: bool = boolean(
         "whether springs and motors stand in for others that are not known yet, which every report repeats",

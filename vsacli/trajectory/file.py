@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.documents.fields import POSITIVE, REQUIRED, check_fields, number, text, value
+from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
 from vsacli.documents.reading import read_document
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
@@ -36,7 +36,7 @@ class TrajectoryFile:
     What it declares of each signal is an attribute named by the key of the signal, see `content`.
     """
 
-    name: str = text("name of the trajectory")
+    name: str = value(Name(), "name of the trajectory")
     duration: float | None = number(
         units.TIME,
         "duration; absent if anything is recorded, required unless it follows from the times of via points"

@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 
 from vsacli.base.flags import Flag
+from vsacli.base.texts import for_comment
 from vsacli.control.codegen.interface import Array, Function, Structure
 from vsacli.control.codegen.scalar import WIDTH, signature
 from vsacli.robot.model import Robot
@@ -77,5 +78,5 @@ def _declaration(prefix: str, function: Function) -> str:
 
 def comment(text: str) -> str:
     """A comment, in as many lines as it takes, that no text ends early."""
-    lines = textwrap.wrap(text.replace("*/", "* /"), WIDTH - 6)
+    lines = textwrap.wrap(for_comment(text), WIDTH - 6)
     return "/* " + "\n   ".join(lines) + " */"

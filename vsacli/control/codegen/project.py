@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
+from vsacli.base.texts import for_markdown
 from vsacli.base.version import __version__
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.header import comment, header_text
@@ -89,8 +90,8 @@ def readme_text(
 ) -> str:
     """How to use the code."""
     return _README.format(
-        name=robot.name,
-        warnings="".join(f"\nWarning: {warning}.\n" for warning in robot.warnings),
+        name=for_markdown(robot.name),
+        warnings="".join(f"\nWarning: {for_markdown(warning)}.\n" for warning in robot.warnings),
         prefix=prefix,
         upper=prefix.upper(),
         tolerance=TOLERANCE[precision],

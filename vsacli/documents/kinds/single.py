@@ -33,6 +33,12 @@ ANGLE = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*(deg)?[ \t]*$"
 
 TRUTHS = ("true", "false")
 
+MOST_LETTERS = 200
+"""Of a name."""
+
+PRINTABLE = r"^[^\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
+"""How names look, for JSON Schema."""
+
 
 @dataclass(eq=False)
 class Number(Kind):
@@ -140,10 +146,12 @@ class Text(Kind):
         return node.text
 
     def problems(self, path: FieldPath, _check: Check | None, content: Any, /) -> Iterator[FieldProblem]:
-        """Characters that an identifier cannot have."""
+        """Characters that an identifier, or any text, cannot have."""
         if self.identifier and not IDENTIFIER.fullmatch(content):
             requirement = "letters, digits, _ and -, beginning with a letter or _"
             yield FieldProblem(path, f"must be made of {requirement}, not {quoted(content)}")
+        else:
+            yield from _unprintable(path, content, allowed="\n")
 
     def schema(self, _check: Check | None, _refer: Refer, /) -> Schema:
         """A string; a number if any text will do, which YAML may take it for."""
@@ -159,6 +167,33 @@ class Text(Kind):
     def arrays(self, content: Any, _of_record: ArraysOfRecord, /) -> Iterator[ResolvedField]:
         """A single text."""
         yield single((), None, content)
+
+
+@dataclass(eq=False)
+class Name(Text):
+    """A name, which stands in titles, messages and comments of code: one line that can be printed."""
+
+    words = f"text in one line, of at most {MOST_LETTERS} letters"
+
+    def problems(self, path: FieldPath, _check: Check | None, content: Any, /) -> Iterator[FieldProblem]:
+        """Nothing, too much, or letters that cannot be printed."""
+        if not 1 <= len(content) <= MOST_LETTERS:
+            yield FieldProblem(path, f"must have 1 to {MOST_LETTERS} letters, not {len(content)}")
+        yield from _unprintable(path, content)
+
+    def schema(self, _check: Check | None, _refer: Refer, /) -> Schema:
+        """A string, or a number which YAML may take it for."""
+        lengths = {"minLength": 1, "maxLength": MOST_LETTERS}
+        return {"type": ["string", "number"], **lengths, "pattern": PRINTABLE}
+
+
+def _unprintable(path: FieldPath, content: str, *, allowed: str = "") -> Iterator[FieldProblem]:
+    """Control characters, and those that turn the direction of writing."""
+    for letter in content:
+        if not (letter.isprintable() or letter in allowed):
+            what = "has a line break" if letter == "\n" else f"has the character {letter!r}"
+            yield FieldProblem(path, f"{what}, which cannot be printed in one line; remove it")
+            return
 
 
 @dataclass(eq=False)

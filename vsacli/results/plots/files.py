@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
@@ -75,6 +76,7 @@ def save_figures(
 
 def _rendered(figure: Figure, file_format: str) -> bytes:
     buffer = BytesIO()
-    with house_style():
+    with house_style(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # a name in letters that the font has not
         figure.savefig(buffer, format=file_format, metadata=_METADATA[file_format])
     return buffer.getvalue()

@@ -7,13 +7,14 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 import h5py
 import numpy as np
 
 from vsacli.base.arrays import FlagArray, FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.texts import one_line, shown
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import bounded, open_checked, own_dataset, reporting_damage
 from vsacli.results.store.schema import FORMAT, row_shape, storage_type
@@ -61,9 +62,9 @@ class StoredResult:
         self._file = file
         with reporting_damage(path):
             self.attributes: dict[str, Any] = dict(file.attrs)
-            self.robot_name = str(file.attrs["robot_name"])
-            self.trajectory_name = str(file.attrs["trajectory_name"])
-            self.verdict = str(file.attrs["verdict"])
+            self.robot_name, self.trajectory_name, self.verdict = (
+                one_line(str(file.attrs[name])) for name in ("robot_name", "trajectory_name", "verdict")
+            )
             self.complete = bool(file.attrs["complete"])
             self.joint_names = self._labels("joint")
             self.joint_types = self._labels("joint_type")
@@ -81,7 +82,7 @@ class StoredResult:
         return bounded(own_dataset(self._file, name))
 
     def _labels(self, name: str) -> tuple[str, ...]:
-        return tuple(self._bounded(name).asstr()[...])
+        return tuple(map(one_line, self._bounded(name).asstr()[...]))
 
     def _gear_ratios(self) -> FloatArray:
         """The stored ones, which have no second axis if no joint has two motors."""
@@ -95,7 +96,7 @@ class StoredResult:
         content = json.loads(own_dataset(self._file, name).asstr()[()])
         if not isinstance(content, dict):
             raise ValueError(f"{name} is no JSON object")
-        return content
+        return cast("dict[str, Any]", shown(content))
 
     def _check_shapes(self) -> None:
         """Refuse what does not fit together, so that every variable can be read piece by piece."""
@@ -129,11 +130,12 @@ class StoredResult:
         """
         with reporting_damage(self.path):
             groups = [group for name, group in self._file["inputs"].items() if name.startswith("file_")]
-            return {
+            provenance = {
                 **{name: str(self.attributes[name]) for name in ("created", "generated_by", "command_line")},
                 "versions": json.loads(self.attributes["versions"]),
                 "inputs": [{name: str(group.attrs[name]) for name in ("path", "sha256")} for group in groups],
             }
+        return cast("dict[str, Any]", shown(provenance))
 
     def close(self) -> None:
         """Close the file."""

@@ -1,0 +1,146 @@
+"""Names that would act on what shows them: a terminal, a C compiler, a reader of Markdown."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+import yaml
+from samples.command_line import REPOSITORY, ROBOT
+from samples.marks import needs_compiler, slow_but
+
+TRAJECTORY = REPOSITORY / "trajectories" / "rest_to_rest.yaml"
+
+PRINTABLE = {
+    "comment": '*/ int main(void){return system("id");} /*',
+    "preprocessor": "arm \\ ??/ //",
+    "markdown": "[a](http://b) <script>x</script> `c` **d** # e",
+    "mathematics": "$\\frac{a}{b}$ _{",
+    "spreadsheet": "=HYPERLINK(1)",
+    "format": "%s %n {0} {name}",
+    "letters": "Ärm 腕",
+    "long": "x" * 200,
+}
+"""Names that are allowed and must do nothing."""
+
+UNPRINTABLE = {
+    "escape": "\x1b[2J\x1b[1;1Hall feasible",
+    "command": "\x1b]0;title\x07",
+    "return": "arm\rINFEASIBLE",
+    "break": "arm\n: 4001 steps, 4 s   OK",
+    "null": "a\x00b",
+    "tab": "a\tb",
+    "c1": "a\x9b31mb",
+    "bidirectional": "a\u202eelbisaefni",
+    "isolate": "a\u2066b\u2069",
+    "separator": "a\u2028b",
+    "zero width": "a\u200bb",
+    "surrogate": "a\ud800b",
+    "long": "x" * 201,
+    "nothing": "",
+}
+"""Names that are refused in files, and shown encoded where an older result holds them."""
+
+
+def quoted(name: str) -> str:
+    """As a YAML scalar; a lone surrogate as its escape."""
+    return json.dumps(name)
+
+
+def renamed(path: Path, folder: Path, name: str) -> Path:
+    """A copy of a file whose `name` is another."""
+    copy = folder / path.name
+    text = path.read_text(encoding="utf-8")
+    copy.write_text(re.sub(r"(?m)^name: .*$", lambda _: f"name: {quoted(name)}", text), encoding="utf-8")
+    return copy
+
+
+def clean(text: str) -> bool:
+    """Whether a terminal shows every letter as a letter."""
+    return all(letter.isprintable() or letter == "\n" for letter in text)
+
+
+@pytest.mark.parametrize("kind", slow_but({"comment"}, PRINTABLE))
+def test_a_printable_name_goes_everywhere_and_does_nothing(vsacli: Any, tmp_path: Path, kind: str) -> None:
+    name = PRINTABLE[kind]
+    robot, trajectory = (renamed(path, tmp_path, name) for path in (ROBOT, TRAJECTORY))
+    motion = yaml.safe_load(trajectory.read_text(encoding="utf-8"))
+    trajectory.write_text(yaml.safe_dump({**motion, "rate": 25}, allow_unicode=True), encoding="utf-8")
+    for arguments in (
+        ("validate", robot, trajectory),
+        ("info", robot),
+        ("invdyn", robot, trajectory, "-o", "r.h5", "--plot", "figures"),
+        ("info", "r.h5"),
+        ("export", "r.h5"),
+        ("plot", "r.h5", "r.h5", "-o", "compared"),
+        ("codegen", robot, "-o", "code"),
+    ):
+        done = vsacli(*arguments)
+        assert done.code == 0, (arguments, done)
+        assert clean(done.out + done.err)
+    readme = (tmp_path / "code" / "README.md").read_text(encoding="utf-8").splitlines()[0]
+    assert re.sub(r"\\(.)", r"\1", readme) == f"# {name} in C"
+    assert not re.search(r"(?<!\\)[`*\[<]", readme)
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PRINTABLE.values(), ids=PRINTABLE)
+def test_generated_code_is_what_it_is_under_any_name(vsacli: Any, tmp_path: Path, name: str) -> None:
+    """Without its comments every file is the one that a harmless name gives, and the compiler is content."""
+    assert vsacli("codegen", renamed(ROBOT, tmp_path, name), "-o", "code").code == 0
+    prefix = next((tmp_path / "code").glob("*.h")).stem
+    assert vsacli("codegen", renamed(ROBOT, tmp_path, prefix), "-o", "plain").code == 0
+    for path in (tmp_path / "code").glob("*.[ch]"):
+        code, plain = (
+            re.sub(r"/\*.*?\*/", "", (tmp_path / folder / path.name).read_text(encoding="utf-8"), flags=re.S)
+            for folder in ("code", "plain")
+        )
+        assert code == plain
+    command = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"{prefix}.c"]
+    assert subprocess.run(command, cwd=tmp_path / "code", check=False).returncode == 0
+
+
+@pytest.mark.parametrize("name", UNPRINTABLE.values(), ids=UNPRINTABLE)
+@pytest.mark.parametrize("which", [ROBOT, TRAJECTORY], ids=["robot", "trajectory"])
+def test_other_names_are_refused_with_their_line(vsacli: Any, tmp_path: Path, which: Path, name: str) -> None:
+    files = [renamed(path, tmp_path, name if path == which else "arm") for path in (ROBOT, TRAJECTORY)]
+    done = vsacli("validate", *files)
+    assert done.code == 2
+    line = next(n for n, text in enumerate(which.read_text().splitlines(), 1) if text.startswith("name: "))
+    assert re.search(rf"{which.name}:{line}: .*(name|character|code point)", done.out + done.err)
+    assert clean(done.out + done.err)
+
+
+def test_a_description_may_have_lines_but_no_control_characters(vsacli: Any, tmp_path: Path) -> None:
+    text = ROBOT.read_text(encoding="utf-8")
+    for description, code in (("a\nb " * 200, 0), ("a\x1b[2J", 2)):
+        copy = tmp_path / "arm.yaml"
+        copy.write_text(
+            re.sub(r"(?m)^description: .*$", lambda _, d=description: f"description: {quoted(d)}", text)
+        )
+        done = vsacli("validate", copy)
+        assert done.code == code
+        assert clean(done.out + done.err)
+
+
+@pytest.mark.parametrize("name", slow_but({"break"}, ["escape", "return", "break", "bidirectional", "c1"]))
+def test_older_results_with_such_names_are_shown_encoded(vsacli: Any, tmp_path: Path, name: str) -> None:
+    assert vsacli("invdyn", ROBOT, TRAJECTORY, "-o", "r.h5", "-q").code == 0
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        file.attrs["robot_name"] = UNPRINTABLE[name]
+        file.attrs["command_line"] = UNPRINTABLE[name]
+        report = json.loads(file["report/json"].asstr()[()])
+        report |= {"robot": UNPRINTABLE[name], "warnings": [UNPRINTABLE[name]]}
+        file["report/json"][()] = json.dumps(report)
+    for arguments in (("info", "r.h5"), ("validate", "r.h5"), ("plot", "r.h5", "-v"), ("export", "r.h5")):
+        done = vsacli(*arguments)
+        assert done.code == 0
+        assert clean(done.out + done.err)
+    told = vsacli("info", "r.h5").out
+    assert UNPRINTABLE[name].encode("unicode_escape").decode() in told

@@ -1,0 +1,47 @@
+"""Texts from files, as each way out can bear them: what one shows must not act on what reads it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+_MARKDOWN = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&$])")
+
+
+def one_line(text: str) -> str:
+    r"""A text in one line: what moves a cursor, or turns letters round, stands as in "\x1b"."""
+    if text.isprintable():
+        return text
+    return "".join(each if each.isprintable() else _escaped(each) for each in text)
+
+
+def for_terminal(text: str) -> str:
+    """The lines of a text, each as in `one_line`."""
+    return "\n".join(map(one_line, text.split("\n")))
+
+
+def for_comment(text: str) -> str:
+    """For a comment in C, which it neither ends nor begins."""
+    return one_line(text).replace("*/", "* /").replace("/*", "/ *")
+
+
+def for_markdown(text: str) -> str:
+    """For a paragraph or heading in Markdown, where it means nothing but itself."""
+    return _MARKDOWN.sub(r"\\\1", one_line(text))
+
+
+def shown(content: Any) -> Any:
+    """JSON values with every text in one line."""
+    match content:
+        case str():
+            return one_line(content)
+        case Mapping():
+            return {one_line(str(key)): shown(value) for key, value in content.items()}
+        case Sequence():
+            return [shown(value) for value in content]
+    return content
+
+
+def _escaped(letter: str) -> str:
+    return letter.encode("unicode_escape").decode("ascii")
