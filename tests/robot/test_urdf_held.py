@@ -72,7 +72,7 @@ def test_torques_with_held_joints(urdf, hold):
 def test_what_does_not_stand_at_zero_is_told(urdf):
     conversion = import_urdf(urdf(TREE), base="torso", tip="hand", hold={"lean": "-30 deg"})
     right, bend = "right at 0.3 rad (follows left)", "bend at 0.35 rad (follows left)"
-    assert list(conversion.notes()) == [
+    assert [note for note in conversion.notes() if note.startswith("held")] == [
         "held below the base: lean at -0.523599 rad",
         "held at zero beside the chain, their links lumped: left",
         f"held beside the chain, their links lumped: {right}, {bend}",

@@ -102,7 +102,7 @@ EDITS = {
         ('mass value="2"', 'mass value="-2"'),
         ["2: mass: must be zero or positive, not -2", "3: ", "4: "],
     ),
-    "no mass": (('<mass value="2"/>', ""), ["2: inertial: there is no <mass> in it", "3: ", "4: "]),
+    "no mass": (('<mass value="2"/>', ""), ["3: inertial of 'l1': there is no <mass> in it", "4: "]),
     "no moment": ((' iyz="0"', ""), ["2: inertia: there is no attribute iyz", "3: ", "4: "]),
     "impossible inertia": (
         ('ixx="0.03"', 'ixx="-0.03"'),

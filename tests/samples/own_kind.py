@@ -12,7 +12,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator, Carried, Placeholders
+from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.limit_check import OfJoint
@@ -49,7 +49,7 @@ class AdjustableArm(Actuator):
         return {"motor": Motor.example(joint_type), "k": 80, "range": [1, 10]}
 
     @classmethod
-    def placeholder(cls, constants: Placeholders, _effort: float | None) -> Self:
+    def placeholder(cls, constants: PlaceholderConstants) -> Self:
         motor = Motor(inertia=constants.motor_inertia)
         return cls(motor=(motor, motor), k=constants.stiffness / 10, range=(1.0, 10.0))
 

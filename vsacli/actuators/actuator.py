@@ -12,7 +12,7 @@ import numpy as np
 from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.limit_check import LimitCheck, OfJoint, within
-from vsacli.actuators.motor import JointMotor
+from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag
@@ -20,20 +20,32 @@ from vsacli.base.variables import MOTORS, SPRINGS, Variable
 from vsacli.documents.source import Source
 
 
-class Placeholders(NamedTuple):
-    """The actuator of every joint as long as nothing is known of it, and its constants, in SI units.
+class PlaceholderConstants(NamedTuple):
+    """Constants of an actuator of which nothing is known, in SI units; at a prismatic joint kg, N/m, N/m^3.
 
     Attributes:
-        actuator: a key of `vsacli.actuators.kinds.ACTUATORS`.
         motor_inertia: of each motor, joint side of the gear.
         stiffness: of an elastic transmission.
-        spring: k and k_c of the cubic springs of an antagonistic one.
+        spring: k and k_c of cubic springs, alike on both sides.
+        max_torque: of a motor that drives the joint alone, joint side of the gear.
+        gear_ratio: of such a motor, None if it is not known.
     """
 
-    actuator: str = "antagonistic"
-    motor_inertia: float = 1.0
-    stiffness: float = 1000.0
-    spring: tuple[float, float] = (400.0, 2000.0)
+    motor_inertia: float
+    stiffness: float
+    spring: tuple[float, float]
+    max_torque: float = math.inf
+    gear_ratio: float | None = None
+
+    @property
+    def only_motor(self) -> Motor:
+        """A motor that drives the joint alone."""
+        ratio = abs(self.gear_ratio or 1.0)
+        return Motor(
+            inertia=self.motor_inertia / (ratio * ratio),
+            max_torque=self.max_torque / ratio,
+            gear_ratio=self.gear_ratio,
+        )
 
 
 class Carried(NamedTuple):
@@ -87,8 +99,8 @@ class Actuator(ABC):
 
     @classmethod
     @abstractmethod
-    def placeholder(cls, constants: Placeholders, effort: float | None) -> Self:
-        """An actuator of which nothing else is known; None or 0 leave the effort of the joint without bound.
+    def placeholder(cls, constants: PlaceholderConstants) -> Self:
+        """An actuator of which nothing else is known.
 
         Raises:
             InvalidRecordError: a constant is not positive.

@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator, Carried, Placeholders
+from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
 from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.pair import PairSolution
@@ -73,8 +73,8 @@ class Antagonistic(Actuator):
         return {"motor": Motor.example(joint_type), "spring": EXAMPLE_SPRING[joint_type]}
 
     @classmethod
-    def placeholder(cls, constants: Placeholders, _effort: float | None) -> Self:
-        """Cubic springs; the effort of the joint bounds neither of the two motors."""
+    def placeholder(cls, constants: PlaceholderConstants) -> Self:
+        """Cubic springs; what is known of a single motor holds for neither of two."""
         from vsacli.actuators.laws.cubic import Cubic
 
         k, k_c = constants.spring

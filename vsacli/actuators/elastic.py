@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator, Carried, Placeholders
+from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
 from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.motor import JointMotor, Motor
@@ -41,10 +40,9 @@ class Elastic(Actuator):
         return {"motor": Motor.example(joint_type), "stiffness": EXAMPLE_STIFFNESS[joint_type]}
 
     @classmethod
-    def placeholder(cls, constants: Placeholders, effort: float | None) -> Self:
-        """One motor, which bears the effort of the joint."""
-        motor = Motor(inertia=constants.motor_inertia, max_torque=effort or math.inf)
-        return cls(motor=motor, stiffness=constants.stiffness)
+    def placeholder(cls, constants: PlaceholderConstants) -> Self:
+        """One motor, which drives the joint alone."""
+        return cls(motor=constants.only_motor, stiffness=constants.stiffness)
 
     @property
     def motors(self) -> tuple[JointMotor, ...]:

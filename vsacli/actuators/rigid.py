@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator, Placeholders
+from vsacli.actuators.actuator import Actuator, PlaceholderConstants
 from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.transmission import Command, Transmission, single_motor
@@ -35,9 +35,9 @@ class Rigid(Actuator):
         return {"motor": Motor.example(joint_type)}
 
     @classmethod
-    def placeholder(cls, constants: Placeholders, effort: float | None) -> Self:
-        """One motor, which bears the effort of the joint."""
-        return cls(motor=Motor(inertia=constants.motor_inertia, max_torque=effort or math.inf))
+    def placeholder(cls, constants: PlaceholderConstants) -> Self:
+        """One motor, which drives the joint alone."""
+        return cls(motor=constants.only_motor)
 
     @property
     def motors(self) -> tuple[JointMotor, ...]:

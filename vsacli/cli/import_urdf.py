@@ -11,7 +11,11 @@ from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 
 
-def _spring(_context: click.Context, _parameter: click.Parameter, written: str) -> tuple[float, float]:
+def _spring(
+    _context: click.Context, _parameter: click.Parameter, written: str | None
+) -> tuple[float, float] | None:
+    if written is None:
+        return None
     try:
         k, k_c = (float(word) for word in written.split(","))
     except ValueError:
@@ -51,25 +55,19 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     "--motor-inertia",
     metavar="KG_M2",
     type=float,
-    default=1.0,
-    show_default=True,
-    help="Placeholder: of each motor, joint side of its gear.",
+    help="Placeholder: of each motor, joint side of its gear; by default half of what the joint carries.",
 )
 @click.option(
     "--stiffness",
     metavar="NM/RAD",
     type=float,
-    default=1000.0,
-    show_default=True,
-    help="Placeholder: of elastic joints.",
+    help="Placeholder: of elastic joints; by default as stiff as what the joint carries asks for.",
 )
 @click.option(
     "--spring",
     metavar="K,KC",
-    default="400,2000",
-    show_default=True,
     callback=_spring,
-    help="Placeholder: cubic springs of antagonistic joints.",
+    help="Placeholder: cubic springs of antagonistic joints; by default likewise.",
 )
 @click.option(
     "--hold",
@@ -95,9 +93,9 @@ def import_urdf(
     tip: str | None,
     output: str | None,
     actuator: str,
-    motor_inertia: float,
-    stiffness: float,
-    spring: tuple[float, float],
+    motor_inertia: float | None,
+    stiffness: float | None,
+    spring: tuple[float, float] | None,
     hold: dict[str, str],
     snap: float,
     overwrite: bool,
@@ -107,7 +105,8 @@ def import_urdf(
 
     Links behind fixed joints, and side branches, which stand still, are lumped with the link they hang on.
     Prints the rows, what was left out or changed, and how far the kinematics stray from the URDF's. A URDF
-    says nothing about motors and springs: these are placeholders, marked in the file.
+    says nothing about motors and springs: these are placeholders, marked in the file and sized to what each
+    joint carries.
     """
     from vsacli.base.outputs import Outputs
     from vsacli.robot import urdf as conversions
@@ -118,5 +117,5 @@ def import_urdf(
         file = outputs.file(path)
         conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold)
         file.write_text(conversions.robot_text(conversion))
-    click.echo(conversions.render(conversion))
+    click.echo(str(conversion))
     talk.wrote(outputs)

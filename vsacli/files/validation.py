@@ -194,7 +194,9 @@ def _table(path: str, robots: Robots) -> Checked:
 
 def _urdf(path: str, _: Robots) -> Checked:
     urdf = read_urdf(path)
-    return _usable(path, f"URDF of {urdf.name}, {_count(len(urdf.joints), 'joint')}")
+    flaws = [link.flaw for link in urdf.links.values() if link.flaw is not None]
+    messages = tuple(Message(WARNING, path, *flaw) for flaw in flaws)
+    return Checked(path, f"URDF of {urdf.name}, {_count(len(urdf.joints), 'joint')}", messages)
 
 
 def _stored(path: str, _: Robots) -> Checked:

@@ -27,6 +27,7 @@ from vsacli.documents.fields import (
 )
 
 UNBOUNDED = (-math.inf, math.inf)
+NO_MASS, NO_INERTIA = "its mass is zero", "its inertia is zero"
 INERTIA_ROUNDING = 1e-12
 """Relative size below which a negative eigenvalue of an inertia tensor is rounding of its entries."""
 
@@ -100,7 +101,7 @@ class Inertia:
         """What may not be what was meant, though it can be computed with."""
         low, middle, high = self.principal_moments
         if high == 0:
-            yield "its inertia is zero"
+            yield NO_INERTIA
         elif high - low - middle > INERTIA_ROUNDING * high:
             excess = high - low - middle
             sides = f"{high:.4g} > {low:.4g} + {middle:.4g} by {excess:.4g} kg m^2"
@@ -121,7 +122,7 @@ class Link:
     def warnings(self) -> Iterator[str]:
         """What may not be what was meant, though it can be computed with."""
         if self.mass == 0:
-            yield "its mass is zero"
+            yield NO_MASS
         yield from self.inertia.warnings()
 
 
@@ -172,7 +173,9 @@ class Joint:
         """The key of its actuator in `ACTUATORS`."""
         return ACTUATORS.name_of(type(self.actuator))
 
-    def warnings(self) -> Iterator[str]:
-        """What may not be what was meant, of the link and of the springs."""
-        yield from (f"link of joint {self.name}: {warning}" for warning in self.link.warnings())
+    def warnings(self, *, massless: bool = False) -> Iterator[str]:
+        """What may not be what was meant, of link and springs; if no link has a mass, nothing on that."""
+        told = (NO_MASS, NO_INERTIA) if massless else ()
+        of_link = (warning for warning in self.link.warnings() if warning not in told)
+        yield from (f"link of joint {self.name}: {warning}" for warning in of_link)
         yield from (f"spring of joint {self.name}: {warning}" for warning in self.actuator.warnings)

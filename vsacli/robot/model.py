@@ -27,6 +27,7 @@ OF_PLACEHOLDERS = (
     "the springs and motors of this robot are placeholders: replace them by those of your devices "
     "and remove `placeholder: true`"
 )
+WITHOUT_MASSES = "no link has a mass, so that hardly anything but the motors asks for torque"
 
 
 @dataclass(frozen=True, repr=False)
@@ -106,8 +107,10 @@ class Robot:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may not be what was meant, one sentence each."""
-        of_joints = (warning for joint in self.joints for warning in joint.warnings())
-        return (*([OF_PLACEHOLDERS] if self.placeholder else []), *of_joints)
+        massless = not any(joint.link.mass for joint in self.joints)
+        of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
+        of_joints = (warning for joint in self.joints for warning in joint.warnings(massless=massless))
+        return (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
 
 
 def check_robot(value: object) -> None:

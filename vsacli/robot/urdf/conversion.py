@@ -1,35 +1,24 @@
-"""A URDF file to a robot with standard Denavit-Hartenberg rows."""
+"""A robot made from a URDF, and what was done to it, as text: what may be wrong, what was left out."""
 
 from __future__ import annotations
 
-import itertools
-import os
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from vsacli.actuators.actuator import Placeholders
-from vsacli.actuators.kinds import ACTUATORS
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InvalidRecordError
-from vsacli.documents.source import Problems
-from vsacli.documents.tree import quoted
-from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Inertia, Joint, Limits, Link, Pose
 from vsacli.robot.model import Robot
-from vsacli.robot.urdf.dh import SNAP_ANGLE, Frames, Snap, dh_frames, tidy, tidy_angle
-from vsacli.robot.urdf.held_joints import HeldJoint, Hold
-from vsacli.robot.urdf.reader import read_urdf
-from vsacli.robot.urdf.residual import Residual, kinematic_residual
-from vsacli.robot.urdf.rigid_motion import Body, inverse, roll_pitch_yaw
-from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain, serial_chain
+from vsacli.robot.urdf.dh import Snap
+from vsacli.robot.urdf.held_joints import HeldJoint
+from vsacli.robot.urdf.placeholders import JointLoad, Placeholders
+from vsacli.robot.urdf.residual import Residual
+from vsacli.robot.urdf.serial_chain import SerialChain
 
-STANDARD_GRAVITY = 9.81
-"""m/s^2, along -z of the root link; a URDF does not give any."""
+EXACT_RESIDUAL = 1e-9
+"""m and rad; kinematics that stray less are called the same."""
 
-NEGLIGIBLE_INERTIA = 1e-15
-"""Inertia, over mass times the arm's size squared, that is rounding of a zero in the file."""
+SMALLEST_RESIDUAL = 1e-12
+"""m and rad; smaller residuals differ between machines, and are not told apart."""
+
+_HEADER = ("joint", "a/m", "alpha/rad", "d/m", "theta/rad", "mass/kg", "links")
 
 
 @dataclass(frozen=True)
@@ -40,6 +29,8 @@ class Conversion:
         file: path of the URDF as given.
         chain: the joints and links it was made from; `chain.joints` belong to `robot.joints` in turn.
         robot: the result.
+        placeholders: its actuators, as they were asked for.
+        loads: what each joint carries at most, to which the actuators were sized.
         snaps: axes that were made parallel.
         residual: how far its tip strays from the chain's.
     """
@@ -47,8 +38,37 @@ class Conversion:
     file: str
     chain: SerialChain
     robot: Robot
+    placeholders: Placeholders
+    loads: tuple[JointLoad, ...]
     snaps: tuple[Snap, ...]
     residual: Residual
+
+    @property
+    def one_motor_each(self) -> bool:
+        """Whether a single motor drives each joint, so that what the URDF knows of motors holds for it."""
+        return all(joint.actuator.motor_count == 1 for joint in self.robot.joints)
+
+    def __str__(self) -> str:
+        """The Denavit-Hartenberg table, how exact it is, what may be wrong, what was left out or changed."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        robot, count = self.robot, len(self.robot.joints)
+        joints = f"{count} joint{'s' if count > 1 else ''}"
+        yield f"{robot.name}: {joints} from {self.chain.base} to {self.chain.tip}"
+        yield from _aligned(self._rows())
+        yield f"total mass of the moving links: {sum(joint.link.mass for joint in robot.joints):.6g} kg"
+        yield _exactness(self.residual)
+        yield from (f"warning: {warning}" for warning in self.warnings())
+        yield from self.notes()
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        yield _HEADER
+        for joint, origin in zip(self.robot.joints, self.chain.joints, strict=True):
+            row = (joint.dh.a, joint.dh.alpha, joint.dh.d, joint.dh.theta, joint.link.mass)
+            others = len(origin.links) - 1
+            carried = origin.links[0].name + (f" + {others}" if others else "")
+            yield (joint.name, *(f"{number:.6g}" for number in row), carried)
 
     def warnings(self) -> Iterator[str]:
         """What may not be what was meant, one sentence each."""
@@ -56,15 +76,27 @@ class Conversion:
         yield from self.robot.warnings
 
     def notes(self) -> Iterator[str]:
-        """What a user should know about what was left out or changed, one sentence each."""
-        chain = self.chain
-        yield from _held("below the base", chain.held_below)
-        yield from _held("beside the chain, their links lumped", chain.held_beside)
+        """What was left out or changed, one sentence each."""
+        joints = [joint.urdf for joint in self.chain.joints]
+        yield from _held("below the base", self.chain.held_below)
+        yield from _held("beside the chain, their links lumped", self.chain.held_beside)
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
-        friction = [joint.urdf.name for joint in chain.joints if joint.urdf.friction]
-        if friction:
-            yield f"dry friction left out: {', '.join(friction)}"
+        yield from self._of_motors()
+        for what in dict.fromkeys(label for joint in joints for label in joint.left_out):
+            yield f"{what} left out: {', '.join(joint.name for joint in joints if what in joint.left_out)}"
+
+    def _of_motors(self) -> Iterator[str]:
+        """What becomes of effort limits and gears, which are those of a single motor."""
+        joints = [joint.urdf for joint in self.chain.joints]
+        known = {
+            "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
+            "gear reductions": [f"{joint.name} {joint.gear_ratio:g}" for joint in joints if joint.gear_ratio],
+        }
+        taken = "taken over" if self.one_motor_each else "not taken over, since two motors share a joint"
+        for what, names in known.items():
+            if names:
+                yield f"{what} {taken}: {', '.join(names)}"
 
 
 def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
@@ -77,122 +109,17 @@ def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
         yield f"held {place}: {', '.join(elsewhere)}"
 
 
-def import_urdf(
-    path: str | os.PathLike[str],
-    base: str | None = None,
-    tip: str | None = None,
-    placeholders: Placeholders | None = None,
-    snap: float = SNAP_ANGLE,
-    hold: Hold | None = None,
-) -> Conversion:
-    """A robot from a serial chain of a URDF file.
-
-    Args:
-        path: the URDF file.
-        base: name of the link that stands still; the root by default.
-        tip: name of the end effector's link; by default the only one that can be.
-        placeholders: the actuators, of which a URDF says nothing.
-        snap: angle in rad; axes closer to parallel are made parallel if their common normal is far away.
-        hold: where joints beside the chain stand, by name, in rad (m) or as "30 deg"; others stand at zero.
-
-    Raises:
-        InputError: the file is no URDF, has no such chain, or its joints cannot be held like this.
-    """
-    chain = serial_chain(read_urdf(path), base, tip, hold)
-    frames = dh_frames(chain.joints, chain.tip_pose, snap)
-    robot = _robot(os.fspath(path), chain, frames, placeholders or Placeholders())
-    return Conversion(os.fspath(path), chain, robot, frames.snaps, kinematic_residual(chain, robot))
+def _exactness(residual: Residual) -> str:
+    verdict = "the same as" if max(residual) <= EXACT_RESIDUAL else "not quite"
+    position, orientation = (max(error, SMALLEST_RESIDUAL) for error in residual)
+    errors = f"{position:.1e} m and {orientation:.1e} rad"
+    return f"forward kinematics: {verdict} the URDF's, the tip within {errors}"
 
 
-def _robot(path: str, chain: SerialChain, frames: Frames, placeholders: Placeholders) -> Robot:
-    names = identifiers([joint.urdf.name for joint in chain.joints])
-    links = _links(path, chain.joints, frames)
-    joints = (
-        _joint(name, joint, row, link, placeholders)
-        for name, joint, row, link in zip(names, chain.joints, frames.rows, links, strict=True)
-    )
-    x, y, z = (-STANDARD_GRAVITY * tidy(chain.up, 1.0) + 0.0).tolist()
-    return Robot(
-        name=chain.robot_name,
-        description=_description(path, chain),
-        placeholder=True,
-        gravity=(x, y, z),
-        base=_pose(frames.base, frames.scale),
-        tool=_pose(frames.tool, frames.scale),
-        joints=tuple(joints),
-    )
-
-
-def _description(path: str, chain: SerialChain) -> str:
-    """Where the robot comes from; that joints do not stand at zero can be seen nowhere else in it."""
-    held = [f", {each}" for each in chain.held if each.position != 0]
-    origin = f"converted from {os.path.basename(path)}, from link {chain.base} to link {chain.tip}"
-    return f"{origin}{''.join(held)}"
-
-
-def _joint(
-    name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, placeholders: Placeholders
-) -> Joint:
-    limit = joint.urdf.limit
-    speed = limit.velocity
-    return Joint(
-        name=name,
-        type="revolute" if joint.is_revolute else "prismatic",
-        dh=dh,
-        link=link,
-        damping=joint.urdf.damping,
-        actuator=ACTUATORS[placeholders.actuator].placeholder(placeholders, limit.effort),
-        limits=Limits(
-            position=limit.position or UNBOUNDED,
-            velocity=UNBOUNDED if speed is None else (-speed, speed),
-        ),
-    )
-
-
-def _links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> list[Link]:
-    """What each joint carries, in its Denavit-Hartenberg frame.
-
-    Raises:
-        InputError: no body has such an inertia.
-    """
-    problems, links = Problems(path), []
-    for joint, pose in zip(joints, frames.poses, strict=True):
-        try:
-            links.append(_link(joint.body.moved(inverse(pose)), frames.scale))
-        except InvalidRecordError as error:
-            own, *others = joint.links
-            whole = f"{quoted(own.name)}{' with the links it carries' if others else ''}"
-            for problem in error.fields:
-                problems.add(own.line, f"inertia of {whole}: {problem}")
-    problems.check()
-    return links
-
-
-def _link(body: Body, scale: float) -> Link:
-    largest = float(abs(body.inertia).max())
-    inertia = (
-        tidy(body.inertia, largest)
-        if largest > NEGLIGIBLE_INERTIA * body.mass * scale**2
-        else np.zeros((3, 3))
-    )
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tolist()
-    x, y, z = tidy(body.com, scale).tolist()
-    mass = tidy(np.array(body.mass), body.mass).item()
-    return Link(mass=mass, com=(x, y, z), inertia=Inertia(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz))
-
-
-def _pose(pose: FloatArray, scale: float) -> Pose:
-    x, y, z = tidy(pose[:3, 3], scale).tolist()
-    roll, pitch, yaw = (tidy_angle(angle) for angle in roll_pitch_yaw(pose[:3, :3]))
-    return Pose(xyz=(x, y, z), rpy=(roll, pitch, yaw))
-
-
-def identifiers(names: Sequence[str]) -> list[str]:
-    """The names with only letters, digits, `_` and `-`, beginning with a letter or `_`, and all different."""
-    chosen: list[str] = []
-    for name in names:
-        word = re.sub(r"[^A-Za-z0-9_-]", "_", name)
-        word = word if re.match(r"[A-Za-z_]", word) else f"_{word}"
-        taken = (f"{word}_{number}" for number in itertools.count(2))
-        chosen.append(word if word not in chosen else next(other for other in taken if other not in chosen))
-    return chosen
+def _aligned(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
+    """Columns of one width, numbers to the right."""
+    table = list(rows)
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for first, *numbers, last in table:
+        cells = [f"{cell:>{width}}" for cell, width in zip(numbers, widths[1:-1], strict=True)]
+        yield "  ".join([f"{first:<{widths[0]}}", *cells, last])

@@ -34,7 +34,7 @@ class HeldJoint(NamedTuple):
 
     def __str__(self) -> str:
         following = "" if self.leader == self.urdf.name else f" (follows {self.leader})"
-        return f"{self.urdf.name} at {self.position:.6g} {self.urdf.unit}{following}"
+        return f"{self.urdf.name} at {self.position:.6g} {self.urdf.unit()}{following}"
 
     def warnings(self) -> Iterator[str]:
         """That it may not stand where it should, and how to mend that."""
@@ -45,7 +45,7 @@ class HeldJoint(NamedTuple):
         if not self._within_limits:
             low, high = self.urdf.limit.position or (-math.inf, math.inf)
             value = f"{max(low, min(high, self.position)):.6g}" if self.leader == self.urdf.name else "VALUE"
-            limits = f"is outside its limits, {low:.6g} to {high:.6g} {self.urdf.unit}"
+            limits = f"is outside its limits, {low:.6g} to {high:.6g} {self.urdf.unit()}"
             yield f"{self} {limits}; hold it elsewhere by --hold {self.leader}={value}"
 
     @property
@@ -82,7 +82,7 @@ def held_joints(
     ]
     for joint, position, leader in held:
         if not abs(position) <= LARGEST_NUMBER:
-            message = f"following {quoted(leader)} it stands at {position:g} {joint.unit}"
+            message = f"following {quoted(leader)} it stands at {position:g} {joint.unit()}"
             problems.add(joint.line, f"joint {quoted(joint.name)}: {message}, more than can be computed with")
     problems.check()
     return held
@@ -106,7 +106,7 @@ def _given(
     if reason:
         problems.add(0, f"hold: {reason}")
         return 0.0
-    unit = urdf.joints[name].unit
+    unit = urdf.joints[name].unit()
     try:
         return evaluate(str(value), unit)
     except ExpressionError as error:

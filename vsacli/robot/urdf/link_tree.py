@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.units import POSITION
+from vsacli.base.units import POSITION, Quantity
 from vsacli.robot.urdf.rigid_motion import Body, cross_matrix
 
 ROTATING = ("revolute", "continuous")
@@ -23,11 +23,16 @@ LARGEST_NUMBER = 1e9
 
 @dataclass(frozen=True)
 class UrdfLink:
-    """A link; `body` is in its own frame, None if the file gives no inertial data."""
+    """A link; `body` is in its own frame, None if the file gives no inertial data.
+
+    `flaw` is the line of inertial data that are not whole and what is missing, which matters if a joint
+    carries the link.
+    """
 
     name: str
     line: int
     body: Body | None
+    flaw: tuple[int, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,11 @@ class Mimic:
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """A joint; at position zero its child has the pose `placement` in its parent."""
+    """A joint; at position zero its child has the pose `placement` in its parent.
+
+    `gear_ratio` is the motion of its only motor over its own, None if that is 1 or not known; `left_out` is
+    what the file says of it that has no place in a robot file, a few words each.
+    """
 
     name: str
     line: int
@@ -61,8 +70,9 @@ class UrdfJoint:
     axis: FloatArray
     limit: UrdfLimit
     damping: float
-    friction: float
     mimic: Mimic | None
+    gear_ratio: float | None
+    left_out: tuple[str, ...]
 
     @property
     def is_fixed(self) -> bool:
@@ -74,10 +84,9 @@ class UrdfJoint:
         """Whether it turns."""
         return self.type in ROTATING
 
-    @property
-    def unit(self) -> str:
-        """Unit of its position."""
-        return POSITION.unit("revolute" if self.is_revolute else "prismatic")
+    def unit(self, quantity: Quantity = POSITION) -> str:
+        """Unit of a quantity of it."""
+        return quantity.unit("revolute" if self.is_revolute else "prismatic")
 
     def motions(self, positions: FloatArray) -> FloatArray:
         """How its child moves at positions (samples,), (samples, 4, 4); by Rodrigues' formula if it turns."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeVar
 
 import numpy as np
@@ -13,6 +13,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.tree import quoted
+from vsacli.robot.urdf.beside_joints import Beside, read_beside
 from vsacli.robot.urdf.link_tree import (
     LARGEST_NUMBER,
     MOVING,
@@ -47,7 +48,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     _refuse_macros(root, problems)
     for link in list(root.all("link"))[MAX_LINKS:]:
         problems.fail(link.line, f"more than {MAX_LINKS:,} links")
-    reader = _Reader(problems)
+    reader = _Reader(problems, read_beside(root, problems))
     links = _by_name(map(reader.link, root.all("link")), "link", problems)
     joints = _by_name(map(reader.joint, root.all("joint")), "joint", problems)
     name = reader.word(root, "name")
@@ -129,20 +130,23 @@ def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], proble
 class _Reader:
     """Reads elements; what is wrong is noted and replaced by something harmless, so that reading goes on."""
 
-    def __init__(self, problems: Problems) -> None:
+    def __init__(self, problems: Problems, beside: Beside) -> None:
         self._problems = problems
+        self._beside = beside
 
     def link(self, element: Element) -> UrdfLink:
         name = self.word(element, "name")
         inertial = self._child(element, "inertial")
-        return UrdfLink(name, element.line, None if inertial is None else self._body(inertial))
-
-    def _body(self, inertial: Element) -> Body:
+        if inertial is None:
+            return UrdfLink(name, element.line, None)
         mass, inertia = self._child(inertial, "mass"), self._child(inertial, "inertia")
         if mass is None or inertia is None:
             missing = "mass" if mass is None else "inertia"
-            self._problems.add(inertial.line, f"inertial: there is no <{missing}> in it")
-            return Body(0.0, np.zeros(3), np.zeros((3, 3)))
+            flaw = (inertial.line, f"inertial of {quoted(name)}: there is no <{missing}> in it")
+            return UrdfLink(name, element.line, None, flaw)
+        return UrdfLink(name, element.line, self._body(inertial, mass, inertia))
+
+    def _body(self, inertial: Element, mass: Element, inertia: Element) -> Body:
         xx, xy, xz, yy, yz, zz = (self._number(inertia, name) for name in _MOMENTS)
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         return Body(self._non_negative(mass, "value"), np.zeros(3), tensor).moved(self._origin(inertial))
@@ -153,6 +157,7 @@ class _Reader:
         if kind not in TYPES:
             self._problems.add(element.line, f"type: unknown word {quoted(kind)}{did_you_mean(kind, TYPES)}")
         dynamics, mimic = self._child(element, "dynamics"), self._child(element, "mimic")
+        ratio = self._beside.gear_ratios.get(name, 1.0)
         return UrdfJoint(
             name=name,
             line=element.line,
@@ -163,9 +168,24 @@ class _Reader:
             axis=self._axis(element) if kind in MOVING else np.zeros(3),
             limit=self._limit(element, kind),
             damping=0.0 if dynamics is None else self._non_negative(dynamics, "damping", 0.0),
-            friction=0.0 if dynamics is None else self._non_negative(dynamics, "friction", 0.0),
             mimic=None if mimic is None else self._mimic(mimic),
+            gear_ratio=None if ratio == 1 else ratio,
+            left_out=(*self._left_out(element), *self._beside.left_out.get(name, ())),
         )
+
+    def _left_out(self, joint: Element) -> Iterator[str]:
+        """What a robot file has no place for."""
+        for dynamics in joint.all("dynamics"):
+            if self._non_negative(dynamics, "friction", 0.0):
+                yield "dry friction"
+            others = [name for name in dynamics.attributes if name not in ("damping", "friction")]
+            if others:
+                yield f"{', '.join(others)} of <dynamics>"
+        for safety in joint.all("safety_controller"):
+            if any(name.startswith("soft_") for name in safety.attributes):
+                yield "soft limits (<safety_controller>)"
+        if any(joint.all("calibration")):
+            yield "reference position (<calibration>)"
 
     def _mimic(self, element: Element) -> Mimic:
         multiplier, offset = self._number(element, "multiplier", 1.0), self._number(element, "offset", 0.0)

@@ -19,6 +19,9 @@ from vsacli.robot.urdf.held_joints import HeldJoint, Hold, held_joints
 from vsacli.robot.urdf.link_tree import MOVING, Urdf, UrdfJoint, UrdfLink, below
 from vsacli.robot.urdf.rigid_motion import Body, inverse, welded
 
+STANDARD_GRAVITY = 9.81
+"""m/s^2, along -z of the root link; a URDF does not give any."""
+
 
 @dataclass(frozen=True)
 class ChainJoint:
@@ -103,6 +106,7 @@ def serial_chain(
     below_base = [joint for joint in urdf.above(path.base) if not joint.is_fixed]
     beside = _beside(urdf, carried, path)
     _check_joints(urdf, path, below_base, beside)
+    _check_links(urdf, carried)
     names = [joint.name for joint in path.moving]
     held = held_joints(urdf, [*below_base, *beside], names, hold or {})
     poses = _poses(urdf, held)
@@ -146,6 +150,15 @@ def _check_joints(
             if leader in on_chain:
                 reason = f"{place} follows {quoted(leader)} on it (<mimic>)"
                 problems.add(joint.line, f"joint {quoted(joint.name)} {reason}; {choice}")
+    problems.check()
+
+
+def _check_links(urdf: Urdf, carried: Iterable[Iterable[UrdfLink]]) -> None:
+    """Refuse inertial data that are not whole of links that move."""
+    problems = Problems(urdf.file)
+    for link in (link for links in carried for link in links):
+        if link.flaw is not None:
+            problems.add(*link.flaw)
     problems.check()
 
 

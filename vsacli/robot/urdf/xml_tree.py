@@ -15,12 +15,24 @@ MAX_ELEMENTS = 100_000
 
 @dataclass(frozen=True)
 class Element:
-    """An element with its attributes and children; text between tags is dropped."""
+    """An element with its attributes and children, and the text outside of these."""
 
     tag: str
     line: int
     attributes: dict[str, str]
     children: list[Element] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        """The text, without space around it."""
+        return "".join(self.texts).strip()
+
+    def everything(self) -> Iterator[Element]:
+        """Itself and all below it."""
+        yield self
+        for child in self.children:
+            yield from child.everything()
 
     def all(self, tag: str) -> Iterator[Element]:
         """The children of this tag."""
@@ -51,6 +63,7 @@ class _Builder:
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
+        self.parser.CharacterDataHandler = self._text
         self.parser.StartDoctypeDeclHandler = self._refuse_doctype
         self._problems = problems
         self._open: list[Element] = []
@@ -72,6 +85,9 @@ class _Builder:
 
     def _end(self, _tag: str) -> None:
         self._open.pop()
+
+    def _text(self, text: str) -> None:
+        self._open[-1].texts.append(text)
 
     def _refuse_doctype(self, name: str, *_: object) -> None:
         reason = "document type declarations and entities are not read; remove it"

@@ -1,4 +1,4 @@
-"""A conversion as text: what it did, and the robot file, with comments on what to replace."""
+"""A converted robot as a robot file, with comments on what to replace."""
 
 from __future__ import annotations
 
@@ -7,66 +7,16 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from vsacli.actuators.actuator import Actuator
+from vsacli.base.units import TORQUE
 from vsacli.documents.fields import Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
 from vsacli.robot.file import FORMAT
-from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Joint, Limits, Link, Pose
+from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Limits, Link, Pose
 from vsacli.robot.urdf.conversion import Conversion
-from vsacli.robot.urdf.residual import Residual
-from vsacli.robot.urdf.serial_chain import ChainJoint
+from vsacli.robot.urdf.link_tree import UrdfJoint
 
-EXACT_RESIDUAL = 1e-9
-"""m and rad; kinematics that stray less are called the same."""
-
-SMALLEST_RESIDUAL = 1e-12
-"""m and rad; smaller residuals differ between machines, and are not told apart."""
-
-_HEADER = ("joint", "a/m", "alpha/rad", "d/m", "theta/rad", "mass/kg", "links")
-PLACEHOLDER = "# placeholder: not from the URDF"
 COMMENT_COLUMN = 34
 MAX_LINKS = 4
 """Links that a comment names before it counts the rest."""
-
-
-def render(conversion: Conversion) -> str:
-    """The Denavit-Hartenberg table, what was left out or changed, and how exact the result is."""
-    return "\n".join(_lines(conversion))
-
-
-def _lines(conversion: Conversion) -> Iterator[str]:
-    robot, chain = conversion.robot, conversion.chain
-    count = len(robot.joints)
-    yield f"{robot.name}: {count} joint{'s' if count > 1 else ''} from {chain.base} to {chain.tip}"
-    yield from _aligned(_table(conversion))
-    yield f"total mass of the moving links: {sum(joint.link.mass for joint in robot.joints):.6g} kg"
-    yield _exactness(conversion.residual)
-    yield from (f"warning: {warning}" for warning in conversion.warnings())
-    yield from conversion.notes()
-
-
-def _exactness(residual: Residual) -> str:
-    verdict = "the same as" if max(residual) <= EXACT_RESIDUAL else "not quite"
-    position, orientation = (max(error, SMALLEST_RESIDUAL) for error in residual)
-    errors = f"{position:.1e} m and {orientation:.1e} rad"
-    return f"forward kinematics: {verdict} the URDF's, the tip within {errors}"
-
-
-def _table(conversion: Conversion) -> Iterator[tuple[str, ...]]:
-    yield _HEADER
-    for joint, origin in zip(conversion.robot.joints, conversion.chain.joints, strict=True):
-        row = (joint.dh.a, joint.dh.alpha, joint.dh.d, joint.dh.theta, joint.link.mass)
-        others = len(origin.links) - 1
-        carried = origin.links[0].name + (f" + {others}" if others else "")
-        yield (joint.name, *(f"{number:.6g}" for number in row), carried)
-
-
-def _aligned(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Columns of one width, numbers to the right."""
-    table = list(rows)
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for first, *numbers, last in table:
-        cells = [f"{cell:>{width}}" for cell, width in zip(numbers, widths[1:-1], strict=True)]
-        yield "  ".join([f"{first:<{widths[0]}}", *cells, last])
 
 
 def robot_text(conversion: Conversion) -> str:
@@ -74,7 +24,8 @@ def robot_text(conversion: Conversion) -> str:
     robot = conversion.robot
     lines = [
         "# From a URDF, by vsacli import-urdf: frames, masses, inertias, damping and limits of the joints.",
-        "# A URDF says nothing about motors and springs: replace what is marked as placeholder.",
+        "# A URDF says nothing about motors and springs: replace what is marked as placeholder, then remove",
+        "# `placeholder: true`.",
         f"format: {FORMAT}",
         f"name: {json.dumps(robot.name)}",
         f"description: {json.dumps(robot.description)}",
@@ -84,12 +35,13 @@ def robot_text(conversion: Conversion) -> str:
         _commented(f"tool: {_pose(robot.tool)}", "# tip link in the last DH frame"),
         "joints:",
     ]
-    for joint, origin in zip(robot.joints, conversion.chain.joints, strict=True):
-        lines += _joint_lines(joint, origin)
+    for index in range(len(robot.joints)):
+        lines += _joint_lines(conversion, index)
     return "\n".join([*lines, ""])
 
 
-def _joint_lines(joint: Joint, origin: ChainJoint) -> Iterator[str]:
+def _joint_lines(conversion: Conversion, index: int) -> Iterator[str]:
+    joint, origin = conversion.robot.joints[index], conversion.chain.joints[index]
     renamed = "" if origin.urdf.name == joint.name else f"# {json.dumps(origin.urdf.name)} in the URDF"
     yield _commented(f"  - name: {joint.name}", renamed)
     yield f"    type: {joint.type}"
@@ -98,9 +50,13 @@ def _joint_lines(joint: Joint, origin: ChainJoint) -> Iterator[str]:
     yield from _link_lines(joint.link)
     if joint.damping:
         yield f"    damping: {_number(joint.damping)}"
-    yield from _actuator_lines(joint, origin.urdf.limit.effort)
+    yield "    actuator:"
+    yield f"      type: {joint.actuator_type}"
+    for name, written in _written(joint.actuator).items():
+        comment = f"# placeholder: {_origin_of(name, conversion, index)}"
+        yield _commented(f"      {name}: {written}", comment)
     if joint.limits != Limits():
-        yield f"    limits: {_limits(joint.limits)}"
+        yield _commented(f"    limits: {_limits(joint.limits)}", "# of the joint's motion")
 
 
 def _links_comment(names: list[str]) -> str:
@@ -121,21 +77,22 @@ def _link_lines(link: Link) -> Iterator[str]:
     yield f"      inertia: {{{', '.join(entries)}}}"
 
 
-def _actuator_lines(joint: Joint, effort: float | None) -> Iterator[str]:
-    actuator = joint.actuator
-    yield "    actuator:"
-    yield f"      type: {joint.actuator_type}"
-    for name, written in _written(actuator).items():
-        comment = _motor_comment(actuator, effort) if name == "motor" else ""
-        yield _commented(f"      {name}: {written}", PLACEHOLDER + comment)
+def _origin_of(field: str, conversion: Conversion, index: int) -> str:
+    """Where the numbers in a field of an actuator come from, and what the URDF knows of a motor."""
+    joint, load = conversion.chain.joints[index], conversion.loads[index]
+    origin = conversion.placeholders.origin(field, joint, load)
+    known = " and ".join(_known(joint.urdf))
+    if field != "motor" or not known:
+        return origin
+    return f"{origin}; {'with' if conversion.one_motor_each else 'the URDF has'} {known}"
 
 
-def _motor_comment(actuator: Actuator, effort: float | None) -> str:
-    if any(math.isfinite(motor.max_torque) for motor in actuator.motors):
-        return ", but for the effort limit"
-    if effort is None or actuator.motor_count == 1:
-        return ""
-    return f"; the joint's effort limit there is {_number(effort)}"
+def _known(joint: UrdfJoint) -> Iterator[str]:
+    """What a URDF says of the only motor of a joint."""
+    if joint.limit.effort:
+        yield f"an effort limit of {_number(joint.limit.effort)} {joint.unit(TORQUE)} (joint side)"
+    if joint.gear_ratio:
+        yield f"a gear reduction of {_number(joint.gear_ratio)}"
 
 
 def _written(record: Any) -> dict[str, str]:

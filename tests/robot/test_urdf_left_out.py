@@ -1,0 +1,128 @@
+"""What a URDF says besides links and joints: taken over, named as left out, or refused with its line."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from samples.urdf import joint, link, robot, serial, write
+
+from vsacli.base.errors import InputError
+from vsacli.robot.urdf import Placeholders, import_urdf, robot_text
+
+LIMIT = '<limit effort="32" velocity="1"/>'
+
+
+def transmission(joints="turn", reductions=(50,), kind="transmission_interface/SimpleTransmission", motors=1):
+    ends = "".join(f'<joint name="{name}"/>' for name in joints.split())
+    motor = '<actuator name="motor">' + "".join(
+        f"<mechanicalReduction>{value}</mechanicalReduction>" for value in reductions
+    )
+    content = f"<type>{kind}</type>{ends}{(motor + '</actuator>') * motors}"
+    return f'<transmission name="gear">{content}</transmission>'
+
+
+@pytest.fixture
+def notes(tmp_path, monkeypatch):
+    """The lines of the report that are not about rows and kinematics, for a file of one joint and more."""
+    monkeypatch.chdir(tmp_path)
+
+    def of(rest="", *beside, actuator="elastic"):
+        text = robot(link("base"), link("arm"), joint("turn", "base", "arm", rest=rest), *beside)
+        conversion = import_urdf(write(tmp_path / "arm.urdf", text).name, placeholders=Placeholders(actuator))
+        return [line for line in str(conversion).splitlines()[5:] if "placeholder" not in line]
+
+    return of
+
+
+@pytest.mark.parametrize(
+    ("rest", "beside", "expected"),
+    [
+        ("", "", []),
+        ('<dynamics damping="1" friction="0"/>', "", []),
+        ('<dynamics friction="0.1"/>', "", ["dry friction left out: turn"]),
+        ('<dynamics K="7000" D="1"/>', "", ["K, D of <dynamics> left out: turn"]),
+        ('<safety_controller k_velocity="10"/>', "", []),
+        (
+            '<safety_controller soft_upper_limit="1"/>',
+            "",
+            ["soft limits (<safety_controller>) left out: turn"],
+        ),
+        ('<calibration rising="0.1"/>', "", ["reference position (<calibration>) left out: turn"]),
+        (
+            "",
+            '<gazebo reference="turn"><springStiffness>3</springStiffness></gazebo>',
+            ["spring beside the drive (<springStiffness>) left out: turn"],
+        ),
+        ("", '<gazebo reference="turn"><selfCollide>1</selfCollide></gazebo>', []),
+        (LIMIT, "", ["effort limits (joint side) taken over: turn"]),
+        ("", transmission(), ["gear reductions taken over: turn 50"]),
+        ("", transmission(reductions=[1.0]), []),
+        ("", transmission(reductions=[]), []),
+        (
+            "",
+            transmission().replace("mechanicalReduction", "mechanical_reduction"),
+            ["gear reductions taken over: turn 50"],
+        ),
+        (
+            "",
+            f"<ros2_control>{transmission().replace('type>', 'plugin>')}</ros2_control>",
+            ["gear reductions taken over: turn 50"],
+        ),
+        (
+            "",
+            transmission(kind="").replace("name=", 'type="SimpleTransmission" name=', 1),
+            ["gear reductions taken over: turn 50"],
+        ),
+        ("", transmission("turn nod"), ["transmission that is not simple left out: turn"]),
+        (
+            "",
+            transmission(kind="a/DifferentialTransmission"),
+            ["transmission that is not simple left out: turn"],
+        ),
+        ("", transmission(motors=2), ["transmission that is not simple left out: turn"]),
+        ("", transmission(reductions=[50, 2]), ["transmission that is not simple left out: turn"]),
+        (
+            "",
+            transmission() * 2,
+            ["gear reductions taken over: turn 50", "transmission that is not simple left out: turn"],
+        ),
+        ("", transmission("nod"), []),
+    ],
+)
+def test_what_is_said_of_a_joint(notes, rest, beside, expected):
+    assert notes(rest, beside) == expected
+
+
+def test_two_motors_do_not_take_what_holds_for_one(notes, tmp_path):
+    assert notes(LIMIT, transmission(), actuator="antagonistic") == [
+        "effort limits (joint side) not taken over, since two motors share a joint: turn",
+        "gear reductions not taken over, since two motors share a joint: turn 50",
+    ]
+    text = robot_text(import_urdf(tmp_path / "arm.urdf"))
+    assert "the URDF has an effort limit of 32 N m (joint side) and a gear reduction of 50" in text
+
+
+@pytest.mark.parametrize("reduction", ["0", "nan", "inf", "5O", "", "1_0", "1e10", "${ratio}"])
+def test_a_reduction_that_is_none(notes, reduction):
+    message = f"arm.urdf:5: mechanicalReduction: expected a number that is not zero, found {reduction!r}"
+    with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
+        notes("", transmission(reductions=[reduction]))
+
+
+@pytest.mark.parametrize("missing", ["mass", "inertia"])
+def test_only_links_that_move_need_whole_inertial_data(tmp_path, monkeypatch, vsacli, missing):
+    monkeypatch.chdir(tmp_path)
+    lines = serial("RR").splitlines()
+    flawed = re.sub(rf"<{missing} [^>]*/>", "", lines[1])
+    write(tmp_path / "arm.urdf", "\n".join([lines[0], flawed, *lines[2:]]))
+    assert import_urdf("arm.urdf").robot == import_urdf(write(tmp_path / "arm.urdf", serial("RR"))).robot
+    message = f"inertial of 'l1': there is no <{missing}> in it"
+    write(
+        tmp_path / "arm.urdf",
+        "\n".join([*lines[:2], re.sub(rf"<{missing} [^>]*/>", "", lines[2]), *lines[3:]]),
+    )
+    with pytest.raises(InputError, match=f"^arm.urdf:3: {message}$"):
+        import_urdf("arm.urdf")
+    checked = vsacli("validate", "arm.urdf")
+    assert (checked.code, f"arm.urdf:3: warning: {message}" in checked.out) == (0, True)
