@@ -17,7 +17,7 @@ GROUPS = {
     "Inverse dynamics and its results": "inverse_dynamics Result Report Flag open_result suggest",
     "Links": "link_torques forward_kinematics jacobian mass_matrix",
     "Control and simulation": "State state_derivative Gains feedback_linearization FeedbackLinearization "
-    "Integral simulate perturbed InitialError Tolerances",
+    "Integral simulate perturbed InitialError GoalTolerance Tolerances",
     "Errors": "InputError StorageError",
 }
 """What is exported, in the order in which one comes across it."""

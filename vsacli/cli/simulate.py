@@ -52,7 +52,7 @@ def _numbers(_context: click.Context, _parameter: click.Parameter, written: str)
 @click.command(
     "simulate",
     short_help="Integrate the robot's full dynamics under a controller.",
-    epilog=example("vsacli simulate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --perturb 0.01"),
+    epilog=example("vsacli simulate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --tolerance 2%"),
 )
 @robot_argument
 @trajectory_argument
@@ -95,8 +95,16 @@ def _numbers(_context: click.Context, _parameter: click.Parameter, written: str)
     show_default=True,
     help="What the controller knows; of positions it takes samples, and filtered differences for rates.",
 )
-@click.option("--rtol", type=float, default=1e-9, show_default=True, help="Relative tolerance.")
-@click.option("--atol", type=float, default=1e-10, show_default=True, help="Absolute tolerance.")
+@click.option(
+    "--tolerance",
+    metavar="ERROR",
+    default="1%",
+    show_default=True,
+    help="How far off joints may be at the end: a share of each one's range, plus 1e-3 rad (m), or a number "
+    "in rad (m).",
+)
+@click.option("--rtol", type=float, default=1e-9, show_default=True, help="Of the integration, relative.")
+@click.option("--atol", type=float, default=1e-10, show_default=True, help="Of the integration, absolute.")
 @click.option(
     "-o",
     "--output",
@@ -168,11 +176,19 @@ def _prepared(
     perturb: float,
     seed: int,
     measured: Any,
+    tolerance: str,
     rtol: float,
     atol: float,
 ) -> partial[Simulation]:
     """The simulation that the options describe."""
-    from vsacli.control.simulation import InitialError, Tolerances, check_measured, perturbed, simulate
+    from vsacli.control.simulation import (
+        GoalTolerance,
+        InitialError,
+        Tolerances,
+        check_measured,
+        perturbed,
+        simulate,
+    )
 
     gains: Gains | None = None
     if controller == FEEDBACK:
@@ -187,6 +203,7 @@ def _prepared(
         model=perturbed(inputs.robot, perturb, seed),
         initial_error=InitialError(initial_error, initial_stiffness_error),
         measured=measured,
+        goal_tolerance=GoalTolerance.from_text(tolerance),
         tolerances=Tolerances(rtol, atol),
     )
 

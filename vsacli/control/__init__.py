@@ -7,6 +7,7 @@ from vsacli.base.lazy import lazy_exports
 if TYPE_CHECKING:
     from vsacli.control.gains import Gains, Integral
     from vsacli.control.linearization import FeedbackLinearization, feedback_linearization
+    from vsacli.control.simulation.goal_tolerance import GoalTolerance
     from vsacli.control.simulation.integrator import Tolerances
     from vsacli.control.simulation.perturbation import perturbed
     from vsacli.control.simulation.simulate import InitialError, simulate
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 __all__ = [
     "FeedbackLinearization",
     "Gains",
+    "GoalTolerance",
     "InitialError",
     "Integral",
     "Tolerances",

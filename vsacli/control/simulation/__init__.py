@@ -1,7 +1,17 @@
 """Simulation of the full model under a controller: feedforward, or feedback linearization."""
 
+from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.integrator import Tolerances
 from vsacli.control.simulation.perturbation import perturbed
 from vsacli.control.simulation.simulate import InitialError, Measured, Simulation, check_measured, simulate
 
-__all__ = ["InitialError", "Measured", "Simulation", "Tolerances", "check_measured", "perturbed", "simulate"]
+__all__ = [
+    "GoalTolerance",
+    "InitialError",
+    "Measured",
+    "Simulation",
+    "Tolerances",
+    "check_measured",
+    "perturbed",
+    "simulate",
+]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,6 +15,7 @@ from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.json_records import Stored, named
 from vsacli.base.simulation_variables import actual
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
+from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
 from vsacli.dynamics.limits import limit_checks
@@ -21,6 +23,9 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
 HEADER = ("joint", "q error: peak", "end", "stiffness error: peak", "end", "peak motor 1 / 2")
+
+STIFFNESS_SHARE = 0.01
+"""Share of the largest commanded stiffness that it may be off at the end without a warning."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,7 @@ class JointTracking(Stored):
         steps_over_limit: how many steps have a limit exceeded.
         worst: the worst excess of each limit, by its name.
         energy: work of the motors, elastic energy, co-contraction.
+        tolerance: how far off q may be at the end, rad (m); NaN in reports written before there was one.
     """
 
     name: str
@@ -63,21 +69,28 @@ class JointTracking(Stored):
     steps_over_limit: int
     worst: dict[str, Worst]
     energy: JointEnergy
+    tolerance: float = math.nan
 
     shape: ClassVar = {
         **named("name", "type"),
         "q_error": "q",
+        "tolerance": "tolerance",
         "stiffness_error": "stiffness",
         "peak": {"tau_motor": "peak_tau_motor"},
         "steps": {"over_limit": "steps_over_limit"},
         **named("worst", "energy"),
     }
 
+    @property
+    def off_course(self) -> bool:
+        """Whether q is further from the command at the end than it may be."""
+        return abs(self.q.final) > self.tolerance
 
-def joint_trackings(robot: Robot, history: History) -> tuple[JointTracking, ...]:
+
+def joint_trackings(robot: Robot, history: History, goal: GoalTolerance) -> tuple[JointTracking, ...]:
     """What a history says about each joint."""
     energies = enumerate(_energies(robot, history))
-    return tuple(_tracking(robot.joints[index], index, history, energy) for index, energy in energies)
+    return tuple(_tracking(robot.joints[index], index, history, energy, goal) for index, energy in energies)
 
 
 def _energies(robot: Robot, history: History) -> list[JointEnergy]:
@@ -96,7 +109,9 @@ def _led(values: FloatArray) -> FloatArray:
     return np.concatenate((rows[..., :1], rows), axis=-1)
 
 
-def _tracking(joint: Joint, index: int, history: History, energy: JointEnergy) -> JointTracking:
+def _tracking(
+    joint: Joint, index: int, history: History, energy: JointEnergy, goal: GoalTolerance
+) -> JointTracking:
     flags = history.flags[:, index]
     first, second = np.fmax.reduce(np.abs(history.tau_motor_actual[:, index]), axis=0).tolist()
     return JointTracking(
@@ -108,6 +123,7 @@ def _tracking(joint: Joint, index: int, history: History, energy: JointEnergy) -
         steps_over_limit=int(np.count_nonzero(has(flags, LIMITS))),
         worst=_worst(joint, index, history),
         energy=energy,
+        tolerance=goal.of(float(np.ptp(history.q[:, index]))),
     )
 
 
@@ -162,3 +178,25 @@ def limit_sentence(joint: JointTracking, worst: Worst) -> str:
         f"{joint.name}: {whose} is {worst.value:.6g} {worst.unit} at t = {worst.time:.3f} s, "
         f"{relation} its limit {worst.bound:.6g}"
     )
+
+
+def end_sentence(joint: JointTracking) -> str:
+    """How far off a joint ends that strayed."""
+    unit = POSITION.unit(joint.type)
+    return (
+        f"{joint.name}: at the end q is {joint.q.final:.3g} {unit} off the command, "
+        f"more than the tolerance of {joint.tolerance:.3g} {unit}"
+    )
+
+
+def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:
+    """A warning for each joint that arrives with another stiffness than commanded."""
+    errors = history.stiffness_error[-1]
+    allowed = STIFFNESS_SHARE * history.stiffness.max(axis=0)
+    for index in np.flatnonzero(np.abs(errors) > allowed):  # NaN of rigid joints exceeds nothing
+        joint = robot.joints[index]
+        unit = STIFFNESS.unit(joint.type)
+        yield (
+            f"{joint.name}: at the end the stiffness is {errors[index]:.3g} {unit} off the command "
+            f"of {history.stiffness[-1, index]:.4g} {unit}"
+        )

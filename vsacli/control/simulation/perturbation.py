@@ -16,7 +16,7 @@ from vsacli.robot.model import Robot
 
 
 def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
-    """The robot with every dynamic parameter wrong by a random relative error.
+    """The robot with every dynamic parameter wrong by a random relative error; itself if that is zero.
 
     Masses, centres of mass, inertia tensors, dampings, motor inertias and the constants of the springs are
     each multiplied by 1 + relative u with u uniform in [-1, 1]; a tensor as a whole, so that it remains one
@@ -34,6 +34,8 @@ def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
         raise InputError.one(f"the relative error of the model must lie between 0 and 1, not {relative:g}")
     if seed < 0:
         raise InputError.one(f"the seed must be zero or positive, not {seed}")
+    if relative == 0:
+        return robot
     wrong = _Wrong(relative, np.random.default_rng(seed))
     return replace(robot, joints=tuple(wrong.joint(joint) for joint in robot.joints))
 

@@ -17,6 +17,7 @@ from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.controllers import Feedforward, LinearizingFeedback
+from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.history import History, history
 from vsacli.control.simulation.integrator import (
     Integrator,
@@ -26,7 +27,7 @@ from vsacli.control.simulation.integrator import (
     continuous,
     sampled,
 )
-from vsacli.control.simulation.joint_tracking import Deviation, joint_trackings
+from vsacli.control.simulation.joint_tracking import Deviation, joint_trackings, stiffness_warnings
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
 from vsacli.dynamics.forward import State
@@ -47,6 +48,11 @@ class InitialError:
 
     q: npt.ArrayLike = 0.0
     stiffness: npt.ArrayLike = 0.0
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the start is as commanded."""
+        return not (np.any(self.q) or np.any(self.stiffness))
 
 
 def start_state(robot: Robot, trajectory: Trajectory, error: InitialError) -> State:
@@ -96,6 +102,12 @@ class Simulation:
         return f"Simulation of {self.report}"
 
 
+_AMPLIFIED = (
+    "model and start are exact, so what strayed are the errors of the integration, which this motion "
+    "amplifies and nothing feeds back: with another --rtol it ends elsewhere"
+)
+
+
 def simulate(
     robot: Robot,
     trajectory: Trajectory,
@@ -104,6 +116,7 @@ def simulate(
     model: Robot | None = None,
     initial_error: InitialError = InitialError(),
     measured: Measured = "state",
+    goal_tolerance: GoalTolerance = GoalTolerance(),
     tolerances: Tolerances = Tolerances(),
     progress: Progress = lambda _: None,
 ) -> Simulation:
@@ -117,6 +130,7 @@ def simulate(
         initial_error: by how much the start differs from the command.
         measured: what the controller knows: the full "state" at every instant, or the "positions" of joints
             and motors at the steps of the trajectory, between which it holds its torques.
+        goal_tolerance: how far off the joints may be at the end of the run.
         tolerances: of the integration.
         progress: called with the time reached, s.
 
@@ -133,24 +147,31 @@ def simulate(
     integrate = continuous if measured == "state" else sampled
     integrated = _integrate(loop, trajectory, start, integrate, tolerances, progress)
     past = history(robot, loop, integrated)
+    joints = joint_trackings(robot, past, goal_tolerance)
     ideal: tuple[Deviation, ...] = ()
     if measured == "positions":
         with_full_state = simulate(
             robot, trajectory, gains=gains, model=model, initial_error=initial_error, tolerances=tolerances
         )
         ideal = tuple(joint.q for joint in with_full_state.report.joints)
+    verdict = verdict_on(past, joints, integrated.ending)
+    exact = gains is None and (model is None or model is robot) and initial_error.is_zero
     report = SimulationReport(
         robot=robot.name,
         trajectory=trajectory.name,
         controller="feedforward" if gains is None else "feedback-linearization",
         samples=len(past.time),
         duration=trajectory.duration,
-        verdict=verdict_on(past, complete=integrated.ending is None),
+        verdict=verdict,
         ending=None if integrated.ending is None else integrated.ending.described(robot.joint_names),
         evaluations=integrated.evaluations,
-        warnings=(*robot.warnings, *trajectory.warnings),
+        warnings=(
+            *(*robot.warnings, *trajectory.warnings),
+            *(stiffness_warnings(robot, past) if integrated.ending is None else ()),
+            *([_AMPLIFIED] if exact and verdict == "strayed" else []),
+        ),
         notes=trajectory.notes,
-        joints=joint_trackings(robot, past),
+        joints=joints,
         with_full_state=ideal,
     )
     return Simulation(past, report)

@@ -2,30 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+import sys
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from vsacli.analysis.report import VERDICTS
 from vsacli.analysis.report_text import WIDTH, energy_lines, warnings_and_notes
 from vsacli.base.flags import LIMITS, Flag
-from vsacli.base.json_records import Stored, named
+from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import aligned
 from vsacli.base.units import POSITION
+from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.history import History
-from vsacli.control.simulation.joint_tracking import HEADER, Deviation, JointTracking, limit_sentence, row
+from vsacli.control.simulation.joint_tracking import (
+    HEADER,
+    Deviation,
+    JointTracking,
+    end_sentence,
+    limit_sentence,
+    row,
+)
+
+VERDICTS = ("ok", "over_limit", "strayed", "singular", "infeasible", "diverged")
+"""From best to worst; the worst that applies wins."""
 
 _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
 
 
-def verdict_on(history: History, *, complete: bool) -> str:
-    """The worst of `VERDICTS` that a flag of any step speaks for, or "diverged" if none explains the end."""
+def verdict_on(history: History, joints: Sequence[JointTracking], ending: Ending | None) -> str:
+    """The worst of `VERDICTS` that applies.
+
+    A flag of any step speaks for its own; "strayed" are joints off course where the run was to end, and
+    "diverged" is a run whose early end no flag explains.
+    """
     flags = int(np.bitwise_or.reduce(history.flags, axis=None))
     applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
-    worst = next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
-    return worst if complete or worst not in ("ok", "over_limit") else "diverged"
+    if ending is None and any(joint.off_course for joint in joints):
+        applies.add("strayed")
+    if ending is not None and ending.flag is None:
+        applies.add("diverged")
+    return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
+
+
+@dataclass(frozen=True)
+class LargestError(Published):
+    """Where q was furthest from the command, measured by what its joint may be off at the end.
+
+    Attributes:
+        joint: its name.
+        value: |error|, rad (m).
+        unit: of it.
+        time: when, s.
+    """
+
+    joint: str
+    value: float
+    unit: str
+    time: float
 
 
 @dataclass(frozen=True)
@@ -38,7 +74,7 @@ class SimulationReport(Stored):
         controller: in words, as typed.
         samples: steps stored.
         duration: time from the first to the last step of the trajectory, s.
-        verdict: the worst of `VERDICTS` that applies, or "diverged"; see `verdict_on`.
+        verdict: the worst of `VERDICTS` that applies; see `verdict_on`.
         ending: why it ended early, as a sentence; None if it did not.
         evaluations: of the equations of motion.
         warnings: why the inputs may not be what was meant.
@@ -62,15 +98,24 @@ class SimulationReport(Stored):
     notes: tuple[str, ...] = ()
 
     format: ClassVar = "vsacli-simulation-report/1"
-    shape: ClassVar = named(
-        *("format", "verdict", "robot", "trajectory", "controller", "samples", "duration", "complete"),
-        *("ending", "evaluations", "warnings", "notes", "joints", "with_full_state"),
-    )
+    shape: ClassVar = {
+        **named("format", "verdict", "robot", "trajectory", "controller", "samples", "duration", "complete"),
+        "largest_error?": "largest_error",
+        **named("ending", "evaluations", "warnings", "notes", "joints", "with_full_state"),
+    }
 
     @property
     def complete(self) -> bool:
         """Whether the run reached the end of the trajectory."""
         return self.ending is None
+
+    @property
+    def largest_error(self) -> LargestError | None:
+        """The largest error of q on the way; None if what the joints may be off is not known."""
+        if any(math.isnan(joint.tolerance) for joint in self.joints):
+            return None
+        worst = max(self.joints, key=lambda joint: joint.q.peak / max(joint.tolerance, sys.float_info.min))
+        return LargestError(worst.name, worst.q.peak, POSITION.unit(worst.type), worst.q.time)
 
     def __str__(self) -> str:
         """The lines that the command prints, without a final newline."""
@@ -80,6 +125,7 @@ class SimulationReport(Stored):
                 *aligned([HEADER, *map(row, self.joints)]),
                 *warnings_and_notes(self.warnings, self.notes),
                 *(limit_sentence(joint, worst) for joint in self.joints for worst in joint.worst.values()),
+                *(end_sentence(joint) for joint in self.joints if self.complete and joint.off_course),
                 *([] if self.ending is None else [self.ending]),
                 *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
                 *self._loss(),
@@ -88,6 +134,8 @@ class SimulationReport(Stored):
 
     def _headline(self) -> str:
         left = f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"
+        if (error := self.largest_error) is not None:
+            left += f", q off by up to {error.value:.2g} {error.unit} ({error.joint}, t = {error.time:.3f} s)"
         verdict = self.verdict.upper().replace("_", " ")
         return f"{left:<{WIDTH - len(verdict) - 1}} {verdict}"
 

@@ -1,0 +1,142 @@
+"""Where a simulated robot ends: how far off it may be, and what the report says of runs that strayed."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from samples.robots import vsa_3r
+from samples.simulated import short_motion
+from samples.single_joint import LINK_INERTIA, rigid_joint, step_of
+
+from vsacli.base.errors import InputError
+from vsacli.control.gains import Gains
+from vsacli.control.simulation import GoalTolerance, InitialError, simulate
+from vsacli.control.simulation.simulation_report import SimulationReport
+
+MOTOR_INERTIA = 2.0
+
+
+def drifted(size, excess, joint_type="revolute"):
+    """Feedforward of a model whose inertia is too large by a share: q goes too far by the same share."""
+    inertia = MOTOR_INERTIA + excess * (MOTOR_INERTIA + LINK_INERTIA)
+    model = rigid_joint(inertia, joint_type)
+    return simulate(rigid_joint(MOTOR_INERTIA, joint_type), step_of(size), model=model)
+
+
+@pytest.mark.parametrize("size", [1.5, -1.5])
+@pytest.mark.parametrize(
+    ("excess", "verdict"),
+    [(0.0105, "ok"), (0.0108, "strayed")],  # 1 % of 1.5 rad and 1e-3 rad are 1.0667 % of 1.5 rad
+)
+def test_a_drift_in_closed_form_strays_beyond_the_tolerance(size, excess, verdict):
+    report = drifted(size, excess).report
+    axis = report.joints[0]
+    assert axis.q.final == pytest.approx(excess * size, rel=1e-7)  # tolerances of the integration
+    assert axis.tolerance == pytest.approx(0.016, rel=1e-12)
+    assert report.verdict == verdict
+    assert ("at the end q is" in str(report)) == (verdict == "strayed")
+
+
+def test_the_headline_has_the_largest_error_on_the_way():
+    """A constant error of the start decays to nothing; its size is known all the same."""
+    gains = Gains.from_poles([-20] * 2)
+    error = InitialError(0.05)
+    report = simulate(rigid_joint(2.0), step_of(1.0), gains=gains, initial_error=error).report
+    assert report.verdict == "ok"
+    headline = str(report).splitlines()[0]
+    assert ", q off by up to 0.05 rad (axis, t = 0.000 s)" in headline
+    assert headline.endswith(" OK")
+    largest = json.loads(json.dumps(report.as_json()))["largest_error"]
+    assert largest == {"joint": "axis", "value": pytest.approx(0.05, rel=1e-12), "unit": "rad", "time": 0.0}
+
+
+def test_a_prismatic_joint_strays_in_metres():
+    report = drifted(0.3, 0.05, "prismatic").report
+    assert report.verdict == "strayed"
+    assert "axis: at the end q is 0.015 m off the command, more than the tolerance of 0.004 m" in str(report)
+    assert "q off by up to 0.015 m (axis, t = 1.000 s)" in str(report)
+
+
+@pytest.mark.parametrize(("error", "verdict"), [(0.9e-3, "ok"), (1.1e-3, "strayed")])
+def test_a_joint_that_is_to_hold_still_may_be_a_milliradian_off(error, verdict):
+    """No force acts on it: it stays where it starts."""
+    report = simulate(rigid_joint(2.0), step_of(0.0), initial_error=InitialError(error)).report
+    assert report.joints[0].q.final == pytest.approx(error, rel=1e-9)
+    assert report.joints[0].tolerance == pytest.approx(1e-3, rel=1e-8)  # rounding of the command
+    assert report.verdict == verdict
+
+
+def test_an_error_of_exactly_the_tolerance_has_arrived():
+    error = InitialError([0, 0, 0.01])
+    joints = simulate(vsa_3r(), short_motion(3), initial_error=error).report.joints
+    size = max(abs(joint.q.final) for joint in joints)
+    for tolerance, verdict in ((size, "ok"), (math.nextafter(size, 0), "strayed")):
+        goal = GoalTolerance(share=0.0, absolute=tolerance)
+        report = simulate(vsa_3r(), short_motion(3), initial_error=error, goal_tolerance=goal).report
+        assert report.verdict == verdict
+
+
+def test_straying_of_an_exact_run_is_blamed_on_the_integration():
+    blame = "so what strayed are the errors of the integration"
+    tight = GoalTolerance(share=0.0, absolute=1e-15)
+    assert blame in "".join(simulate(vsa_3r(), short_motion(3), goal_tolerance=tight).report.warnings)
+    off = simulate(vsa_3r(), short_motion(3), goal_tolerance=tight, initial_error=InitialError(0.01)).report
+    assert off.verdict == "strayed"
+    assert not off.warnings
+
+
+def test_a_stiffness_that_does_not_arrive_is_a_warning():
+    slow = Gains.from_poles([-20] * 4, [-1] * 2)
+    error = InitialError(0, [0, 30, 0])
+    report = simulate(vsa_3r(), short_motion(3), gains=slow, initial_error=error).report
+    assert report.verdict == "ok"
+    left = 30 * (1 + 0.8) * math.exp(-0.8)  # of a double pole at -1/s, started without a rate
+    assert report.joints[1].stiffness.final == pytest.approx(left, rel=1e-6)
+    assert report.warnings == (
+        f"shoulder: at the end the stiffness is {left:.3g} N m/rad off the command of 1300 N m/rad",
+    )
+
+
+@pytest.mark.parametrize(
+    ("written", "share", "absolute"),
+    [
+        ("1%", 0.01, 1e-3),
+        (" 2.5 % ", 0.025, 1e-3),
+        ("0%", 0.0, 1e-3),
+        ("0.02", 0.0, 0.02),
+        ("1e-3", 0.0, 1e-3),
+    ],
+)
+def test_a_tolerance_as_typed(written, share, absolute):
+    assert GoalTolerance.from_text(written) == GoalTolerance(share, absolute)
+
+
+@pytest.mark.parametrize(
+    ("written", "message"),
+    [
+        ("wide", "--tolerance: expected a number in rad .m. such as 0.01, or a share .* not 'wide'"),
+        ("%", "--tolerance: expected a number"),
+        ("1 deg", "--tolerance: expected a number"),
+        ("0", "the tolerance must be positive and finite"),
+        ("-1", "the tolerance must be positive and finite"),
+        ("-1%", "the tolerance must be positive and finite"),
+        ("nan", "the tolerance must be positive and finite"),
+        ("inf", "the tolerance must be positive and finite"),
+        ("120%", "as a share at most 100 %"),
+    ],
+)
+def test_a_tolerance_that_makes_no_sense_is_refused(written, message):
+    with pytest.raises(InputError, match=message):
+        GoalTolerance.from_text(written)
+
+
+def test_reports_written_before_there_was_a_tolerance_can_be_read():
+    content = simulate(rigid_joint(2.0), step_of(1.0)).report.as_json()
+    del content["largest_error"], content["joints"][0]["tolerance"]
+    old = SimulationReport.from_json(content)
+    assert old.largest_error is None
+    assert np.isnan(old.joints[0].tolerance)
+    assert str(old).splitlines()[0].split() == ["single,", "step:", "feedforward,", "1", "s", "OK"]
