@@ -64,7 +64,8 @@ def test_generated_code_says_so(vsacli, arm, tmp_path):
     files = [path for path in (tmp_path / "controller").iterdir() if path.name != "Makefile"]
     assert len(files) == 4
     for path in files:
-        assert OF_PLACEHOLDERS in re.sub(r"\s+", " ", path.read_text())
+        text = path.read_text().replace("\\", "")  # with which Markdown says that a letter is only a letter
+        assert OF_PLACEHOLDERS in re.sub(r"\s+", " ", text)
 
 
 def test_results_keep_it(vsacli, arm):
