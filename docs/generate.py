@@ -6,6 +6,7 @@ python docs/generate.py --check    changes nothing; exit code 1 if a part is sta
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import sys
@@ -33,9 +34,12 @@ from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.cli.console import Exit
 from vsacli.cli.main import vsacli
 from vsacli.control.poles import PolesFile
+from vsacli.documents.plausibility import Rule
 from vsacli.files.examples import Example, examples, opening_comment
 from vsacli.robot.file import RobotFile
+from vsacli.robot.plausibility import ROBOT_RULES
 from vsacli.trajectory.file import content
+from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -124,6 +128,29 @@ def _wrench_columns() -> Iterator[tuple[str, str, str]]:
 def pole_fields() -> str:
     """Fields of a poles file."""
     return record_sections(PolesFile)
+
+
+def robot_rules() -> str:
+    """What numbers of a robot are held against."""
+    return _rules(ROBOT_RULES)
+
+
+def trajectory_rules() -> str:
+    """What numbers of a trajectory are held against."""
+    return _rules(TRAJECTORY_RULES)
+
+
+def _rules(rules: Iterable[Rule[Any]]) -> str:
+    return table(
+        ("what", "keys", "size", "passes", "since"),
+        ((rule.name, rule.fields, rule.size, _bounds(rule.low, rule.high), rule.reason) for rule in rules),
+    )
+
+
+def _bounds(low: float, high: float) -> str:
+    if math.isinf(high):
+        return f"from {low:g}"
+    return f"below {high:g}" if low <= 0 else f"{low:g} to {high:g}"
 
 
 def variables() -> str:
@@ -232,6 +259,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "trajectory-fields": trajectory_fields,
     "csv-columns": csv_columns,
     "pole-fields": pole_fields,
+    "robot-rules": robot_rules,
+    "trajectory-rules": trajectory_rules,
     "stiffness-cost": stiffness_cost,
     "simulation-variables": simulation_variables,
     "robots": robots,

@@ -132,7 +132,11 @@ def _stiffened(nodes: Sequence[tree.Node], names: Sequence[str]) -> tuple[str, .
 
 
 def _robot(names: Sequence[str], stiffened: Sequence[str]) -> Robot:
-    return Robot(name="stand-in", joints=tuple(_joint(name, _actuator(name, stiffened)) for name in names))
+    return Robot(
+        name="stand-in",
+        placeholder=True,
+        joints=tuple(_joint(name, _actuator(name, stiffened)) for name in names),
+    )
 
 
 def _actuator(name: str, stiffened: Sequence[str]) -> Actuator:

@@ -86,10 +86,10 @@ def _failed(path: str, error: InputError) -> Checked:
     return Checked(path, "", tuple(Message(ERROR, *problem) for problem in error.problems))
 
 
-def _usable(path: str, summary: str, warnings: Iterable[str] = (), notes: Iterable[str] = ()) -> Checked:
+def _usable(path: str, summary: str, warnings: Iterable[Problem] = (), notes: Iterable[str] = ()) -> Checked:
     """A file that can be used, with what is to be known about it."""
-    told = [*((WARNING, text) for text in warnings), *((NOTE, text) for text in notes)]
-    return Checked(path, summary, tuple(Message(severity, path, 0, text) for severity, text in told))
+    messages = [Message(WARNING, path, warning.line, warning.message) for warning in warnings]
+    return Checked(path, summary, (*messages, *(Message(NOTE, path, 0, text) for text in notes)))
 
 
 def check_files(paths: Sequence[str]) -> list[Checked]:
@@ -125,19 +125,20 @@ def _checked(path: str, kind: FileKind, robots: dict[str, Robot]) -> Checked:
 
 def _robot(path: str, robots: Robots) -> Checked:
     robot = robots[path]
-    return _usable(path, f"robot {robot.name}, {_count(len(robot.joints), 'joint')}", robot.warnings)
+    return _usable(path, f"robot {robot.name}, {_count(len(robot.joints), 'joint')}", robot.located_warnings)
 
 
 def _trajectory(path: str, robots: Robots) -> Checked:
     if not robots:
         return _described(path, load_trajectory(path, placeholder_robot(path).robot), WITHOUT_ROBOT)
-    return _described(path, *_fitting(path, lambda robot: load_trajectory(path, robot), robots))
+    fitting, note = _fitting(path, lambda robot: load_trajectory(path, robot), robots)
+    return _described(path, min(fitting, key=lambda trajectory: len(trajectory.warnings)), note)
 
 
 def _described(path: str, trajectory: Trajectory, note: str) -> Checked:
     steps = f"{_count(trajectory.samples, 'step')} over {trajectory.duration:g} s"
     return _usable(
-        path, f"trajectory {trajectory.name}, {steps}", trajectory.warnings, [*trajectory.notes, note]
+        path, f"trajectory {trajectory.name}, {steps}", trajectory.located_warnings, [*trajectory.notes, note]
     )
 
 
@@ -158,8 +159,8 @@ def _gains(path: str, robot: Robot) -> Any:
         return load_gains(path, robot, integral=True)
 
 
-def _fitting(path: str, read: Callable[[Robot], Any], robots: Robots) -> tuple[Any, str]:
-    """What is read for the first robot that it fits, and a note on the robots that it fits.
+def _fitting(path: str, read: Callable[[Robot], Any], robots: Robots) -> tuple[list[Any], str]:
+    """What is read for each robot that it fits, and a note on these robots.
 
     Raises:
         InputError: it fits none; the problems are those with the robot that it fits best.
@@ -175,7 +176,7 @@ def _fitting(path: str, read: Callable[[Robot], Any], robots: Robots) -> tuple[A
         best = min(errors, key=lambda robot_path: len(errors[robot_path].problems))
         raise InputError([*errors[best].problems, *_misfit(path, len(errors), best)])
     shown = ", ".join([*fitting][:MOST_ROBOTS_SHOWN]) + (", ..." if len(fitting) > MOST_ROBOTS_SHOWN else "")
-    return next(iter(fitting.values())), f"fits {len(fitting)} of {_count(len(robots), 'robot')}: {shown}"
+    return list(fitting.values()), f"fits {len(fitting)} of {_count(len(robots), 'robot')}: {shown}"
 
 
 def _misfit(path: str, robots: int, best: str) -> Iterator[Problem]:
@@ -189,7 +190,8 @@ def _table(path: str, robots: Robots) -> Checked:
     if set(table.columns) != SPRING_COLUMNS:
         return _trajectory(path, robots)
     spring = MeasuredSpring(file=table)
-    return _usable(path, f"spring of {_count(len(table.values), 'row')}", spring.warnings)
+    warnings = [Problem(path, 0, warning) for warning in spring.warnings]
+    return _usable(path, f"spring of {_count(len(table.values), 'row')}", warnings)
 
 
 def _urdf(path: str, _: Robots) -> Checked:

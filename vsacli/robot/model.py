@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.base import units
-from vsacli.base.errors import check_type
+from vsacli.base.errors import Problem, check_type
 from vsacli.base.tables import aligned, html_table
 from vsacli.documents.fields import (
     Items,
@@ -22,6 +22,9 @@ from vsacli.documents.fields import (
 )
 from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint, Pose
+
+if TYPE_CHECKING:
+    from vsacli.robot.plausibility.facts import Facts
 
 OF_PLACEHOLDERS = (
     "the springs and motors of this robot are placeholders: replace them by those of your devices "
@@ -105,12 +108,28 @@ class Robot:
         return tuple(dict.fromkeys(sources))
 
     @property
+    def facts(self) -> Facts:
+        """What is known of it to tell numbers that are hardly what was meant."""
+        from vsacli.documents.plausibility import numbers
+        from vsacli.robot.plausibility.facts import Facts
+
+        return Facts(self.joints, self.base, self.gravity, tuple(numbers(self)), self.placeholder)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What may not be what was meant, one sentence each."""
+        return tuple(map(str, self.located_warnings))
+
+    @property
+    def located_warnings(self) -> tuple[Problem, ...]:
+        """The warnings; those on a number of the robot file with its line."""
+        from vsacli.robot.plausibility import implausible
+
         massless = not any(joint.link.mass for joint in self.joints)
         of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
         of_joints = (warning for joint in self.joints for warning in joint.warnings(massless=massless))
-        return (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
+        whole = (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
+        return (*(Problem("", 0, warning) for warning in whole), *implausible(self.facts, self.sources))
 
 
 def check_robot(value: object) -> None:

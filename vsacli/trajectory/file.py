@@ -14,10 +14,12 @@ from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
+from vsacli.documents.plausibility import numbers
 from vsacli.documents.reading import read_document
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
+from vsacli.trajectory.plausibility import Facts, implausible
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes, uniform_times_over
 from vsacli.trajectory.trajectory import Trajectory
@@ -147,13 +149,15 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     }
     profiles |= {each.signal.key: each for recording in recordings for each in recording.profiles}
     wrench = document.declared.get(WRENCH)
+    motion = profiles[POSITION.key] if POSITION in document.formulas else None
+    facts = Facts(robot, tuple(numbers(document, joints.types)), times, motion)
     return Trajectory(
         times,
         profiles[POSITION.key],
         profiles,
         wrench=None if wrench is None else WrenchProfile(profiles[WRENCH.key], wrench.frame),
         name=document.name,
-        warnings=_warnings(document, times, joints),
+        warnings=[*_warnings(document, times, joints), *implausible(facts, source)],
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, times)],
         sources=[source, *(recording.source for recording in recordings)],
     )

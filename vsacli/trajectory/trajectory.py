@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, over_time
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_names
 from vsacli.base.wrench import Wrench
 from vsacli.documents.source import Source
@@ -38,7 +38,9 @@ class Trajectory:
             chosen.
         wrench: what the environment exerts meanwhile; None if nothing.
         name: used in reports and for the name of the result file.
-        warnings: why times and profiles may not be what was meant.
+        located_warnings: why times and profiles may not be what was meant; those on a number of the file with
+            its line.
+        warnings: the same as texts.
         notes: how they were understood, where that is not obvious.
         sources: the files it was read from.
     """
@@ -51,7 +53,7 @@ class Trajectory:
         *,
         wrench: WrenchProfile | None = None,
         name: str,
-        warnings: Iterable[str] = (),
+        warnings: Iterable[str | Problem] = (),
         notes: Iterable[str] = (),
         sources: Iterable[Source] = (),
     ) -> None:
@@ -68,7 +70,11 @@ class Trajectory:
             for key, signal in COMMANDED.items()
         }
         profiles = [profile for _, profile in self._profiles()]
-        self.warnings = (*warnings, *(each for profile in profiles for each in profile.warnings))
+        told = (*warnings, *(each for profile in profiles for each in profile.warnings))
+        self.located_warnings = tuple(
+            each if isinstance(each, Problem) else Problem("", 0, each) for each in told
+        )
+        self.warnings = tuple(map(str, self.located_warnings))
         self.notes = (*notes, *times.notes, *(each for profile in profiles for each in profile.notes))
         self.sources = tuple(sources)
         self._check()

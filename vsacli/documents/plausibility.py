@@ -1,0 +1,306 @@
+"""Numbers that can be computed with but are hardly what was meant: the rules, and what they find in a file.
+
+A rule holds a size, made of a number of the file, against bounds that whatever is built keeps by far. What
+lies outside is a warning that names the number, its size, and the unit in which it would be as usual.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
+
+import numpy as np
+
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.units import Quantity
+from vsacli.documents import tree
+from vsacli.documents.expression import ANGLES, ExpressionError, evaluate
+from vsacli.documents.kinds.lists import Pair
+from vsacli.documents.records import Kind, declared
+from vsacli.documents.source import Problems, Source
+from vsacli.documents.yaml_tree import parse_yaml
+
+_Subject = TypeVar("_Subject")
+_EXPRESSION_OF_ANGLE = re.compile("deg|pi")
+
+
+class Entry(NamedTuple):
+    """A step into a list, or into values by joint: number from 0, and the name if it has one."""
+
+    number: int
+    name: str = ""
+
+    def __str__(self) -> str:
+        return self.name or str(self.number)
+
+
+NumberPath: TypeAlias = tuple[str | Entry, ...]
+"""Leads to a number of a file; joined by dots as users write it."""
+
+
+class Number(NamedTuple):
+    """A number of a record: the path to it, what it measures, and its value in SI units."""
+
+    path: NumberPath
+    quantity: Quantity
+    value: float
+
+
+def numbers(
+    record: Any, members: Mapping[str, str] = MappingProxyType({}), path: NumberPath = ()
+) -> Iterator[Number]:
+    """Every finite number in the declared fields of a record, and in the records in it.
+
+    Args:
+        record: whose fields are declared.
+        members: name and unit variant of every joint, where the record has values by joint.
+        path: to the record.
+    """
+    for name, (field, _) in declared(type(record)).items():
+        yield from _numbers(field.kind, getattr(record, name), members, (*path, name))
+
+
+def _numbers(kind: Kind, content: Any, members: Mapping[str, str], path: NumberPath) -> Iterator[Number]:
+    quantity = getattr(kind, "unit", None)
+    if content is None:
+        return
+    if isinstance(kind, Pair) and content[0] is content[1]:
+        yield from _numbers(kind.item, content[0], members, path)
+    elif kind.each is not None:
+        for number, (name, entry) in enumerate(zip(kind.names(content, members), content, strict=True)):
+            yield from _numbers(kind.each, entry, members, (*path, Entry(number, name)))
+    elif kind.records:
+        yield from numbers(content, members, path)
+    elif quantity is not None and math.isfinite(content):
+        yield Number(path, quantity, float(content))
+
+
+class Slip(NamedTuple):
+    """Another unit in which a number may have been written.
+
+    Attributes:
+        unit: the unit, e.g. `mm`.
+        factor: its size in the unit that was expected.
+        power: of the factor by which the size of the rule changes.
+        instead_of: the unit that was expected, if the rule is about numbers of several.
+        field: path, beside the number that was measured, to the field it is about; that number if empty.
+    """
+
+    unit: str
+    factor: float
+    power: float = 1.0
+    instead_of: str = ""
+    field: tuple[str, ...] = ()
+
+
+class Measured(NamedTuple):
+    """What a rule measures of one number.
+
+    Attributes:
+        path: to the number.
+        value: of it; NaN if the path leads to several.
+        unit: of it.
+        size: what the rule bounds; NaN if there is nothing to hold it against.
+        beside: values that the words of the rule name, by name.
+    """
+
+    path: NumberPath
+    value: float
+    unit: str
+    size: float
+    beside: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rule(Generic[_Subject]):
+    """What numbers of a kind are held against.
+
+    Attributes:
+        name: of what is judged, a few words.
+        fields: of the file, for the documentation.
+        measure: yields the numbers of a robot or trajectory with their sizes.
+        size: what the size is, for the documentation.
+        low: least size that passes.
+        high: sizes from here on do not pass.
+        usual: a common size, towards which a slip is looked for.
+        finding: what the number is, a verb with its object; `{size}` and what lies beside are filled in.
+        reason: why sizes beyond the bounds are not what is meant, a sentence.
+        slips: other units that the number may be in.
+        advice: what to look at if none of them fits.
+        in_angles: whether a number written with `deg` or `pi` passes, as its writer knew the unit.
+        explained_by: names of rules; what one of them finds explains what this one would find.
+    """
+
+    name: str
+    fields: str
+    measure: Callable[[_Subject], Iterable[Measured]]
+    size: str
+    low: float = 0.0
+    high: float = math.inf
+    usual: float = 1.0
+    finding: str
+    reason: str
+    slips: tuple[Slip, ...] = ()
+    advice: str = "check its unit"
+    in_angles: bool = False
+    explained_by: tuple[str, ...] = ()
+
+    def admits(self, size: float) -> bool:
+        """Whether a size is as usual, or nothing is known of it."""
+        return math.isnan(size) or self.low <= size < self.high
+
+    def slip(self, measured: Measured) -> Slip | None:
+        """The unit in which the number would be nearest to a common one; None if it would be in none."""
+        sizes = {
+            slip: measured.size * slip.factor**slip.power
+            for slip in self.slips
+            if slip.instead_of in ("", measured.unit)
+        }
+        fitting = [slip for slip, size in sizes.items() if size and self.admits(size)]
+        return min(fitting, key=lambda slip: abs(math.log(sizes[slip] / self.usual)), default=None)
+
+    def sentence(self, measured: Measured, slip: Slip | None) -> str:
+        """The warning: field and value, what it is, and what it looks like."""
+        path = _of_slip(measured.path, slip)
+        known = path == measured.path and not math.isnan(measured.value)
+        value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if known else ""
+        found = self.finding.format(size=_shown(measured.size), **measured.beside)
+        guess = "" if slip is None else _guess(measured, slip) if known else f"is it in {slip.unit}?"
+        return f"{_dotted(path)}{value} {found}; {guess or self.advice}"
+
+
+def _guess(measured: Measured, slip: Slip) -> str:
+    meant = f"did you mean {measured.value:.6g} {slip.unit}"
+    if measured.unit in ANGLES and slip.unit == "deg":
+        return f"{meant}?"
+    return f"{meant}, which is {measured.value * slip.factor:.6g} {measured.unit}?"
+
+
+def _shown(size: float) -> str:
+    """Three digits, with a power of ten only where there would be many zeros."""
+    return f"{float(f'{size:.3g}'):.6g}"
+
+
+def _of_slip(path: NumberPath, slip: Slip | None) -> NumberPath:
+    return (*path[:-1], *slip.field) if slip and slip.field else path
+
+
+def _dotted(path: NumberPath) -> str:
+    return ".".join(map(str, path))
+
+
+Moved: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
+"""Gives the path in a file, from its root and the path in the record made of it."""
+
+
+class Written:
+    """What a YAML file says, and on which line, at the path to a number."""
+
+    def __init__(
+        self, source: Source, moved: Callable[[tree.Node, NumberPath], NumberPath] | None = None
+    ) -> None:
+        """The file, and where it has what stands elsewhere in the record made of it."""
+        self._source = source
+        self._moved = moved
+
+    @cached_property
+    def _root(self) -> tree.Node:
+        try:
+            return parse_yaml(self._source.text or "", Problems(self._source.path))
+        except InputError:  # no YAML file
+            return tree.Mapping(0, {}, {})
+
+    def at(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
+        """The deepest node on the way along a path, and the steps that do not lead into it."""
+        steps = path if self._moved is None else self._moved(self._root, path)
+        node = self._root
+        for taken, step in enumerate(steps):
+            inner = _inside(node, step)
+            if inner is None:
+                return node, steps[taken:]
+            node = inner
+        return node, ()
+
+    def problem(self, path: NumberPath, message: str) -> Problem:
+        """A message on a path, with the line."""
+        return Problem(self._source.path, self.at(path)[0].line, message)
+
+    def said(self, measured: Measured) -> Measured | None:
+        """The number as the file says it, once if for all joints or both ends; None if it says another."""
+        node, left = self.at(measured.path)
+        if not isinstance(node, tree.Scalar) or math.isnan(measured.value):
+            return measured
+        value = _value(node.text, measured.unit)
+        if abs(value) != abs(measured.value):
+            return None
+        return measured._replace(path=measured.path[: len(measured.path) - len(left)], value=value)
+
+    def in_angles(self, path: NumberPath) -> bool:
+        """Whether a number is written with `deg` or `pi`."""
+        node, _ = self.at(path)
+        return isinstance(node, tree.Scalar) and bool(_EXPRESSION_OF_ANGLE.search(node.text))
+
+
+def _inside(node: tree.Node, step: str | Entry) -> tree.Node | None:
+    match node, step:
+        case tree.Mapping(entries=entries), _:
+            return entries.get(str(step))
+        case tree.Sequence(items=items), Entry(number=number) if number < len(items):
+            return items[number]
+    return None
+
+
+def _value(text: str, unit: str) -> float:
+    """The number that a text stands for; NaN if none."""
+    try:
+        return evaluate(text, unit)
+    except ExpressionError:
+        return math.nan
+
+
+def strange(
+    rules: Sequence[Rule[_Subject]], subject: _Subject, known: Collection[str] = ()
+) -> dict[str, list[Measured]]:
+    """The numbers that rules find, by name of the rule; of rules that find nothing there is no entry.
+
+    Args:
+        rules: a rule comes after those that explain what it finds.
+        subject: what they measure.
+        known: names of rules that found something elsewhere.
+    """
+    found: dict[str, list[Measured]] = {}
+    with np.errstate(all="ignore"):  # a number may be so strange that a size is infinite
+        for rule in rules:
+            if {*found, *known}.isdisjoint(rule.explained_by):
+                outside = [measured for measured in rule.measure(subject) if not rule.admits(measured.size)]
+                found |= {rule.name: outside} if outside else {}
+    return found
+
+
+def findings(
+    rules: Sequence[Rule[_Subject]],
+    subject: _Subject,
+    written: Written | None = None,
+    known: Collection[str] = (),
+) -> tuple[Problem, ...]:
+    """What rules find; with file and line if the file is given and still says it. The rest as `strange`."""
+    named = {rule.name: rule for rule in rules}
+    found = strange(rules, subject, known)
+    problems = (_problem(named[name], each, written) for name, several in found.items() for each in several)
+    return tuple(dict.fromkeys(problem for problem in problems if problem is not None))
+
+
+def _problem(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem | None:
+    """The warning about a number; None if its writer knew the unit."""
+    slip = rule.slip(measured)
+    said = written.said(measured) if written is not None else None
+    if written is None or said is None:
+        return Problem("", 0, rule.sentence(measured, slip))
+    if rule.in_angles and written.in_angles(measured.path):
+        return None
+    return written.problem(_of_slip(measured.path, slip), rule.sentence(said, slip))

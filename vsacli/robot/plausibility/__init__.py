@@ -1,0 +1,41 @@
+"""Numbers of a robot that are hardly what was meant, by rules that are data; see `documents.plausibility`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from vsacli.base.errors import Problem
+from vsacli.documents import tree
+from vsacli.documents.plausibility import Entry, NumberPath, Written, findings, strange
+from vsacli.documents.source import Source
+from vsacli.robot.plausibility.body_rules import BODY_RULES
+from vsacli.robot.plausibility.drive_rules import DRIVE_RULES
+from vsacli.robot.plausibility.facts import Facts
+
+ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES)
+
+
+def implausible(facts: Facts, sources: Sequence[Source]) -> tuple[Problem, ...]:
+    """What the rules find, with lines of the robot file: the first of the sources, if there is one."""
+    return findings(ROBOT_RULES, facts, Written(sources[0], _as_written) if sources else None)
+
+
+def strange_of_robot(facts: Facts) -> frozenset[str]:
+    """Names of the rules that find something."""
+    return frozenset(strange(ROBOT_RULES, facts))
+
+
+def _as_written(root: tree.Node, path: NumberPath) -> NumberPath:
+    """Where a robot file says what stands at a path of the robot: modified rows are made standard ones.
+
+    The standard row i has a and alpha of the modified row i+1; those of the first one are in the base.
+    """
+    convention = root.entries.get("convention") if isinstance(root, tree.Mapping) else None
+    if not (isinstance(convention, tree.Scalar) and convention.text == "modified"):
+        return path
+    match path:
+        case ("joints", Entry(number=number), "dh", "a" | "alpha" as word):
+            return ("joints", Entry(number + 1), "dh", word)
+        case ("base", "rpy", Entry(number=0)):
+            return ("joints", Entry(0), "dh", "alpha")
+    return path
