@@ -74,7 +74,8 @@ class Dip:
     def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
         return self.at(time)
 
-    def summary(self) -> None:
+    @property
+    def estimate(self) -> None:
         return None
 
     def stretched(self, factor: float) -> Dip:

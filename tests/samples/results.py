@@ -18,7 +18,7 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import WRENCH
-from vsacli.base.variables import VARIABLES, Block
+from vsacli.base.variables import UNCERTAIN, VARIABLES, Block
 from vsacli.documents.source import Source
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
@@ -40,6 +40,7 @@ class PlannedTrajectory:
     name: str = "swing"
     sources: tuple[Source, ...] = ()
     wrench: WrenchProfile | None = PUSH
+    uncertain: tuple[str, ...] = UNCERTAIN
 
 
 def joint(name: str, kind: str, index: int = 0) -> Joint:

@@ -9,10 +9,13 @@ import numpy as np
 
 from vsacli.base.arrays import AnyArray, FlagArray, FloatArray
 from vsacli.base.flags import Flag, has, marked
-from vsacli.base.variables import VARIABLES
+from vsacli.base.variables import VARIABLES, deviation
 
 LIMIT_ROUNDING = 1e-9
 """Relative excess over a limit that is none, so that a motion may run along its limit."""
+
+ALLOWED_DEVIATIONS, LARGEST_ALLOWANCE = 2.0, 0.01
+"""Standard deviations, and share of a limit's range, by which an uncertain value may seem to exceed it."""
 
 OfJoint = Mapping[str, AnyArray]
 """Variables of one joint by name, (samples,), those of its motors (2, samples)."""
@@ -60,10 +63,27 @@ class LimitCheck(NamedTuple):
         rows = of_joint[self.variable]
         return rows if self.motor is None else rows[self.motor - 1]
 
-    def flags(self, of_joint: OfJoint) -> FlagArray:
-        """The bit where the range is left by more than rounding; NaN does not leave it."""
-        largest = max(abs(bound) for bound in self.range if np.isfinite(bound))
-        return marked(self.flag, self._outside(self.values(of_joint)) > LIMIT_ROUNDING * largest)
+    def flags(self, of_joint: OfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
+        """The bit where the range is left by more than rounding and an allowance; NaN does not leave it."""
+        allowed = LIMIT_ROUNDING * self._largest + allowance
+        return marked(self.flag, self._outside(self.values(of_joint)) > allowed)
+
+    def allowance(self, of_joint: OfJoint) -> FloatArray | float:
+        """How far outside values may seem to be since they are uncertain, (samples,); 0 if they are not.
+
+        Twice the standard deviation, but at most 1 % of the range, or of the bound if there is only one.
+        """
+        deviations = of_joint.get(deviation(self.variable))
+        if deviations is None:
+            return 0.0
+        width = self.range[1] - self.range[0]
+        most = LARGEST_ALLOWANCE * (width if np.isfinite(width) else self._largest)
+        of_motor = deviations if self.motor is None else deviations[self.motor - 1]
+        return np.minimum(ALLOWED_DEVIATIONS * np.nan_to_num(of_motor), most)
+
+    @property
+    def _largest(self) -> float:
+        return max(abs(bound) for bound in self.range if np.isfinite(bound))
 
     def worst(self, of_joint: OfJoint, flags: FlagArray) -> Excess | None:
         """The worst of the steps that have the bit among these flags, (samples,); None if there is none."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
 from vsacli.base.flags import LIMITS, Flag
@@ -24,6 +24,13 @@ UNKNOWN = (math.nan, math.nan)
 """Of both motors, where a report was written before this was stated."""
 
 
+DETERMINED = 0.1
+"""Largest share of a variable's root mean square that its standard deviation may have."""
+
+JUDGED = "tau_motor"
+"""The variable that a run is for, unless others are asked for."""
+
+
 @dataclass(frozen=True)
 class Worst(Stored):
     """The worst step of a kind of trouble: when, what value, against which bound.
@@ -40,6 +47,60 @@ class Worst(Stored):
 
     key: ClassVar = "kind"
     shape: ClassVar = {**named("time", "value", "bound", "unit"), "motor?": "motor"}
+
+
+@dataclass(frozen=True)
+class Spread(Stored):
+    """How uncertain a variable of a joint is, away from the doubtful ends of the records.
+
+    Attributes:
+        name: of the variable.
+        rms: root mean square of its standard deviation; of the motor with the larger one, if it is one of
+            motors. NaN if the records do not determine it.
+        max: largest standard deviation.
+        share: of the root mean square of the variable itself that `rms` is; the larger one of both motors.
+        unit: of the deviations.
+    """
+
+    name: str
+    rms: float
+    max: float
+    share: float
+    unit: str
+
+    key: ClassVar = "name"
+    shape: ClassVar = named("rms", "max", "share", "unit")
+
+    @property
+    def determined(self) -> bool:
+        """Whether the records determine the variable to `DETERMINED`."""
+        return self.share <= DETERMINED
+
+
+@dataclass(frozen=True)
+class JointUncertainty(Stored):
+    """What recorded signals leave uncertain at a joint.
+
+    Attributes:
+        variables: how uncertain the motor torque is, and each variable that was asked for.
+        asked: names of those that were asked for, and so decide.
+        steps: how many of the steps that are infeasible, and singular, would be otherwise within twice the
+            standard deviation of the margin.
+        limits: for each limit that is exceeded by no more than the uncertainty and does not count as
+            exceeded there, the step at which it is exceeded most.
+    """
+
+    variables: dict[str, Spread] = field(default_factory=dict)
+    asked: tuple[str, ...] = (JUDGED,)
+    steps: dict[str, int] = field(default_factory=dict)
+    limits: dict[str, Worst] = field(default_factory=dict)
+
+    @property
+    def undetermined(self) -> tuple[Spread, ...]:
+        """What was asked for and is not determined."""
+        return tuple(
+            spread for name, spread in self.variables.items() if name in self.asked and not spread.determined
+        )
 
 
 @dataclass(frozen=True)
@@ -69,6 +130,7 @@ class JointReport(Stored):
         end_theta: motor positions at the last step of the trajectory; NaN if that was not computed.
         end_dtheta: motor velocities there.
         peak_dtheta: largest |dtheta| of motors 1 and 2, over the steps where it exists.
+        uncertainty: what recorded signals leave uncertain; None if nothing comes from fits of records.
     """
 
     name: str
@@ -92,6 +154,7 @@ class JointReport(Stored):
     end_theta: tuple[float, float] = UNKNOWN
     end_dtheta: tuple[float, float] = UNKNOWN
     peak_dtheta: tuple[float, float] = UNKNOWN
+    uncertainty: JointUncertainty | None = None
 
     shape: ClassVar = {
         **named("name", "type", "actuator", "steps", "first_time", "worst"),
@@ -101,7 +164,14 @@ class JointReport(Stored):
         "start": {"theta": "start_theta", "dtheta": "start_dtheta", "torque_step": "torque_step"},
         "end": {"theta": "end_theta", "dtheta": "end_dtheta"},
         **named("other_preload", "energy"),
+        "uncertainty?": "uncertainty",
     }
+
+    def shows(self, verdict: str) -> bool:
+        """Whether the joint is a reason for a verdict that is not ok."""
+        if verdict == "doubtful":
+            return self.uncertainty is not None and bool(self.uncertainty.undetermined)
+        return bool(self.steps.get(verdict))
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:

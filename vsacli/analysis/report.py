@@ -11,7 +11,7 @@ from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.tables import aligned
 
-VERDICTS = ("ok", "over_limit", "singular", "infeasible", "self_check_failed")
+VERDICTS = ("ok", "over_limit", "singular", "infeasible", "doubtful", "self_check_failed")
 """From best to worst; the worst that applies wins."""
 
 
@@ -56,10 +56,10 @@ class Report(Stored):
     @property
     def verdict(self) -> str:
         """The worst of `VERDICTS` that applies."""
-        applies = {kind for joint in self.joints for kind, count in joint.steps.items() if count}
         if not self.self_check.passed:
-            applies.add("self_check_failed")
-        return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
+            return VERDICTS[-1]
+        applies = (each for each in reversed(VERDICTS) if any(joint.shows(each) for joint in self.joints))
+        return next(applies, "ok")
 
     @property
     def deflections(self) -> str:
@@ -74,6 +74,7 @@ class Report(Stored):
                 *aligned(text.joint_rows(self.joints)),
                 *text.warnings_and_notes(self.warnings, self.notes),
                 *(sentence for joint in self.joints for sentence in text.sentences(joint)),
+                *text.uncertainty_lines(self.joints),
                 *text.stops(self.joints, self.drifts),
                 *text.start(self.joints),
                 *text.end(self.joints),

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.analysis.joint_report import JointDrift, JointReport, Worst
+from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointDrift, JointReport, Spread, Worst
 from vsacli.analysis.self_check import SelfCheck
 from vsacli.base.flags import Flag
 from vsacli.base.units import POSITION, TORQUE, VELOCITY, time_text
@@ -26,7 +26,7 @@ four digits or with noise of 1e-4 rad, left 1e-4."""
 ROUNDING_SHARE = 1e-9
 """Share of the largest velocity of any motor that may be nothing but rounding: that of a joint held still."""
 
-TROUBLE = ("infeasible", "singular", "over_limit")
+TROUBLE = ("doubtful", "infeasible", "singular", "over_limit")
 """Kinds that make the verdict worse than ok."""
 
 
@@ -46,7 +46,7 @@ def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
     """What was run at the left, the verdict in capitals at the right."""
     words = verdict.upper().replace("_", " ")
     if verdict in TROUBLE:
-        concerned = sum(1 for joint in joints if joint.steps.get(verdict))
+        concerned = sum(joint.shows(verdict) for joint in joints)
         words = f"{words} ({concerned} of {len(joints)} joints)"
     return f"{left:<{WIDTH - 32}} {words:>31}".rstrip()
 
@@ -171,14 +171,14 @@ def _not_finite(joint: JointReport, worst: Worst) -> str:
 
 
 def _limit(joint: JointReport, worst: Worst) -> str:
+    return f"{_excess(worst)} (first at {time_text(joint.first_time[worst.kind])})"
+
+
+def _excess(worst: Worst) -> str:
     whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     value, bound = _apart(worst.value, worst.bound)
     relation = "below" if worst.value < worst.bound else "above"
-    first = joint.first_time[worst.kind]
-    return (
-        f"{whose} is {value} {worst.unit} at t = {time_text(worst.time)}, {relation} its limit {bound} "
-        f"(first at {time_text(first)})"
-    )
+    return f"{whose} is {value} {worst.unit} at t = {time_text(worst.time)}, {relation} its limit {bound}"
 
 
 _SENTENCES = {
@@ -187,6 +187,36 @@ _SENTENCES = {
     "singular": _singular,
     "near_singular": _near_singular,
 }
+
+
+def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
+    """How uncertain the motor torques of recorded motions are, and what that means for the rest."""
+    found = [(joint, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
+    for joint, uncertainty in found:
+        yield from (f"{joint.name}: {_undetermined(spread)}" for spread in uncertainty.undetermined)
+        for kind, steps in uncertainty.steps.items():
+            if steps:
+                share = f"{steps} of {count(joint.steps[kind])}"
+                yield f"{joint.name}: {share} that are {kind} may be otherwise within their uncertainty"
+        for worst in uncertainty.limits.values():
+            yield f"{joint.name}: {_excess(worst)} by less than its uncertainty, and does not count"
+    torques = [(joint.name, each.variables[JUDGED]) for joint, each in found if JUDGED in each.variables]
+    if torques:
+        yield _by_joint("motor torque: ", [_spread(name, spread) for name, spread in torques])
+
+
+def _spread(name: str, spread: Spread) -> str:
+    if math.isnan(spread.rms):
+        return f"{name} not determined"
+    return f"{name} +- {spread.rms:.2g} {spread.unit} ({_percent(spread.share)})"
+
+
+def _undetermined(spread: Spread) -> str:
+    what = f"{spread.name} is not determined by the record"
+    if math.isnan(spread.rms):
+        return f"{what}, since a derivative that it depends on is not"
+    share, most = _percent(spread.share), _percent(DETERMINED)
+    return f"{what}: +- {spread.rms:.2g} {spread.unit} is {share} of its root mean square, more than {most}"
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
 from vsacli.analysis.summaries import DriftSummary, JointSummary
@@ -15,14 +16,16 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, has
 from vsacli.base.variables import Block
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import Engine, choose
 from vsacli.dynamics.energy import RunEnergy
 from vsacli.dynamics.inverse import InverseDynamics, check_fit, compute_block, usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from vsacli.analysis.joint_report import JointUncertainty
     from vsacli.analysis.result import Result
+    from vsacli.analysis.run_uncertainty import RunUncertainty
     from vsacli.dynamics.integrated_deflections import IntegratedDeflections
 
 DEFLECTIONS = ("root", "integrate")
@@ -42,6 +45,8 @@ class Run:
         block_samples: steps in a block, as `usual_block` has it if None; results do not depend on it.
         engine: what computes, one of `vsacli.compute.engine.NAMES`.
         threads: of compiled code; as many as there are processors if None.
+        asked: names of the variables that the run is for; if recorded signals leave them too uncertain, the
+            run is doubtful.
 
     Attributes:
         choice: the engine that was chosen, and why.
@@ -62,6 +67,7 @@ class Run:
         block_samples: int | None = None,
         engine: str = "numpy",
         threads: int | None = None,
+        asked: Collection[str] = (JUDGED,),
     ) -> None:
         check_near_singular(near_singular)
         check_fit(robot, trajectory)
@@ -77,6 +83,7 @@ class Run:
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
         self._energy = RunEnergy(robot)
+        self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
         self._spring_residual = 0.0
         self._samples = 0
 
@@ -93,7 +100,9 @@ class Run:
             yield self._added(block)
 
     def _added(self, block: Block) -> Block:
-        """The block with the energy that the motors have spent, once it is merged into the report."""
+        """The block with deviations and the energy that the motors have spent, merged into the report."""
+        if self._uncertainty is not None:
+            block = self._uncertainty.add(block)
         self._samples += len(block.time)
         self._spring_residual = float(np.maximum(self._spring_residual, spring_residual(self.robot, block)))
         for summary in self._summaries:
@@ -105,7 +114,7 @@ class Run:
     def report(self) -> Report:
         """The verdict on the blocks so far, with the self-check of the whole."""
         complete = self._samples == self.trajectory.samples
-        joints = zip(self._summaries, self._energy.report(), strict=True)
+        joints = zip(self._summaries, self._energy.report(), self._uncertainties(), strict=True)
         return Report(
             robot=self.robot.name,
             trajectory=self.trajectory.name,
@@ -115,10 +124,16 @@ class Run:
             warnings=(*self.robot.warnings, *self.trajectory.warnings),
             notes=self.trajectory.notes,
             self_check=self._self_check(),
-            joints=tuple(summary.report(energy, complete=complete) for summary, energy in joints),
+            joints=tuple(
+                summary.report(energy, uncertainty, complete=complete)
+                for summary, energy, uncertainty in joints
+            ),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,
         )
+
+    def _uncertainties(self) -> Sequence[JointUncertainty | None]:
+        return [None] * len(self._summaries) if self._uncertainty is None else self._uncertainty.report()
 
     def _self_check(self) -> SelfCheck:
         """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
@@ -176,6 +191,17 @@ def _integrated(
     from vsacli.dynamics.integrated_deflections import integrate_deflections
 
     return integrate_deflections(robot, trajectory)
+
+
+def _uncertainty(
+    robot: Robot, trajectory: Trajectory, asked: Collection[str], engine: Engine
+) -> RunUncertainty | None:
+    """What keeps account of it; None if nothing comes from fits of records."""
+    if not trajectory.estimates:
+        return None
+    from vsacli.analysis.run_uncertainty import RunUncertainty, judged_variables
+
+    return RunUncertainty(robot, trajectory, judged_variables(asked, robot), engine)
 
 
 def _drift_summaries(robot: Robot, deflections: IntegratedDeflections) -> list[DriftSummary]:

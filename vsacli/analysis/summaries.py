@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vsacli.actuators.reach import margin
-from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, Worst
+from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, JointUncertainty, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
 from vsacli.base.variables import MOTORS, VARIABLES, Block
@@ -70,11 +70,14 @@ class JointSummary:
             demand = block.tau_e[outside, index], stiffness[outside]
             self._other_preload = bool(self._joint.actuator.other_preload(*demand).all())
 
-    def report(self, energy: JointEnergy, *, complete: bool) -> JointReport:
-        """What was found so far, besides the energy; at least one block must have been added.
+    def report(
+        self, energy: JointEnergy, uncertainty: JointUncertainty | None = None, *, complete: bool
+    ) -> JointReport:
+        """What was found so far, besides what is given; at least one block must have been added.
 
         Args:
             energy: of the joint.
+            uncertainty: of the joint; None if no signal was recorded.
             complete: whether the last step that was added is that of the trajectory.
         """
         assert self._start is not None
@@ -103,6 +106,7 @@ class JointSummary:
             end_theta=end_theta,
             end_dtheta=end_dtheta,
             peak_dtheta=_pair(self._peaks[3:]),
+            uncertainty=uncertainty,
         )
 
     def _count(self, flags: FlagArray, time: FloatArray) -> None:

@@ -123,7 +123,34 @@ _COMPUTED = (
     ),
 )
 
-VARIABLES: dict[str, Variable] = {variable.name: variable for variable in (*_given(), *_COMPUTED)}
+
+UNCERTAIN = (
+    *(name for signal in (POSITION, *COMMANDED.values(), WRENCH) for name in signal.names),
+    *("tau_e", "dtau_e", "ddtau_e", "phi", "theta", "dtheta", "tau_motor"),
+)
+"""The variables that have a standard deviation if a signal was recorded."""
+
+
+def deviation(name: str) -> str:
+    """Name under which the standard deviation of a variable is stored."""
+    return f"{name}_std"
+
+
+def _deviations(declared: Iterable[Variable]) -> Iterator[Variable]:
+    for variable in declared:
+        if variable.name in UNCERTAIN:
+            words = variable.long_name.replace("commanded ", "")
+            source = "covariance of the fit" if variable.equation == "given" else "first order"
+            yield variable._replace(
+                name=deviation(variable.name),
+                long_name=f"standard deviation of the {words}",
+                equation=source,
+            )
+
+
+VARIABLES: dict[str, Variable] = {
+    variable.name: variable for variable in (*_given(), *_COMPUTED, *_deviations((*_given(), *_COMPUTED)))
+}
 """Every variable by name, `time` first."""
 
 
@@ -132,7 +159,8 @@ class Block:
 
     A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have
     is NaN throughout. What a block does not have is None: the wrench, (samples, 6), if the trajectory has
-    none, and `motor_energy`, which sums over the steps before, until the block has its place in a run.
+    none; until the block has its place in a run, `motor_energy`, which sums over the steps before, and the
+    standard deviations; those of what no recorded signal has a part in.
 
     Attributes:
         declared: the variables that it may have, by name.

@@ -109,6 +109,7 @@ def check_feasibility(
         deflections=deflections,
         engine=engine,
         threads=threads,
+        asked=("flags",),
     )
     if plot_folder is None:
         report = compute(run, talk)

@@ -31,7 +31,10 @@ class Exit(enum.IntEnum):
     OK = 0, "done; every step feasible, regular and within limits"
     BUG = 1, "a bug, or a result whose self-check failed (written, and its verdict says so)"
     USAGE = 2, "usage or input error: one line for each problem; nothing written"
-    VERDICT = 3, "done, but some steps are infeasible, singular or over a limit; the report says which"
+    VERDICT = (
+        3,
+        "done, but steps are infeasible, singular or over a limit, or a record is too uncertain",
+    )
     STORAGE = 4, "a file cannot be read or written (disk full, permission); the target is untouched"
     HUNG_UP = 129, "ended by SIGHUP, as when a terminal is closed; the target is untouched"
     INTERRUPTED = 130, "interrupted; the target is untouched"
@@ -50,6 +53,7 @@ EXIT_OF_VERDICT = {
     "over_limit": Exit.VERDICT,
     "singular": Exit.VERDICT,
     "infeasible": Exit.VERDICT,
+    "doubtful": Exit.VERDICT,
     "self_check_failed": Exit.BUG,
 }
 """Exit code of a run by the verdict of its report."""

@@ -78,6 +78,7 @@ def invdyn(
     """
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk)
+    from vsacli.analysis.joint_report import JUDGED
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs
     from vsacli.results.store.writer import ResultWriter
@@ -93,6 +94,7 @@ def invdyn(
             deflections=deflections,
             engine=engine,
             threads=threads,
+            asked=(JUDGED,) if variables is None else variables,
         )
         report = compute(run, talk, writer)
         if figures is not None:

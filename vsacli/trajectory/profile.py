@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import WRENCH_AXES, check_frame
+
+if TYPE_CHECKING:
+    from vsacli.trajectory.recorded.samples import SampledProfile
 
 
 class Profile(Protocol):
@@ -38,8 +41,9 @@ class Profile(Protocol):
     def stretched(self, factor: float) -> Profile:
         """The same profile, slower by a factor, from the same first time on."""
 
-    def summary(self) -> dict[str, Any] | None:
-        """The spline that values at the steps come from, in JSON values; None if they come from none."""
+    @property
+    def estimate(self) -> SampledProfile | None:
+        """The same if any number at the steps comes from a fit of recorded samples, else None."""
 
 
 @dataclass(frozen=True)

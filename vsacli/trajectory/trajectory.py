@@ -13,6 +13,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray, over_time
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_names
+from vsacli.base.variables import UNCERTAIN
 from vsacli.base.wrench import Wrench
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import Constant
@@ -22,6 +23,8 @@ from vsacli.trajectory.times import Times
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+    from vsacli.trajectory.recorded.samples import SampledProfile
 
 NARROWEST_PIECE = 1e-9
 """Share of the duration; pieces below arise where knots of two splines coincide but for rounding."""
@@ -88,22 +91,22 @@ class Trajectory:
     def _repr_html_(self) -> str:
         return f"<p>{escape(repr(self))}</p>"
 
-    def _profiles(self) -> Iterator[tuple[str, Profile]]:
-        yield POSITION.key, self.position
-        yield from self.commanded.items()
+    def _profiles(self) -> Iterator[tuple[Signal, Profile]]:
+        yield POSITION, self.position
+        yield from ((COMMANDED[key], profile) for key, profile in self.commanded.items())
         if self.wrench is not None:
-            yield WRENCH.key, self.wrench.profile
+            yield WRENCH, self.wrench.profile
 
     def _check(self) -> None:
         for key, profile in self.commanded.items():
             if self.joints != profile.components:
                 raise InputError.one(f"the position has {self.joints} joints, the {key} {profile.components}")
         rounding = np.spacing(max(map(abs, self.times.span)))
-        for part, profile in self._profiles():
+        for signal, profile in self._profiles():
             start, end = profile.breakpoints[[0, -1]]
             if start != 0 or abs(end - self.duration) > 2 * rounding:
                 raise InputError.one(
-                    f"the {part} spans {start:g} to {end:g} s, the steps 0 to {self.duration:g} s"
+                    f"the {signal.key} spans {start:g} to {end:g} s, the steps 0 to {self.duration:g} s"
                 )
 
     def _nothing(self, signal: Signal) -> Constant:
@@ -228,8 +231,23 @@ class Trajectory:
     @property
     def fits(self) -> tuple[dict[str, Any], ...]:
         """What is known of the splines that its steps come from, see `SampledProfile.summary`."""
-        summaries = (profile.summary() for _, profile in self._profiles())
-        return tuple(summary for summary in summaries if summary is not None)
+        return tuple(estimate.summary() for estimate in self.estimates.values())
+
+    @property
+    def estimates(self) -> dict[Signal, SampledProfile]:
+        """The signals of which any number at the steps comes from a fit of recorded samples."""
+        found = ((signal, profile.estimate) for signal, profile in self._profiles())
+        return {signal: estimate for signal, estimate in found if estimate is not None}
+
+    @property
+    def uncertain(self) -> tuple[str, ...]:
+        """The variables of a run along it that have a standard deviation.
+
+        Those that come from fits of recorded samples, and all that is computed, if there are any.
+        """
+        estimated = {name for estimate in self.estimates.values() for name in estimate.estimated}
+        given = {name for signal, _ in self._profiles() for name in signal.names}
+        return tuple(name for name in UNCERTAIN if estimated and (name in estimated or name not in given))
 
     def stretched(self, factor: float) -> Trajectory:
         """All profiles slower by a factor; steps at a uniform rate keep their rate."""

@@ -110,6 +110,7 @@ MARKER_STAGGER = 0.37
 
 # Opaque and edged: bands do not darken where they meet, and a single step stays visible.
 _INFEASIBLE_BAND = {"facecolor": "0.8", "edgecolor": "0.8", "linewidth": 1.5, "zorder": 0.5}
+_SPREAD: dict[str, Any] = {"alpha": 0.3, "linewidth": 0}
 _SINGULAR_BAND = {"facecolor": "none", "edgecolor": "0.45", "linewidth": 0.8, "hatch": "////", "zorder": 0.6}
 
 
@@ -135,6 +136,24 @@ def _marker_points(time: FloatArray, shift: float) -> list[int]:
     """Points next to `MARKERS_PER_CURVE` equidistant times."""
     wanted = time[0] + (np.arange(MARKERS_PER_CURVE) + shift) / MARKERS_PER_CURVE * (time[-1] - time[0])
     return [int(point) for point in np.unique(np.searchsorted(time, wanted))]
+
+
+def draw_uncertainty(
+    axes: Axes, time: FloatArray, values: FloatArray, deviations: FloatArray, style: LineStyle
+) -> list[Artist]:
+    """A band of two standard deviations to both sides of a curve that is drawn already.
+
+    The axes keep their range, as at the ends of a record deviations may be hundreds of times those inside.
+
+    Returns:
+        What a legend shows for it; nothing if there is no deviation.
+    """
+    if np.all(np.isnan(deviations)):
+        return []
+    shown = axes.get_ylim()
+    axes.fill_between(time, values - 2 * deviations, values + 2 * deviations, color=style.color, **_SPREAD)
+    axes.set_ylim(shown)
+    return [Patch(facecolor="0.5", **_SPREAD, label="two standard deviations")]
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:

@@ -17,9 +17,16 @@ from matplotlib.gridspec import SubplotSpec
 from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.units import TIME, TORQUE
-from vsacli.base.variables import MOTORS
+from vsacli.base.variables import MOTORS, deviation
 from vsacli.results.plots.curves import Failures, read_curves
-from vsacli.results.plots.drawing import draw_bands, draw_curve, line_handle, line_style, shortened
+from vsacli.results.plots.drawing import (
+    draw_bands,
+    draw_curve,
+    draw_uncertainty,
+    line_handle,
+    line_style,
+    shortened,
+)
 from vsacli.results.store.reader import StoredResult
 
 PANEL_WIDTH = 3.0
@@ -144,13 +151,20 @@ def draw_groups(
     there = np.array(existing(result.declared[name], result.actuators))
     drawn = np.flatnonzero(there.any(axis=0)).tolist()
     groups = [group for group in panel_groups(result.joint_types) if there[group].any()]
-    joints = read_curves(result, [name])
+    uncertain = deviation(name) in result.variables
+    joints = read_curves(result, [name, deviation(name)] if uncertain else [name])
     panels = place.subgridspec(len(groups), len(drawn)).subplots(squeeze=False)
     handles = [line_handle(line_style(joint), name) for joint, name in enumerate(result.joint_names)]
     for group, row in zip(groups, panels, strict=True):
         for curve, axes in zip(drawn, row, strict=True):
-            for joint in [joint for joint in group if there[joint, curve]]:
+            present = [joint for joint in group if there[joint, curve]]
+            for joint in present:
                 draw_curve(axes, joints[joint].time, joints[joint].values[curve], joint, line_style(joint))
+            for joint in present if uncertain else ():
+                curves, deviations = np.split(joints[joint].values, 2)
+                handles += draw_uncertainty(
+                    axes, joints[joint].time, curves[curve], deviations[curve], line_style(joint)
+                )
             handles += draw_bands(axes, failures.time, *failures.among(group))
             axes.set_ylabel(labels[curve](result.joint_types[group[0]]))
     share_time(panels, np.array([there[group][:, drawn].any(axis=0) for group in groups]), failures.time)

@@ -17,7 +17,7 @@ from vsacli.base.atomic_files import check_free_space, reporting_storage_errors,
 from vsacli.base.errors import InputError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
-from vsacli.base.variables import VARIABLES, Variable, select_variables
+from vsacli.base.variables import UNCERTAIN, VARIABLES, Variable, deviation, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes
 from vsacli.results.store.schema import FORMAT, TEXT, storable
@@ -177,14 +177,25 @@ class ResultWriter:
     @staticmethod
     def _selected(names: Iterable[str] | None, trajectory: Trajectory) -> tuple[Variable, ...]:
         """The variables of these names, or all that a run along the trajectory has."""
-        absent = WRENCH_NAMES if trajectory.wrench is None else ()
+        absent = _absent(trajectory)
         if names is None:
             return select_variables(name for name in VARIABLES if name not in absent)
         selected = select_variables(names)
         for variable in selected:
             if variable.name in absent:
-                raise InputError.one(f"there is no {variable.name}: the trajectory has no wrench")
+                raise InputError.one(f"there is no {variable.name}: {absent[variable.name]}")
         return selected
+
+
+def _absent(trajectory: Trajectory) -> dict[str, str]:
+    """The variables that a run along a trajectory does not have, each with the reason."""
+    uncertain = trajectory.uncertain
+    certain = [name for name in UNCERTAIN if name not in uncertain]
+    reasons = {deviation(name): f"{name} does not come from a fit of recorded samples" for name in certain}
+    if trajectory.wrench is not None:
+        return reasons
+    wrench = (*WRENCH_NAMES, *map(deviation, WRENCH_NAMES))
+    return reasons | dict.fromkeys(wrench, "the trajectory has no wrench")
 
 
 class Sink(io.RawIOBase):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -64,8 +64,9 @@ class ClosedForm(ABC):
         """The same at the steps start..stop-1, whose times are `time`."""
         return self.at(time)
 
-    def summary(self) -> dict[str, Any] | None:
-        """None: no value comes from a spline through samples."""
+    @property
+    def estimate(self) -> None:
+        """None: no value comes from a fit of samples."""
         return None
 
     def stretched(self, factor: float) -> Self:

@@ -152,9 +152,14 @@ class SampledProfile:
         """Whether any number at the steps comes from the fit."""
         return self.resampled or not self.record.complete
 
-    def summary(self) -> dict[str, Any] | None:
-        """The fit in JSON values, for the report: see `describe`; None if nothing comes from it."""
-        return describe(self.record.signal.names[0], self.record.labels, self.fit) if self.fitted else None
+    @property
+    def estimate(self) -> SampledProfile | None:
+        """The profile itself if any number at the steps comes from the fit, else None."""
+        return self if self.fitted else None
+
+    def summary(self) -> dict[str, Any]:
+        """The fit in JSON values, for the report: see `describe`."""
+        return describe(self.record.signal.names[0], self.record.labels, self.fit)
 
     @property
     def breakpoints(self) -> FloatArray:
@@ -181,6 +186,23 @@ class SampledProfile:
     def at(self, time: FloatArray) -> FloatArray:
         """The fit and its derivatives at any times of the span, shape (orders, components, samples)."""
         return self.fit.at(time, self.record.signal.orders)
+
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Names of value and derivatives that come, at the steps, from the fit."""
+        value, *derivatives = self.signal.names
+        return value, *(derivatives if self.resampled else self.record.missing)
+
+    def covariance(self, time: FloatArray) -> FloatArray:
+        """Of value and derivatives at any times of the span, (components, orders, orders, samples).
+
+        Zero for what is given; NaN for components of which the record does not determine enough to say.
+        """
+        found = self.fit.covariance(time)
+        given = [name not in self.estimated for name in self.signal.names]
+        found[:, given] = 0
+        found[:, :, given] = 0
+        return found
 
     def stretched(self, factor: float) -> SampledProfile:
         """The same profile, slower by a factor; the warnings are those about the record."""

@@ -1,0 +1,213 @@
+"""What a run says of recorded signals: deviations, limits that may be kept, what is not determined."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from samples.blurred import Blurred
+from samples.robots import vsa_3r
+
+from vsacli import inverse_dynamics
+from vsacli.actuators.limit_check import LimitCheck
+from vsacli.analysis.joint_report import JointUncertainty, Spread
+from vsacli.analysis.report import VERDICTS, Report
+from vsacli.analysis.run import Run
+from vsacli.analysis.run_uncertainty import judged_variables
+from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.base.variables import deviation
+from vsacli.robot.joint import Limits
+from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves.sinusoids import Sinusoids
+from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+SPAN = (0.0, 2.0)
+AMPLITUDE = 0.3
+
+
+def swinging(deviations, *, stiffness=1500.0, doubtful=(0.0, 0.0), known=True):
+    """Three joints that swing by `AMPLITUDE`; deviations of q to d4q, each joint's alike."""
+    sines = Sinusoids(
+        signal=POSITION,
+        span=SPAN,
+        cycles=2.0,
+        offset=(0.0,) * 3,
+        sine=((AMPLITUDE,) * 3,),
+        cosine=((0.0,) * 3,),
+    )
+    covariances = np.repeat(np.diag(np.square(deviations, dtype=float))[None], 3, axis=0)
+    if not known:
+        covariances[2] = np.nan
+    firm = Constant(signal=STIFFNESS, span=SPAN, value=(stiffness,) * 3)
+    position = Blurred(sines, covariances, doubtful=doubtful)
+    return Trajectory(UniformTimes(SPAN[1], 500.0), position, {"stiffness": firm}, name="swing")
+
+
+def limited(**limits):
+    """The 3R arm, whose base has limits, each of the size of a quantity."""
+    base, *others = vsa_3r().joints
+    ranges = Limits(**{name: (-size, size) for name, size in limits.items()})
+    return dataclasses.replace(vsa_3r(), joints=(dataclasses.replace(base, limits=ranges), *others))
+
+
+STEADY = (1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+SHAKY = (1e-5, 1e-4, 1e-3, 1e-2, 1e5)
+
+
+def test_deviations_are_variables_of_the_result():
+    result = inverse_dynamics(vsa_3r(), swinging(STEADY))
+    np.testing.assert_allclose(result.d4q_std, 0.1, rtol=1e-12)
+    assert result.tau_motor_std.shape == result.tau_motor.shape
+    assert (result.tau_motor_std > 0).all()
+    assert result.stiffness_std is None
+    assert result.report.verdict == "ok"
+    exact = swinging(STEADY)
+    exact = Trajectory(exact.times, exact.position.exact, exact.commanded, name="swing")
+    plain = inverse_dynamics(vsa_3r(), exact)
+    assert not any(name.endswith("_std") for name in plain.arrays())
+    assert all("uncertainty" not in joint for joint in plain.report.as_json()["joints"])
+    for name, array in plain.arrays().items():
+        np.testing.assert_array_equal(array, getattr(result, name))
+
+
+def test_results_do_not_depend_on_the_size_of_blocks():
+    whole, parts = (
+        Run(limited(position=0.2999), swinging(STEADY), block_samples=samples) for samples in (2000, 77)
+    )
+    arrays = [[block.arrays() for block in run] for run in (whole, parts)]
+    for name, array in arrays[0][0].items():
+        np.testing.assert_array_equal(array, np.concatenate([block[name] for block in arrays[1]]))
+    expected, found = (run.report().as_json()["joints"] for run in (whole, parts))
+    for one, other in zip(expected, found, strict=True):
+        assert one["uncertainty"]["limits"] == other["uncertainty"]["limits"]
+        for name, spread in one["uncertainty"]["variables"].items():
+            assert other["uncertainty"]["variables"][name] == pytest.approx(spread)
+
+
+@pytest.mark.parametrize(
+    ("limit", "deviation", "exceeded"),
+    [
+        (0.2998, 1.1e-4, False),  # 2e-4 beyond, 2.2e-4 allowed
+        (0.2998, 0.9e-4, True),
+        (0.2990, 0.1, False),  # 1e-3 beyond; 1 % of the range of 0.598 is allowed
+        (0.2930, 0.1, True),  # 7e-3 beyond, 5.86e-3 allowed
+        (0.3001, 0.1, False),
+    ],
+)
+def test_limits_of_recorded_motions_count_beyond_two_deviations_but_one_percent(limit, deviation, exceeded):
+    result = inverse_dynamics(limited(position=limit), swinging((deviation, *STEADY[1:])))
+    joint = result.report.joints[0]
+    assert bool(joint.steps["over_limit"]) == exceeded
+    assert has(result.flags[:, 0], LIMITS).any() == exceeded
+    within = joint.uncertainty.limits
+    assert ("position_limit" in within) == (limit < AMPLITUDE)
+    if not exceeded and within:
+        line = next(line for line in str(result.report).splitlines() if "does not count" in line)
+        assert line.startswith("base: position is ")
+        assert f"its limit {limit:g}" in line.replace("-", "")
+
+
+def test_what_lies_beyond_the_allowance_stays_flagged_and_what_does_not_is_named():
+    result = inverse_dynamics(limited(position=0.2998), swinging((9e-5, *STEADY[1:])))
+    flagged = has(result.flags[:, 0], Flag.POSITION_LIMIT)
+    beyond = np.abs(result.q[:, 0]) - 0.2998
+    np.testing.assert_array_equal(flagged, beyond > 1.8e-4 + 0.2998e-9)
+    named = result.report.joints[0].uncertainty.limits["position_limit"]
+    assert abs(named.value) - 0.2998 == pytest.approx(beyond[beyond <= 1.8e-4].max())
+
+
+def test_the_allowance_of_a_one_sided_limit_is_a_share_of_the_bound():
+    check = LimitCheck(Flag.STIFFNESS_LIMIT, "stiffness", None, (-math.inf, 2000.0))
+    allowed = check.allowance({"stiffness_std": np.array([1.0, 1e3, np.nan])})
+    np.testing.assert_array_equal(allowed, [2.0, 20.0, 0.0])
+    assert check.allowance({}) == 0
+
+
+def test_torques_that_are_not_determined_make_a_run_doubtful():
+    report = inverse_dynamics(vsa_3r(), swinging(SHAKY)).report
+    assert report.verdict == "doubtful"
+    text = str(report).splitlines()
+    assert text[0].endswith("DOUBTFUL (3 of 3 joints)")
+    assert any(
+        line.startswith("elbow: tau_motor is not determined by the record: +- ")
+        and line.endswith("% of its root mean square, more than 10.00 %")
+        for line in text
+    )
+    spread = report.joints[0].uncertainty.variables["tau_motor"]
+    assert spread.share > 0.1
+    assert Report.from_json(json.loads(json.dumps(report.as_json()))) == report
+
+
+def test_it_is_what_was_asked_for_that_must_be_determined():
+    def verdict(*asked):
+        run = Run(vsa_3r(), swinging(SHAKY), asked=asked)
+        assert sum(len(block.time) for block in run) == 1001
+        return run.report().verdict
+
+    assert verdict("tau_motor") == "doubtful"
+    assert verdict("ddtheta") == "doubtful"  # has no deviation of its own
+    assert verdict("d4q_std") == "doubtful"
+    assert verdict("q", "tau_e") == "ok"
+    assert verdict("flags", "stiffness") == "ok"
+    assert judged_variables(["flags"], limited(velocity=2.0)) == ("dq", "tau_e")
+    assert judged_variables(["motor_energy", "q", "time"], vsa_3r()) == ("q", "tau_motor")
+
+
+def test_a_component_that_is_not_determined_makes_doubtful_what_depends_on_it():
+    report = inverse_dynamics(vsa_3r(), swinging(STEADY, known=False)).report
+    assert report.verdict == "doubtful"
+    assert str(report).count("is not determined by the record, since a derivative") == 3
+    assert report.as_json()["joints"][0]["uncertainty"]["variables"]["tau_motor"]["rms"] is None
+    run = Run(vsa_3r(), swinging(STEADY, known=False), asked=["q"])
+    assert list(run)
+    assert [bool(joint.uncertainty.undetermined) for joint in run.report().joints] == [False, False, True]
+
+
+def test_the_doubtful_ends_of_a_record_do_not_count():
+    @dataclasses.dataclass(frozen=True)
+    class Frayed(Blurred):
+        def covariance(self, time):
+            found = super().covariance(time)
+            found[..., (time < 0.2) | (time > 1.9)] *= 1e14
+            return found
+
+    steady = swinging(STEADY).position
+    position = Frayed(steady.exact, steady.covariances, doubtful=(0.21, 0.11))
+    ends = Trajectory(UniformTimes(SPAN[1], 500.0), position, swinging(STEADY).commanded, name="frayed")
+    assert inverse_dynamics(vsa_3r(), ends).report.verdict == "ok"
+    shorter = dataclasses.replace(position, doubtful=(0.19, 0.11))
+    cut = Trajectory(ends.times, shorter, ends.commanded, name="frayed")
+    assert inverse_dynamics(vsa_3r(), cut).report.verdict == "doubtful"
+    # where they overlap, the half in the middle counts
+    few = dataclasses.replace(position, doubtful=(1.5, 1.5))
+    half = Trajectory(ends.times, few, ends.commanded, name="frayed")
+    assert inverse_dynamics(vsa_3r(), half).report.verdict == "ok"
+
+
+def test_infeasible_steps_within_the_uncertainty_are_counted_and_stay_infeasible():
+    soft = swinging((1e-4, 1e-3, 1.0, 0.1, 1.0), stiffness=802.0)
+    result = inverse_dynamics(vsa_3r(), soft)
+    base = result.report.joints[0]
+    within, all_of_them = base.uncertainty.steps["infeasible"], base.steps["infeasible"]
+    assert 0 < within < all_of_them
+    assert f"base: {within} of {all_of_them} steps that are infeasible" in str(result.report)
+    surer = inverse_dynamics(vsa_3r(), swinging(STEADY, stiffness=802.0)).report.joints[0]
+    assert surer.steps["infeasible"] == all_of_them
+    assert surer.uncertainty.steps["infeasible"] < within
+
+
+def test_doubtful_is_worse_than_infeasible():
+    assert VERDICTS.index("infeasible") < VERDICTS.index("doubtful") < VERDICTS.index("self_check_failed")
+    both = inverse_dynamics(vsa_3r(), swinging(SHAKY, stiffness=802.0)).report
+    assert both.joints[0].steps["infeasible"]
+    assert both.verdict == "doubtful"
+
+
+def test_a_spread_that_is_not_a_number_determines_nothing():
+    assert not Spread("tau_motor", math.nan, math.nan, math.nan, "N m").determined
+    assert Spread("tau_motor", 0.0, 0.0, 0.0, "N m").determined
+    assert JointUncertainty().undetermined == ()
+    assert deviation("d4q") == "d4q_std"

@@ -1,0 +1,162 @@
+"""What recorded signals leave uncertain in a run: deviations, limits judged by them, shares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from vsacli.actuators.limit_check import ALLOWED_DEVIATIONS
+from vsacli.actuators.reach import margin
+from vsacli.analysis.joint_report import JUDGED, JointUncertainty, Spread, Worst
+from vsacli.base.arrays import AnyArray, FloatArray
+from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.variables import UNCERTAIN, VARIABLES, Block, deviation
+from vsacli.compute.engine import NUMPY, Engine
+from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.uncertainty import MARGIN, Uncertainty
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+SMALLEST_SHARE = 0.01
+"""Of the largest torque of any joint against which smaller ones are measured: what a joint at rest carries
+may be nothing but noise."""
+
+WITHIN = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR}
+"""Kinds of steps of which those within the uncertainty are counted."""
+
+
+def judged_variables(names: Iterable[str], robot: Robot) -> tuple[str, ...]:
+    """The variables whose uncertainty decides whether what was asked for is determined.
+
+    Whether steps can be done, `flags`, depends on elastic torques, and on what the limits of the robot bound.
+    What has no deviation of its own is judged by the motor torques, which depend on everything.
+
+    Args:
+        names: of the variables that were asked for.
+        robot: whose limits count.
+    """
+    judged: set[str] = set()
+    for name in (name.removesuffix(deviation("")) for name in names):
+        if name == "flags":
+            bounded = {check.variable for joint in robot.joints for check in limit_checks(joint)}
+            judged |= {"tau_e", *bounded}
+        elif "joint" in VARIABLES[name].dims:
+            judged.add(name if name in UNCERTAIN else JUDGED)
+    return tuple(name for name in UNCERTAIN if name in judged)
+
+
+class RunUncertainty:
+    """Deviations of a run along recorded signals; `add` blocks in order, then ask for the `report`."""
+
+    def __init__(
+        self, robot: Robot, trajectory: Trajectory, asked: Sequence[str], engine: Engine = NUMPY
+    ) -> None:
+        """Begin.
+
+        Args:
+            robot: the robot.
+            trajectory: along which at least one signal was recorded and fitted.
+            asked: the variables that decide, see `judged_variables`.
+            engine: what computes.
+        """
+        self._robot, self._trajectory, self._asked, self._engine = robot, trajectory, asked, engine
+        first, last = trajectory.times.span
+        ends = [estimate.fit.doubtful for estimate in trajectory.estimates.values()]
+        start, end = np.minimum(np.max(ends, axis=0), (last - first) / 4).tolist()
+        self._inside = first + start, last - end
+        self._shown = {JUDGED, *asked}
+        self._powers: dict[str, _Powers] = {}
+        self._steps = [dict.fromkeys(WITHIN, 0) for _ in robot.joints]
+        self._limits: list[dict[str, tuple[float, Worst]]] = [{} for _ in robot.joints]
+
+    @cached_property
+    def _deviations(self) -> Uncertainty:
+        return Uncertainty(self._robot, self._trajectory, self._engine)
+
+    def add(self, block: Block) -> Block:
+        """The block with its deviations, and without limits that may be kept; merged into the report."""
+        deviations = self._deviations.at(block.time)
+        self._count_steps(block, deviations.pop(MARGIN))
+        inside = (block.time >= self._inside[0]) & (block.time <= self._inside[1])
+        for name, array in deviations.items():
+            values = getattr(block, name)
+            array[np.isnan(values)] = np.nan
+            if name in self._shown:
+                powers = self._powers.setdefault(name, _Powers(values.shape[1:]))
+                powers.add(values[inside], array[inside])
+        stored = {deviation(name): array for name, array in deviations.items()}
+        block = Block(**{**block.arrays(), **stored, "flags": block.flags.copy()})
+        for index in range(len(self._robot.joints)):
+            self._judge_limits(block, index)
+        return block
+
+    def _count_steps(self, block: Block, deviations: FloatArray) -> None:
+        """Those that a change of the margin by its uncertainty would make feasible, or regular."""
+        gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+        near = np.abs(gap) <= ALLOWED_DEVIATIONS * deviations
+        for kind, bit in WITHIN.items():
+            for steps, found in zip(self._steps, (has(block.flags, bit) & near).T, strict=True):
+                steps[kind] += int(np.count_nonzero(found))
+
+    def _judge_limits(self, block: Block, index: int) -> None:
+        """Take the bits of limits away where the excess is within the uncertainty."""
+        joint, values = self._robot.joints[index], block.of_joint(index)
+        exceeded = np.zeros_like(block.flags[:, index])
+        for check in limit_checks(joint):
+            seeming, known = check.flags(values), check.flags(values, check.allowance(values))
+            exceeded |= known
+            excess = check.worst(values, seeming & ~known)
+            kept, label = self._limits[index], check.flag.label
+            if excess is not None and (label not in kept or excess.size > kept[label][0]):
+                time, unit = float(block.time[excess.step]), check.unit(joint.type)
+                kept[label] = excess.size, Worst(label, time, excess.value, excess.bound, unit, check.motor)
+        block.flags[:, index] = (block.flags[:, index] & ~np.uint16(LIMITS)) | exceeded
+
+    def report(self) -> list[JointUncertainty]:
+        """What was found so far, of each joint."""
+        types = np.array(self._robot.joint_types)
+        spreads = [spread for name, powers in self._powers.items() for spread in powers.spreads(name, types)]
+        return [
+            JointUncertainty(
+                variables={each.name: each for at, each in spreads if at == index},
+                asked=tuple(self._asked),
+                steps=dict(self._steps[index]),
+                limits={label: worst for label, (_, worst) in self._limits[index].items()},
+            )
+            for index in range(len(types))
+        ]
+
+
+class _Powers:
+    """Sums over steps of the squares of a variable and of its deviation, (joints[, 2])."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._count, self._values, self._deviations = np.zeros((3, *shape))
+        self._largest = np.zeros(shape)
+
+    def add(self, values: FloatArray, deviations: FloatArray) -> None:
+        """Merge steps, (samples, joints[, 2]); those without a value do not count."""
+        exists = np.isfinite(values)
+        self._count += np.sum(exists, axis=0)
+        self._values += np.sum(values**2, axis=0, where=exists)
+        self._deviations += np.sum(deviations**2, axis=0, where=exists)
+        self._largest = np.maximum(self._largest, np.max(deviations, axis=0, where=exists, initial=0.0))
+
+    def spreads(self, name: str, types: AnyArray) -> Iterator[tuple[int, Spread]]:
+        """With the indices of the joints that have the variable; types of joints are (joints,)."""
+        with np.errstate(invalid="ignore"):
+            size, rms = np.sqrt([self._values / self._count, self._deviations / self._count])
+        for index, joint_type in enumerate(types):
+            if not np.any(self._count[index]):
+                continue
+            least = SMALLEST_SHARE * np.nanmax(size[types == joint_type])
+            scale = np.maximum(size[index], least)
+            share = np.divide(rms[index], scale, out=np.zeros_like(scale), where=rms[index] != 0)
+            unit = VARIABLES[name].quantity.unit(joint_type)
+            rms_of_worst, largest, worst_share = (
+                float(np.max(each, where=self._count[index] > 0, initial=0.0))
+                for each in (rms[index], self._largest[index], share)
+            )
+            yield index, Spread(name, rms_of_worst, largest, worst_share, unit)

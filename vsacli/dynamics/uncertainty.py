@@ -1,0 +1,176 @@
+"""How uncertain everything is that follows from recorded signals: propagation to first order.
+
+Covariances C of recorded signals give what is computed from them the variance g C g', with g its gradient by
+the signals (JCGM 100:2008, Guide to the expression of uncertainty in measurement, equation (13)). Derivatives
+of one component are correlated, components are independent of each other. Gradients are differences over one
+standard deviation to both sides, all of them one batch of samples for the kernel that computes the motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.reach import margin
+from vsacli.base.arrays import AnyArray, FloatArray
+from vsacli.base.signals import orders_of_derivation
+from vsacli.base.variables import UNCERTAIN, Block
+from vsacli.base.wrench import WRENCH_NAMES, Wrench
+from vsacli.compute.engine import NUMPY, Engine
+from vsacli.dynamics.inverse import COMPUTED, compute_block, usual_block
+from vsacli.robot.model import Robot
+from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Trajectory
+
+MARGIN = "margin"
+"""Of the stiffness to the nearer end of its corridor: has a deviation, too, but is no variable of results."""
+
+PROBES_OF_A_KNOT, FEWEST_PROBES, MOST_PROBES = 4, 2048, 32768
+"""Times at which deviations are computed; each costs some thirty steps of a run with three joints, and
+seventy with seven. Between knots of the fits they change as slowly as the motion does."""
+
+
+class Uncertainty:
+    """Standard deviations of what recorded signals have a part in: computed at some times, linear in between.
+
+    Times at which a value does not exist, as the step is infeasible or singular, play no part. The deviation
+    is NaN where the value depends on components of which the record does not say enough, or does not exist
+    one deviation away to either side.
+    """
+
+    def __init__(self, robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> None:
+        """Compute them.
+
+        Args:
+            robot: the robot.
+            trajectory: for this robot, with estimated signals.
+            engine: what computes.
+        """
+        fits = [estimate.fit for estimate in trajectory.estimates.values()]
+        knots = [len(part.knots) for fit in fits for part in fit.parts if not part.exact]
+        wanted = max(FEWEST_PROBES, PROBES_OF_A_KNOT * max(knots, default=0))
+        count = max(2, min(wanted, MOST_PROBES, trajectory.samples))
+        self._start = trajectory.start
+        self._elapsed = np.linspace(0.0, trajectory.duration, count)
+        components = sum(fit.components for fit in fits)
+        # each component has at most five orders, each shifted to both sides
+        batch = max(1, usual_block(len(robot.joints)) // (10 * components))
+        parts = [
+            _deviations(robot, trajectory, self._elapsed[start : start + batch], engine)
+            for start in range(0, count, batch)
+        ]
+        self._known = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def at(self, time: FloatArray) -> dict[str, FloatArray]:
+        """By the names of the variables, and of `MARGIN`, at any times: each (samples, joints[, 2])."""
+        return {name: self._between(known, time) for name, known in self._known.items()}
+
+    def _between(self, known: FloatArray, time: FloatArray) -> FloatArray:
+        found = np.full((known[0].size, len(time)), np.nan)
+        for row, column in zip(found, known.reshape(len(known), -1).T, strict=True):
+            exists = ~np.isnan(column)
+            if exists.any():
+                row[:] = np.interp(time - self._start, self._elapsed[exists], column[exists])
+        found[np.isinf(found)] = np.nan
+        return np.moveaxis(found.reshape(*known.shape[1:], len(time)), -1, 0)
+
+
+class _Shift(NamedTuple):
+    """A change of one function of one component by its standard deviation, (times,)."""
+
+    name: str
+    component: int
+    size: FloatArray
+
+
+def _deviations(
+    robot: Robot, trajectory: Trajectory, elapsed: FloatArray, engine: Engine
+) -> dict[str, FloatArray]:
+    """By name, (times, ...): NaN where there is no value, infinite where nothing can be said of it."""
+    motion = trajectory.at(trajectory.start + elapsed)
+    estimates = trajectory.estimates
+    covariances = {signal: estimate.covariance(elapsed) for signal, estimate in estimates.items()}
+    spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
+    shifts = [
+        _Shift(name, component, row)
+        for signal, spread in spreads.items()
+        for component, rows in enumerate(spread)
+        for name, row in zip(signal.names, rows, strict=True)
+    ]
+    values, gradients = _values_and_gradients(robot, motion, shifts, engine)
+    found = {}
+    for name, value in values.items():
+        variance, first = np.zeros_like(value), 0
+        for signal, covariance in covariances.items():
+            gradient = gradients[name][first : first + len(covariance) * signal.orders]
+            variance += _variance(gradient, _correlations(covariance, spreads[signal]))
+            first += len(gradient)
+        spread = np.sqrt(np.maximum(variance, 0))  # below zero by rounding only
+        found[name] = np.where(np.isnan(value), np.nan, np.nan_to_num(spread, nan=np.inf, posinf=np.inf))
+    for signal, spread in spreads.items():
+        for name, rows in zip(signal.names, np.moveaxis(spread, 1, 0), strict=True):
+            if name in estimates[signal].estimated:
+                found[name] = rows.T
+    return found
+
+
+def _spreads(covariance: FloatArray) -> FloatArray:
+    """Standard deviations, (components, orders, times)."""
+    return np.sqrt(np.moveaxis(np.diagonal(covariance, axis1=1, axis2=2), -1, 1))
+
+
+def _correlations(covariance: FloatArray, spread: FloatArray) -> FloatArray:
+    """Zero of what is given, or not known: gradients by the latter are NaN as far as they count."""
+    product = spread[:, :, None] * spread[:, None]
+    return np.divide(covariance, product, out=np.zeros_like(covariance), where=product > 0)
+
+
+def _values_and_gradients(
+    robot: Robot, motion: Motion, shifts: Sequence[_Shift], engine: Engine
+) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Variables by name, (times, joints[, 2]), and their changes by the shifts, (shifts, times, ...)."""
+    shifted = compute_block(robot, _shifted(motion, shifts), engine=engine)
+    values, gradients = {}, {}
+    for name, array in _uncertain(shifted).items():
+        every = array.reshape(1 + 2 * len(shifts), len(motion.time), *array.shape[1:])
+        values[name], ahead, behind = every[0], every[1::2], every[2::2]
+        one_sided = np.where(np.isnan(ahead), every[0] - behind, ahead - every[0])
+        both = (ahead - behind) / 2
+        gradients[name] = np.where(np.isnan(both), one_sided, both)
+    return values, gradients
+
+
+def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
+    """The motion, then for each shift the motion with it added, and with it subtracted, in a row."""
+    given = motion.variables()
+    times = given.pop("time")
+    copies = {name: np.repeat(array[None], 1 + 2 * len(shifts), axis=0) for name, array in given.items()}
+    for place, shift in enumerate(shifts):
+        copies[shift.name][1 + 2 * place, :, shift.component] += shift.size
+        copies[shift.name][2 + 2 * place, :, shift.component] -= shift.size
+    rows = {name: array.reshape(-1, array.shape[-1]) for name, array in copies.items()}
+    wrench = motion.wrench
+    if wrench is not None:
+        wrench = Wrench(*(rows[name] for name in WRENCH_NAMES), frame=wrench.frame)
+    return Motion.of(np.tile(times, 1 + 2 * len(shifts)), rows, wrench)
+
+
+def _uncertain(block: Block) -> dict[str, AnyArray]:
+    """What of a block follows from signals."""
+    given = orders_of_derivation()
+    computed = {name: getattr(block, name) for name in COMPUTED if name in UNCERTAIN and name not in given}
+    return {**computed, MARGIN: margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)}
+
+
+def _variance(gradient: FloatArray, correlation: FloatArray) -> FloatArray:
+    """Of variables that depend on one signal, (times, joints[, 2]).
+
+    Args:
+        gradient: changes by one deviation of each component and order, (components * orders, times, ...).
+        correlation: of the orders of each component, (components, orders, orders, times).
+    """
+    components, orders = correlation.shape[:2]
+    by_order = gradient.reshape(components, orders, *gradient.shape[1:])
+    return np.asarray(np.einsum("cmt...,cmnt,cnt...->t...", by_order, correlation, by_order, optimize=True))
