@@ -24,8 +24,8 @@ from vsacli.results.plots import compare_files, plot_feasibility, plot_stored
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
-from vsacli.studies.remedies import StiffnessProfile, suggest, write_fixed
-from vsacli.studies.remedies.suggestions import NotPossible, StiffnessOffset
+from vsacli.studies.remedies import suggest, write_fixed
+from vsacli.studies.remedies.suggestions import NotPossible, StiffnessOffset, StiffnessProfile
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -315,7 +315,8 @@ def test_a_suggested_profile_is_of_the_antagonistic_joint_alone(robot: Robot, tm
     assert isinstance(found.stiffness_offset, StiffnessOffset)
     assert [offset.joint for offset in found.stiffness_offset.offsets] == ["elbow"]
     assert isinstance(found.stiffness_profile, StiffnessProfile)
-    path, table = write_fixed(found.stiffness_profile.trajectory, robot.joint_names, tmp_path / "fixed.yaml")
+    (remedy,) = [each for each in found.remedies if each.stiffness_profile]
+    path, table = write_fixed(remedy, tmp_path / "fixed.yaml")
     assert table.read_text().splitlines()[0] == "time,elbow.stiffness,elbow.dstiffness,elbow.ddstiffness"
     again = load_trajectory(path, robot)
     assert again.warnings == ()

@@ -16,16 +16,16 @@ def test_suggestions_follow_the_report(vsacli, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--suggest")
     assert (done.code, done.err) == (3, "")
     assert done.out.startswith(plain.out)
-    heading, slow_down, offset, profile = done.out[len(plain.out) :].splitlines()
+    heading, profile, offset, slow_down = done.out[len(plain.out) :].splitlines()
     assert (
         heading
         == "suggestions, with any one of which every step has a margin of at least 1 % and keeps every limit:"
     )
     assert slow_down.startswith(
-        "- no slow-down: even at rest, under gravity alone, base needs at least 808.081 N m"
+        "- no slow-down alone: even at rest, under gravity alone, base needs at least 808.081 N m"
     )
-    assert offset.startswith("- raise the stiffness of base by 18.0")
-    assert profile.startswith("- reshape the stiffness of base by up to +18.")
+    assert offset.startswith("2. raise the stiffness of base by 18.0")
+    assert profile.startswith("1. reshape the stiffness of base by up to +18.")
 
 
 def test_json_has_them_under_one_key(vsacli, too_soft):
@@ -67,12 +67,13 @@ def test_nothing_needs_to_change(vsacli, motion):
         "slow_down": None,
         "stiffness_offset": None,
         "stiffness_profile": None,
+        "remedies": [],
     }
 
 
 def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml")
-    assert (done.code, done.err) == (3, "wrote fixed.yaml and fixed.csv\n")
+    assert (done.code, done.err) == (3, "wrote fixed.yaml and fixed.csv: suggestion 1\n")
     assert "suggestions, with any one of which" in done.out
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml", "fixed.csv"}
     run = vsacli("invdyn", ROBOT, "fixed.yaml")
@@ -100,14 +101,14 @@ def test_nothing_is_written_if_nothing_needs_to_change(vsacli, tmp_path, motion)
     assert contents(tmp_path).keys() == {"move.yaml"}
 
 
-def test_nothing_is_written_if_no_profile_helps(vsacli, tmp_path, too_soft):
+def test_nothing_is_written_if_nothing_helps(vsacli, tmp_path, too_soft):
     robot = edited(
         ROBOT,
         tmp_path / "robot.yaml",
-        ("motor: {inertia: 3.20,", "motor: {max_velocity: 0.1, inertia: 3.20,"),
+        ("motor: {inertia: 3.20,", "motor: {max_torque: 1, inertia: 3.20,"),
     )
     done = vsacli("check-feasibility", robot, too_soft, "--write-fixed", "fixed.yaml")
-    assert (done.code, done.err) == (3, "fixed.yaml is not written: no stiffness profile mends the task\n")
+    assert (done.code, done.err) == (3, "fixed.yaml is not written: nothing that was tried mends the task\n")
     assert contents(tmp_path).keys() == {"robot.yaml", "soft.yaml"}
 
 

@@ -24,9 +24,12 @@ from vsacli.analysis.run import Run, inverse_dynamics
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.joint import Limits
-from vsacli.studies.remedies import StiffnessProfile, suggest
+from vsacli.studies.remedies import suggest
+from vsacli.studies.remedies.acceptance import Acceptance
 from vsacli.studies.remedies.nearest_spline import Bounds, NoSplineError, nearest_spline
+from vsacli.studies.remedies.smallest_changes import AS_IT_IS
 from vsacli.studies.remedies.suggestions import NotPossible
+from vsacli.studies.remedies.task import Task
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -35,9 +38,9 @@ MARGIN = 0.01
 
 
 def profile(robot, trajectory):
-    found = suggest(robot, trajectory, MARGIN).stiffness_profile
-    assert isinstance(found, StiffnessProfile)
-    return found
+    """The remedy that changes the profile alone, and the change of each joint."""
+    remedy = Task(Acceptance(robot, MARGIN), trajectory).with_profiles(AS_IT_IS)
+    return remedy.trajectory, remedy.stiffness_profile
 
 
 def reason(robot, trajectory):
@@ -52,12 +55,9 @@ def stiffness_needed(robot, motion):
     return lowest_stiffness(tau_e) / (1 - MARGIN)
 
 
-def change(found, trajectory):
+def change(fixed, trajectory):
     steps = trajectory.samples
-    return (
-        found.trajectory.block(0, steps).commanded["stiffness"]
-        - trajectory.block(0, steps).commanded["stiffness"]
-    )
+    return fixed.block(0, steps).commanded["stiffness"] - trajectory.block(0, steps).commanded["stiffness"]
 
 
 def bump(time, height, at, width):
@@ -123,12 +123,13 @@ def test_bounds_too_fast_for_any_spline_are_refused():
 def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, stiffness):
     robot, trajectory = vsa_3r(), rest_to_rest(duration, stiffness, rate=800 / duration)
     suggestions = suggest(robot, trajectory, MARGIN)
-    found = suggestions.stiffness_profile
-    assert accepted(robot, found.trajectory, MARGIN)
+    fixed, found = profile(robot, trajectory)
+    assert suggestions.stiffness_profile == found
+    assert accepted(robot, fixed, MARGIN)
     constants = {each.joint: each.value for each in suggestions.stiffness_offset.offsets}
     for joint in found.changes:
         assert 0 < joint.rms <= constants[joint.joint]
-    moved = change(found, trajectory)
+    moved = change(fixed, trajectory)
     motion = trajectory.block(0, trajectory.samples)
     least = np.maximum(stiffness_needed(robot, motion) - motion.commanded["stiffness"], 0)
     # where nothing is needed nothing is gained, and the excess is small: a few percent of the largest change,
@@ -139,14 +140,14 @@ def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, st
 
 def test_joints_that_are_fine_are_left_alone():
     trajectory = rest_to_rest(4.0, (850.0, 820.0, 850.0))
-    found = profile(vsa_3r(), trajectory)
+    fixed, found = profile(vsa_3r(), trajectory)
     assert [joint.joint for joint in found.changes] == ["shoulder"]
-    np.testing.assert_array_equal(change(found, trajectory)[:, [0, 2]], 0.0)
+    np.testing.assert_array_equal(change(fixed, trajectory)[:, [0, 2]], 0.0)
 
 
 def test_profile_and_its_derivatives_belong_together():
     trajectory = rest_to_rest(0.5, rate=10_000)
-    motion = profile(vsa_3r(), trajectory).trajectory.block(0, trajectory.samples)
+    motion = profile(vsa_3r(), trajectory)[0].block(0, trajectory.samples)
     step = 1e-4
     for values, rates in (("stiffness", "dstiffness"), ("dstiffness", "ddstiffness")):
         value, rate = motion.of_joints[values], motion.of_joints[rates]
@@ -158,7 +159,7 @@ def test_profile_and_its_derivatives_belong_together():
 @pytest.mark.parametrize("duration", [0.3, 0.5, 4.0])
 def test_rest_to_rest_stays_rest_to_rest(duration):
     trajectory = rest_to_rest(duration, 790.0, rate=800 / duration)
-    fixed = profile(vsa_3r(), trajectory).trajectory
+    fixed = profile(vsa_3r(), trajectory)[0]
     commanded = fixed.block(0, fixed.samples).commanded
     for rate in ("dstiffness", "ddstiffness"):
         # three coefficients are equal there, which leaves their rounding over the square of a short piece
@@ -178,7 +179,7 @@ def test_moving_ends_keep_the_rates_that_were_commanded():
         signal=STIFFNESS, span=(0.0, 2.0), cycles=0.75, offset=(805.0,), sine=((-8.0,),), cosine=((3.0,),)
     )
     trajectory = Trajectory(UniformTimes(2.0, 500.0), position, {"stiffness": stiffness}, name="swing")
-    fixed = profile(pendulum(), trajectory).trajectory
+    fixed = profile(pendulum(), trajectory)[0]
     for time in (0, -1):
         before, after = (each.block(0, 1001).commanded for each in (trajectory, fixed))
         for rate in ("dstiffness", "ddstiffness"):
@@ -188,7 +189,7 @@ def test_moving_ends_keep_the_rates_that_were_commanded():
 
 def test_profile_holds_between_the_steps():
     robot, trajectory = vsa_3r(), rest_to_rest(0.5, rate=100)
-    fixed = profile(robot, trajectory).trajectory
+    fixed = profile(robot, trajectory)[0]
     motion = fixed.at(np.linspace(0, 0.5, 101))  # steps and the instants half-way
     gap = motion.commanded["stiffness"] - stiffness_needed(robot, motion)
     # half-way the file is read as a spline through its steps, off by step^4/384 of the fourth derivative
@@ -197,27 +198,27 @@ def test_profile_holds_between_the_steps():
 
 def test_motor_limit_asks_for_a_smoother_or_wider_profile():
     trajectory = rest_to_rest(0.5)
-    free = profile(vsa_3r(), trajectory)
-    (block,) = Run(vsa_3r(), free.trajectory)
+    fastest, free = profile(vsa_3r(), trajectory)
+    (block,) = Run(vsa_3r(), fastest)
     peak = float(np.abs(block.tau_motor[:, BASE]).max())
     robot = changed(BASE, motor={"max_torque": 0.8 * peak})
-    found = profile(robot, trajectory)
-    assert accepted(robot, found.trajectory, MARGIN)
+    fixed, found = profile(robot, trajectory)
+    assert accepted(robot, fixed, MARGIN)
     assert found.changes[0].rms > free.changes[0].rms
 
 
 def test_springs_that_differ_on_a_prismatic_joint():
     robot = changed(0, robot=pendulum(letter="P"), spring=(CUBIC, Sinh(k=80, a=5)))
-    found = profile(robot, rest_to_rest(0.2, 850.0, start=(0.0,), end=(0.3,)))
-    assert accepted(robot, found.trajectory, MARGIN)
+    fixed, found = profile(robot, rest_to_rest(0.2, 850.0, start=(0.0,), end=(0.3,)))
+    assert accepted(robot, fixed, MARGIN)
     assert found.sentence.startswith("reshape the stiffness of lift by up to +")
     assert " N/m (at t = " in found.sentence
 
 
 def test_deflection_limit_bounds_the_profile_from_above():
     robot = changed(SHOULDER, spring=(dataclasses.replace(CUBIC, max_deflection=0.08),) * 2)
-    found = profile(robot, rest_to_rest(4.0, (850.0, 900.0, 850.0)))
-    assert accepted(robot, found.trajectory, MARGIN)
+    fixed, found = profile(robot, rest_to_rest(4.0, (850.0, 900.0, 850.0)))
+    assert accepted(robot, fixed, MARGIN)
     assert found.changes[0].largest < 0
 
 
@@ -231,8 +232,8 @@ def test_stiffness_limit_below_what_the_load_needs():
 
 def test_limits_of_the_motion_are_none_of_the_stiffness():
     robot = changed(BASE, limits=Limits(position=(-1.0, 1.0)))
-    assert reason(robot, rest_to_rest(1.0)).startswith(
-        "no stiffness changes that the position of base, 1.5708 rad"
+    assert reason(robot, rest_to_rest(1.0)) == (
+        "the position of base, 1.5708 rad at t = 1.000 s, is above its limit 1"
     )
 
 

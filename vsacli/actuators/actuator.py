@@ -167,6 +167,11 @@ class Actuator(ABC):
         """Phi at which the springs carry the torque with the stiffness (14), on the actuator's branch."""
         raise NotImplementedError(f"{type(self).__name__} takes no stiffness")
 
+    @property
+    def opposite_preload(self) -> str | None:
+        """The other word that its field `preload` may hold; None if there is none."""
+        return None
+
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:  # noqa: ARG002
         """Where another choice of the preload would reach the stiffness, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)

@@ -171,11 +171,18 @@ class Antagonistic(Actuator):
             return make_pair(second, first).solve(tau_e, stiffness).exchanged()
         return make_pair(first, second).solve(tau_e, stiffness)
 
+    @property
+    def opposite_preload(self) -> str | None:
+        """The other branch, unless the springs only pull."""
+        if any(law.pulls_only for law in self.laws):
+            return None
+        return "negative" if self.preload == "positive" else "positive"
+
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
         """Where the branch with the opposite preload reaches the stiffness."""
-        if any(law.pulls_only for law in self.laws):
+        if self.opposite_preload is None:
             return np.zeros(tau_e.shape, dtype=bool)
-        opposite = replace(self, preload="negative" if self.preload == "positive" else "positive")
+        opposite = replace(self, preload=self.opposite_preload)
         return ~reach(stiffness, opposite.solve(tau_e, stiffness)).infeasible
 
     def deflection_rates(self, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray) -> FloatArray:

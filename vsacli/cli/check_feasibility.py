@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs
-    from vsacli.robot.model import Robot
     from vsacli.studies.remedies import Suggestions
 
 
@@ -60,7 +59,14 @@ if TYPE_CHECKING:
     "--write-fixed",
     "fixed",
     metavar="FILE",
-    help="Write the suggested stiffness profile as FILE.yaml, with a CSV beside it; implies --suggest.",
+    help="Write the first suggestion as a trajectory, with a CSV beside it for what is no formula, and as"
+    " FILE-robot.yaml the robot, if its preload changes; implies --suggest.",
+)
+@click.option(
+    "--remedy",
+    metavar="N",
+    type=click.IntRange(min=1),
+    help="Write that suggestion instead of the first.",
 )
 @overwrite_option
 @engine_options
@@ -75,6 +81,7 @@ def check_feasibility(
     plot_folder: str | None,
     advise: bool,
     fixed: str | None,
+    remedy: int | None,
     overwrite: bool,
     engine: str,
     threads: int | None,
@@ -85,10 +92,12 @@ def check_feasibility(
     The same computation as invdyn, and the same report. Exit code 0 if every step is feasible, regular and
     within limits, else 3.
 
-    --suggest looks for the smallest slow-down, the smallest constant offset of the stiffness, and the nearest
-    smooth stiffness profile with which every step keeps the near-singular margin and all limits. Each is
-    confirmed on all steps.
+    --suggest looks for what would mend it: slower, another stiffness (by a constant, or as a smooth profile),
+    another preload, or several of these together, so that every step keeps the near-singular margin and all
+    limits. The list begins with the smallest change; each was confirmed by a run of its own.
     """
+    if remedy is not None and fixed is None:
+        raise click.UsageError("--remedy says which suggestion to write; give --write-fixed FILE, too")
     inputs = load_inputs(robot, trajectory, talk)
     from vsacli.analysis.run import Run
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
@@ -119,7 +128,7 @@ def check_feasibility(
         talk.wrote(outputs)
     suggestions = suggest(*inputs, margin) if advise or fixed is not None else None
     if suggestions is not None and fixed is not None:
-        _write_fixed(suggestions, inputs.robot, fixed, overwrite, talk)
+        _write_fixed(suggestions, 1 if remedy is None else remedy, fixed, overwrite, talk)
     return show_report(report, as_json, suggestions)
 
 
@@ -146,14 +155,17 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
     return report
 
 
-def _write_fixed(suggestions: Suggestions, robot: Robot, path: str, overwrite: bool, talk: Talk) -> None:
-    """Write the suggested profile, if there is one, and say what was written."""
-    from vsacli.studies.remedies import StiffnessProfile, write_fixed
+def _write_fixed(suggestions: Suggestions, number: int, path: str, overwrite: bool, talk: Talk) -> None:
+    """Write one of the suggestions, if there is one, and say what was written."""
+    from vsacli.studies.remedies import write_fixed
 
-    profile = suggestions.stiffness_profile
-    if isinstance(profile, StiffnessProfile):
-        written = write_fixed(profile.trajectory, robot.joint_names, path, overwrite=overwrite)
-        talk.note(f"wrote {' and '.join(map(str, written))}")
+    remedies = suggestions.remedies
+    if number <= len(remedies):
+        written = write_fixed(remedies[number - 1], path, overwrite=overwrite)
+        talk.note(f"wrote {' and '.join(map(str, written))}: suggestion {number}")
+        return
+    if suggestions.slow_down is None:
+        reason = "nothing needs to change"
     else:
-        reason = "nothing needs to change" if profile is None else "no stiffness profile mends the task"
-        talk.note(f"{path} is not written: {reason}")
+        reason = f"there is no suggestion {number}" if remedies else "nothing that was tried mends the task"
+    talk.note(f"{path} is not written: {reason}")

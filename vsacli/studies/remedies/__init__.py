@@ -1,11 +1,11 @@
-"""What would mend an infeasible task: the smallest slow-down, stiffness offset, or change of profile."""
+"""What would mend an infeasible task: slower, with another stiffness or preload, or all together."""
 
 from vsacli.studies.remedies.fixed_file import check_fixed_target, fixed_paths, write_fixed
 from vsacli.studies.remedies.smallest_changes import suggest
-from vsacli.studies.remedies.suggestions import StiffnessProfile, Suggestions
+from vsacli.studies.remedies.suggestions import Remedy, Suggestions
 
 __all__ = [
-    "StiffnessProfile",
+    "Remedy",
     "Suggestions",
     "check_fixed_target",
     "fixed_paths",

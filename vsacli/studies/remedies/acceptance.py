@@ -26,7 +26,15 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 class ImpossibleError(VsacliError):
-    """No change of a kind mends a motion; the message says why, without a full stop."""
+    """No change of a kind mends a motion.
+
+    Attributes:
+        reasons: why, in clauses; one for each joint that cannot be mended.
+    """
+
+    def __init__(self, *reasons: str) -> None:
+        super().__init__("; ".join(reasons))
+        self.reasons = reasons
 
 
 @dataclass(frozen=True)
@@ -41,17 +49,17 @@ class Acceptance:
         block = compute_block(self.robot, motion, self.near_singular)
         return self._refused(block.flags, block.stiffness, block.stiffness_lower, block.stiffness_upper)
 
-    def refused_along(self, trajectory: Trajectory) -> Iterator[tuple[Motion, BoolArray]]:
-        """All steps of a trajectory, block by block, and which of them are not accepted."""
+    def blocks(self, trajectory: Trajectory) -> Iterator[Motion]:
+        """All steps of a trajectory, block by block."""
         samples = usual_block(len(self.robot.joints))
         for start in range(0, trajectory.samples, samples):
-            motion = trajectory.block(start, start + samples)
-            yield motion, self.refused(motion)
+            yield trajectory.block(start, start + samples)
 
     def refused_joints(self, trajectory: Trajectory) -> BoolArray:
         """The joints with any step that is not accepted, (joints,)."""
-        blocks = [np.any(refused, axis=0) for _, refused in self.refused_along(trajectory)]
-        joints: BoolArray = np.any(blocks, axis=0)
+        joints: BoolArray = np.any(
+            [np.any(self.refused(motion), axis=0) for motion in self.blocks(trajectory)], axis=0
+        )
         return joints
 
     def refused_commands(self, joint: Joint, command: Command) -> BoolArray:
@@ -59,6 +67,15 @@ class Acceptance:
         driven = drive(joint, command, self.near_singular)
         asked = command.commanded["stiffness"]
         return self._refused(driven.flags, asked, driven.stiffness_lower, driven.stiffness_upper)
+
+    def position_reasons(self, trajectory: Trajectory) -> tuple[str, ...]:
+        """For each joint the limit of its position that the motion exceeds, at whatever speed, if it does."""
+        found: dict[str, str] = {}
+        for motion in self.blocks(trajectory):
+            for index, joint in enumerate(self.robot.joints):
+                if reason := _limit_reason(joint, motion.time, {"q": motion.q[:, index]}):
+                    found.setdefault(joint.name, reason)
+        return tuple(found.values())
 
     def reasons(self, motion: Motion) -> tuple[str, ...]:
         """For each joint that is not accepted throughout, the worst that is wrong with it."""

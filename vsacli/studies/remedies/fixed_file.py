@@ -1,34 +1,38 @@
-"""A trajectory with recorded stiffness as files: YAML, and a CSV table beside it."""
+"""A remedy as files: the trajectory, a CSV table for what is no formula, the robot with another preload."""
 
 from __future__ import annotations
 
 import csv
 import json
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 
-from vsacli.base.atomic_files import AtomicFile, check_target, reporting_storage_errors
+from vsacli.base.atomic_files import check_target
 from vsacli.base.errors import InputError
+from vsacli.base.outputs import Outputs
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.wrench import wrench_columns
 from vsacli.dynamics.inverse import usual_block
-from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.studies.remedies.fixed_robot import robot_text
+from vsacli.studies.remedies.formulas import formula
+from vsacli.studies.remedies.suggestions import Remedy
 from vsacli.trajectory.file import FORMAT
 from vsacli.trajectory.profile import Profile
+from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 
-def fixed_paths(path: str | Path) -> tuple[Path, Path]:
-    """The YAML file, and the CSV file beside it."""
-    return Path(path), Path(path).with_suffix(".csv")
+def fixed_paths(path: str | Path) -> tuple[Path, Path, Path]:
+    """The YAML file, which is always written, and the CSV file and the robot file beside it."""
+    document = Path(path)
+    return document, document.with_suffix(".csv"), document.with_name(f"{document.stem}-robot.yaml")
 
 
 def check_fixed_target(path: str | Path, *, overwrite: bool) -> None:
-    """Refuse a YAML path that cannot be written, or whose CSV file beside it cannot.
+    """Refuse a YAML path that cannot be written, or beside which the others cannot.
 
     Raises:
         InputError: it does not end in .yaml or .yml.
@@ -40,71 +44,72 @@ def check_fixed_target(path: str | Path, *, overwrite: bool) -> None:
         check_target(file, overwrite=overwrite)
 
 
-def write_fixed(
-    trajectory: Trajectory, joint_names: Sequence[str], path: str | Path, *, overwrite: bool = False
-) -> tuple[Path, Path]:
-    """Write a trajectory with recorded stiffness as a YAML file and a CSV file of the same stem.
+def write_fixed(remedy: Remedy, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+    """Write the trajectory of a remedy, and its robot if that has another preload.
 
-    Position and wrench stay formulas if they are constants or polynomials from rest to rest; else they are
-    recorded at the steps with all their derivatives.
+    Signals stay formulas where they are; else they are recorded at the steps with all their derivatives, in a
+    CSV file of the same stem. The robot file is that of the robot with the preload changed.
 
     Returns:
-        The two paths.
+        The paths of the files that were written.
 
     Raises:
-        InputError, StorageError: as `check_fixed_target`, or the disk fails; nothing is written then.
+        InputError, StorageError: as `check_fixed_target`, or the robot file cannot be changed so, or the disk
+            fails; nothing is written then.
     """
     check_fixed_target(path, overwrite=overwrite)
-    document_path, table_path = fixed_paths(path)
-    with (
-        AtomicFile(table_path, overwrite=overwrite) as table,
-        AtomicFile(document_path, overwrite=overwrite) as document,
-    ):
-        with (
-            reporting_storage_errors(table_path),
-            table.temporary.open("w", encoding="utf-8", newline="") as stream,
-        ):
-            _write_table(trajectory, joint_names, stream)
-        with reporting_storage_errors(document_path):
-            document.temporary.write_text(_document(trajectory, table_path.name), encoding="utf-8")
-        table.publish()
-        document.publish()
-    return document_path, table_path
+    document, table, robot = fixed_paths(path)
+    trajectory, names = remedy.trajectory, remedy.robot.joint_names
+    formulas = _formulas(trajectory)
+    recorded = [signal for signal, declared in formulas.items() if declared is None]
+    contents: dict[Path, Callable[[TextIO], object]] = {
+        document: lambda file: file.writelines(_document(trajectory, formulas, table.name))
+    }
+    if recorded:
+        contents[table] = lambda file: _write_table(trajectory, recorded, names, file)
+    if remedy.preload is not None:
+        contents[robot] = lambda file: file.write(robot_text(remedy, robot.parent))
+    with Outputs(overwrite=overwrite) as outputs:
+        for target, write in contents.items():
+            with outputs.file(target).opened() as stream:
+                write(stream)
+    return tuple(contents)
 
 
-def _document(trajectory: Trajectory, table: str) -> str:
-    lines = [
-        f"format: {FORMAT}",
-        f"name: {json.dumps(trajectory.name)}",
-        f"position: {{{_declaration(trajectory.position, table)}}}",
-        *(f"{key}: {{{_declaration(profile, table)}}}" for key, profile in trajectory.commanded.items()),
-    ]
+def _formulas(trajectory: Trajectory) -> dict[Signal, dict[str, Any] | None]:
+    """How each signal is declared; None for those that are recorded, whose table has the times."""
+    profiles: dict[Signal, Profile] = {POSITION: trajectory.position}
+    chosen = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
+    profiles |= {COMMANDED[key]: trajectory.commanded[key] for key in chosen}
     if trajectory.wrench is not None:
-        declaration = _declaration(trajectory.wrench.profile, table)
-        lines.append(f"wrench: {{{declaration}, frame: {trajectory.wrench.frame}}}")
-    return "\n".join([*lines, ""])
+        profiles[WRENCH] = trajectory.wrench.profile
+    formulas = {signal: formula(profile) for signal, profile in profiles.items()}
+    if None not in formulas.values() and not isinstance(trajectory.times, UniformTimes):
+        formulas[POSITION] = None
+    return formulas
 
 
-def _declaration(profile: Profile, table: str) -> str:
-    return _formula(profile) or f"type: csv, file: {json.dumps(table)}"
+def _document(
+    trajectory: Trajectory, formulas: Mapping[Signal, dict[str, Any] | None], table: str
+) -> Iterator[str]:
+    """Lines of the trajectory file."""
+    yield f"format: {FORMAT}\n"
+    yield f"name: {json.dumps(trajectory.name)}\n"
+    if None not in formulas.values():
+        assert isinstance(trajectory.times, UniformTimes), "see _formulas"
+        yield f"duration: {trajectory.times.duration!r}\nrate: {trajectory.times.rate!r}\n"
+    for signal, declared in formulas.items():
+        content = {"type": "csv", "file": table} if declared is None else declared
+        if signal is WRENCH and trajectory.wrench is not None:
+            content = {**content, "frame": trajectory.wrench.frame}
+        entries = ", ".join(f"{key}: {json.dumps(value)}" for key, value in content.items())
+        yield f"{signal.key}: {{{entries}}}\n"
 
 
-def _formula(profile: Profile) -> str | None:
-    """How a profile that does not depend on the times of the steps is declared; None for the others."""
-    match profile:
-        case RestToRest(degree=degree, start=start, end=end):
-            return f"type: polynomial, degree: {degree}, start: {_numbers(start)}, end: {_numbers(end)}"
-        case Constant(value=value):
-            return f"type: constant, value: {_numbers(value)}"
-    return None
-
-
-def _numbers(values: Sequence[float]) -> str:
-    return json.dumps([None if math.isnan(value) else value for value in values])
-
-
-def _write_table(trajectory: Trajectory, joint_names: Sequence[str], stream: TextIO) -> None:
-    names = [name for signal in _recorded(trajectory) for name in signal.names]
+def _write_table(
+    trajectory: Trajectory, recorded: Sequence[Signal], joint_names: Sequence[str], stream: TextIO
+) -> None:
+    names = [name for signal in recorded for name in signal.names]
     chosen = {name: trajectory.chosen(key) for key, signal in COMMANDED.items() for name in signal.names}
     headers = [np.array(_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
     writer = csv.writer(stream, lineterminator="\n")
@@ -115,17 +120,6 @@ def _write_table(trajectory: Trajectory, joint_names: Sequence[str], stream: Tex
         variables = motion.variables()
         columns = [motion.time[:, None], *(variables[name][:, chosen.get(name, ...)] for name in names)]
         writer.writerows(np.concatenate(columns, axis=1).tolist())
-
-
-def _recorded(trajectory: Trajectory) -> Iterator[Signal]:
-    """The signals that are not declared as formulas."""
-    profiles = {POSITION: trajectory.position}
-    profiles |= {COMMANDED[key]: profile for key, profile in trajectory.commanded.items()}
-    if trajectory.wrench is not None:
-        profiles[WRENCH] = trajectory.wrench.profile
-    for signal, profile in profiles.items():
-        if _formula(profile) is None:
-            yield signal
 
 
 def _columns(name: str, joint_names: Sequence[str]) -> list[str]:

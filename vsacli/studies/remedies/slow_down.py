@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 
-from vsacli.base.arrays import IndexArray, evenly
-from vsacli.base.wrench import WRENCH_NAMES, Wrench
+from vsacli.base.arrays import evenly
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed
+from vsacli.studies.remedies.motions import evenly_chosen, joined, select, slowed
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -42,11 +41,11 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     Raises:
         ImpossibleError: with the reason.
     """
-    steps = _evenly_chosen(trajectory)
-    at_rest = _slowed(steps, math.inf)
+    steps = evenly_chosen(trajectory, WATCHED_STEPS)
+    at_rest = slowed(steps, math.inf)
     refused = np.flatnonzero(np.any(acceptance.refused(at_rest), axis=1))
     few = np.union1d(evenly(len(steps.time), FIRST_STEPS), refused[evenly(len(refused), FIRST_STEPS)])
-    number = _scan_start(acceptance, _select(steps, few))
+    number = _scan_start(acceptance, select(steps, few))
     if number is not None:
         candidates = SlowDownCandidates(acceptance, trajectory, steps)
         number = smallest_confirmed(candidates, number, LARGEST_FACTOR * FACTOR_DENOMINATOR)
@@ -68,7 +67,7 @@ def _scan_start(acceptance: Acceptance, few: Motion) -> int | None:
         numbers.append(min(numbers[-1] + _stride(numbers[-1]), LARGEST_FACTOR * FACTOR_DENOMINATOR))
     for start in range(0, len(numbers), FACTORS_AT_ONCE):
         tried = numbers[start : start + FACTORS_AT_ONCE]
-        refused = acceptance.refused(_joined(_slowed(few, number / FACTOR_DENOMINATOR) for number in tried))
+        refused = acceptance.refused(joined(slowed(few, number / FACTOR_DENOMINATOR) for number in tried))
         accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
         if accepted.size:
             return numbers[max(start + int(accepted[0]) - 1, 0)]
@@ -87,43 +86,19 @@ class SlowDownCandidates:
 
     def accepts(self, number: int) -> bool:
         """Whether every watched step is accepted."""
-        return not self._acceptance.refused(_slowed(self._watched, number / FACTOR_DENOMINATOR)).any()
+        return not self._acceptance.refused(slowed(self._watched, number / FACTOR_DENOMINATOR)).any()
 
     def confirms(self, number: int) -> bool:
         """Whether every step is accepted; those of the first block with others are watched from now on."""
         factor = number / FACTOR_DENOMINATOR
-        for motion, refused in self._acceptance.refused_along(self._trajectory.stretched(factor)):
-            steps = np.flatnonzero(np.any(refused, axis=1))
+        for motion in self._acceptance.blocks(self._trajectory.stretched(factor)):
+            steps = np.flatnonzero(np.any(self._acceptance.refused(motion), axis=1))
             if steps.size:
-                motion = _select(motion, steps[evenly(len(steps), WATCHED_STEPS)])
-                self._watched = _joined([self._watched, _slowed(motion, 1 / factor)])
+                motion = select(motion, steps[evenly(len(steps), WATCHED_STEPS)])
+                self._watched = joined([self._watched, slowed(motion, 1 / factor)])
                 return False
         return True
 
 
 def _stride(number: int) -> int:
     return math.ceil(number / 100)
-
-
-def _slowed(motion: Motion, factor: float) -> Motion:
-    """A motion passed more slowly, at rest if the factor is infinite; their times are kept."""
-    return motion.mapped(motion.time, lambda array, order: array / factor**order)
-
-
-def _evenly_chosen(trajectory: Trajectory) -> Motion:
-    return _joined(
-        trajectory.block(step, step + 1) for step in evenly(trajectory.samples, WATCHED_STEPS).tolist()
-    )
-
-
-def _select(motion: Motion, steps: IndexArray) -> Motion:
-    return motion.mapped(motion.time[steps], lambda array, _: array[steps])
-
-
-def _joined(motions: Iterable[Motion]) -> Motion:
-    parts = list(motions)
-    variables = [part.variables() for part in parts]
-    arrays = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
-    last = parts[-1].wrench
-    wrench = last and Wrench(*(arrays[name] for name in WRENCH_NAMES), frame=last.frame)
-    return Motion.of(arrays["time"], arrays, wrench)

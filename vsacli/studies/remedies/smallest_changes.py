@@ -1,44 +1,36 @@
-"""The smallest changes after which a motion is possible: a slow-down, a stiffness offset, another profile."""
+"""What would mend a task: each kind of change by itself, and the combinations worth choosing from."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from typing import Any
 
-import numpy as np
-
-from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
-from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.inverse import check_fit
-from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.remedies.admissible_stiffness import Load, joint_loads
+from vsacli.studies.remedies.combination import Combination, constant_change, least_change
+from vsacli.studies.remedies.combined_search import CombinedSearch
 from vsacli.studies.remedies.slow_down import smallest_slow_down
-from vsacli.studies.remedies.stiffness_offset import smallest_offset
-from vsacli.studies.remedies.stiffness_profile import Change, nearest_change, with_changed_stiffness
-from vsacli.studies.remedies.suggestions import (
-    JointChange,
-    NotPossible,
-    Offset,
-    SlowDown,
-    StiffnessOffset,
-    StiffnessProfile,
-    Suggestions,
-)
+from vsacli.studies.remedies.suggestions import NotPossible, Remedy, Suggestions
+from vsacli.studies.remedies.task import Task
 from vsacli.trajectory.trajectory import Trajectory
 
-_Found = TypeVar("_Found", float, Change)
+AS_IT_IS = Combination(1.0, {}, {}, 0.0)
 
-STEPS = slice(None, None, 2)
-"""The instants of a load that are steps."""
+SIMPLER_SHARE = 1.05
+"""How much larger a remedy with fewer kinds of change may be and still be worth more."""
+
+FASTER_SHARE = 0.8
+"""Share of the extra time of a remedy that another may take to be worth its while although it is larger."""
 
 
 def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Suggestions:
-    """The smallest changes, each by itself, after which every step has the margin and keeps every limit.
+    """The smallest changes after which every step has the margin and keeps every limit.
 
-    Each is recomputed over all steps and confirmed.
+    Slow-down, constant change and other profile of the stiffness each by itself; and remedies to choose from,
+    which combine them, also with another preload. Each is recomputed over all steps and confirmed.
 
     Args:
         robot: the robot.
@@ -52,98 +44,78 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
     check_fit(robot, trajectory)
     check_near_singular(near_singular)
     acceptance = Acceptance(robot, near_singular)
-    refused = np.flatnonzero(acceptance.refused_joints(trajectory)).tolist()
-    if not refused:
+    if not acceptance.refused_joints(trajectory).any():
         return Suggestions(near_singular)
-    loads = dict(zip(refused, joint_loads(robot, trajectory, refused), strict=True))
-    offsets = {joint: _offset(acceptance, joint, load) for joint, load in loads.items()}
-    changes = {joint: _change(acceptance, joint, load, offsets[joint]) for joint, load in loads.items()}
+    if reasons := acceptance.position_reasons(trajectory):
+        none = NotPossible(reasons)
+        return Suggestions(near_singular, none, none, none)
+    task = Task(acceptance, trajectory)
+    slower = _attempt(lambda: task.with_constants(_slow_down(task)))
+    offset = _attempt(lambda: task.with_constants(task.constants()))
+    profile = _attempt(lambda: task.with_profiles(AS_IT_IS))
+    alone = [found for found in (slower, offset, profile) if isinstance(found, Remedy)]
     return Suggestions(
         near_singular,
-        slow_down=_slow_down(acceptance, trajectory),
-        stiffness_offset=_stiffness_offset(acceptance, trajectory, offsets),
-        stiffness_profile=_stiffness_profile(acceptance, trajectory, changes),
+        slow_down=_part(slower, "slow_down"),
+        stiffness_offset=_part(offset, "stiffness_offset"),
+        stiffness_profile=_part(profile, "stiffness_profile"),
+        remedies=tuple(_worth_choosing([*alone, *_combined(task)], task)),
     )
 
 
-def _offset(acceptance: Acceptance, joint: int, load: Load) -> float | ImpossibleError:
+def _slow_down(task: Task) -> Combination:
+    factor = smallest_slow_down(task.acceptance, task.trajectory)
+    return Combination(factor, {}, {}, task.cost.of_factor(factor))
+
+
+def _attempt(find: Callable[[], Remedy]) -> Remedy | NotPossible:
     try:
-        return smallest_offset(acceptance, acceptance.robot.joints[joint], load.at(STEPS))
+        return find()
     except ImpossibleError as error:
-        return error
+        return NotPossible(error.reasons)
 
 
-def _change(
-    acceptance: Acceptance, joint: int, load: Load, offset: float | ImpossibleError
-) -> Change | ImpossibleError:
-    constant = None if isinstance(offset, ImpossibleError) else offset
-    try:
-        return nearest_change(acceptance, acceptance.robot.joints[joint], load, constant)
-    except ImpossibleError as error:
-        return error
+def _part(found: Remedy | NotPossible, name: str) -> Any:
+    """The only change of a remedy, or why there is none."""
+    return found if isinstance(found, NotPossible) else getattr(found, name)
 
 
-def _slow_down(acceptance: Acceptance, trajectory: Trajectory) -> SlowDown | NotPossible:
-    try:
-        return SlowDown(smallest_slow_down(acceptance, trajectory), trajectory.duration)
-    except ImpossibleError as error:
-        return NotPossible((str(error),))
-
-
-def _stiffness_offset(
-    acceptance: Acceptance, trajectory: Trajectory, offsets: Mapping[int, float | ImpossibleError]
-) -> StiffnessOffset | NotPossible:
-    found, reasons = _parted(offsets)
-    if reasons:
-        return NotPossible(reasons)
-    constants = {joint: np.array([[offset], [0], [0]]) for joint, offset in found.items()}
-    _confirmed(acceptance, trajectory, constants)
-    return StiffnessOffset(
-        tuple(
-            Offset(joint.name, found.get(index, 0.0), STIFFNESS.unit(joint.type))
-            for index, joint in enumerate(acceptance.robot.joints)
-            if "stiffness" in joint.actuator.commanded
-        )
+def _combined(task: Task) -> Iterator[Remedy]:
+    """Remedies that may take several kinds of change."""
+    constant, least, exchanged = (
+        CombinedSearch(task, form, preloads)
+        for form, preloads in ((constant_change, False), (least_change, False), (constant_change, True))
     )
+    smallest = constant.smallest()
+    yield from (task.with_constants(found) for found in (smallest, constant.fastest()) if found is not None)
+    profiles = list(_with_profiles(task, least.smallest(), least.fastest()))
+    yield from profiles or _with_profiles(task, smallest)
+    if any(len(choices) > 1 for choices in exchanged.choices):
+        found = exchanged.smallest()
+        if found is not None and found.preloads:
+            yield task.with_constants(found)
 
 
-def _stiffness_profile(
-    acceptance: Acceptance, trajectory: Trajectory, changes: Mapping[int, Change | ImpossibleError]
-) -> StiffnessProfile | NotPossible:
-    found, reasons = _parted(changes)
-    if reasons:
-        return NotPossible(reasons)
-    fixed = _confirmed(
-        acceptance, trajectory, {joint: change.rows[:, STEPS] for joint, change in found.items()}
-    )
-    return StiffnessProfile(
-        tuple(_summary(acceptance.robot.joints[joint], change) for joint, change in found.items()), fixed
-    )
+def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Remedy]:
+    """The remedies with profiles that slow down as these combinations do, as far as there are any."""
+    factors = {found.factor: found for found in combinations if found is not None and found.factor > 1}
+    for found in factors.values():
+        with suppress(ImpossibleError):
+            yield task.with_profiles(found)
 
 
-def _parted(outcomes: Mapping[int, _Found | ImpossibleError]) -> tuple[dict[int, _Found], tuple[str, ...]]:
-    """What was found for joints by index, and the reasons where nothing was."""
-    found = {joint: each for joint, each in outcomes.items() if not isinstance(each, ImpossibleError)}
-    reasons = tuple(str(each) for each in outcomes.values() if isinstance(each, ImpossibleError))
-    return found, reasons
+def _worth_choosing(candidates: Iterable[Remedy], task: Task) -> list[Remedy]:
+    """Those that a run confirms and no simpler one makes superfluous; with another preload last."""
+    chosen: list[Remedy] = []
+    for remedy in sorted(candidates, key=lambda each: (len(each.kinds), each.size)):
+        if not any(_superfluous(remedy, beside) for beside in chosen) and task.confirms(remedy):
+            chosen.append(remedy)
+    return sorted(chosen, key=lambda each: (each.preload is not None, each.size))
 
 
-def _confirmed(
-    acceptance: Acceptance, trajectory: Trajectory, changes: Mapping[int, FloatArray]
-) -> Trajectory:
-    """The trajectory with changed stiffness, after all of its steps have been recomputed."""
-    fixed = with_changed_stiffness(trajectory, changes)
-    refused = acceptance.refused_joints(fixed)
-    assert not refused.any(), "a change that was accepted joint by joint is not confirmed"
-    return fixed
-
-
-def _summary(joint: Joint, change: Change) -> JointChange:
-    largest = int(np.abs(change.rows[0]).argmax())
-    return JointChange(
-        joint=joint.name,
-        largest=float(change.rows[0, largest]),
-        time=float(change.time[largest]),
-        rms=change.rms,
-        unit=STIFFNESS.unit(joint.type),
-    )
+def _superfluous(remedy: Remedy, beside: Remedy) -> bool:
+    """Whether a remedy has nothing for it that another one, no more complicated, has not."""
+    if beside.kinds < remedy.kinds:
+        return beside.size <= SIMPLER_SHARE * remedy.size
+    faster = remedy.longer < FASTER_SHARE * beside.longer
+    return beside.kinds == remedy.kinds and beside.size <= remedy.size and not faster

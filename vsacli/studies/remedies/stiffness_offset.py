@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -16,6 +17,12 @@ LARGEST_RATIO = 100
 
 WATCHED_STEPS = 1000
 """Steps that the scan looks at to begin with, and how many a refused confirmation may add."""
+
+FIRST_STEPS = 20
+"""How many of them are tried at many offsets at once before the scan, and how many each look at all adds."""
+
+OFFSETS_AT_ONCE = 64
+"""Offsets that are tried at once: hardly dearer than one of them."""
 
 OFFSET_DIGITS = 4
 """Decimal places of an offset behind the leading digit of the stiffness: so what is printed was confirmed."""
@@ -85,8 +92,50 @@ class OffsetCandidates:
         ratio = LARGEST_RATIO - 1 if self._sign > 0 else 1 - 1 / LARGEST_RATIO
         start = math.ceil(max(low, 0.0) / unit - GRID_ROUNDING)
         stop = math.floor(min(high, ratio * self._softest) / unit + GRID_ROUNDING)
-        number = smallest_confirmed(self, start, stop)
+        near = self._scan_start(start, stop)
+        number = None if near is None else smallest_confirmed(self, near, stop)
         return None if number is None else self.value(number)
+
+    def _scan_start(self, start: int, stop: int) -> int | None:
+        """A number up to which the scan would find some watched step refused; None if it always would.
+
+        Found by looking at a few steps, to which others are added as long as the watched ones refuse.
+        """
+        few = np.union1d(self._watched[evenly(len(self._watched), FIRST_STEPS)], self._hardest(start))
+        numbers = list(self._strides(start, stop))
+        first = 0
+        while (first := self._first_accepted(numbers, first, few)) < len(numbers):
+            refused = self._refused(self._load.at(self._watched), numbers[first])
+            if not refused.size:
+                return numbers[max(first - 1, 0)]
+            few = np.union1d(few, self._watched[refused[evenly(len(refused), FIRST_STEPS)]])
+        return None
+
+    def _hardest(self, number: int) -> IndexArray:
+        """Some of the watched steps that refuse a number."""
+        refused = self._watched[self._refused(self._load.at(self._watched), number)]
+        return refused[evenly(len(refused), FIRST_STEPS)]
+
+    def _strides(self, start: int, stop: int) -> Iterator[int]:
+        """The numbers at which the scan looks."""
+        number = start
+        while number < stop:
+            yield number
+            number += self.stride(number)
+        if start <= stop:
+            yield stop
+
+    def _first_accepted(self, numbers: Sequence[int], first: int, steps: IndexArray) -> int:
+        """Index, from `first` on, of a number that these steps accept; that behind the last if none is."""
+        for begin in range(first, len(numbers), OFFSETS_AT_ONCE):
+            tried = numbers[begin : begin + OFFSETS_AT_ONCE]
+            load = self._load.at(np.tile(steps, len(tried)))
+            values = np.repeat([self.value(number) for number in tried], len(steps))
+            refused = self._acceptance.refused_commands(self._joint, load.changed(values).command)
+            accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
+            if accepted.size:
+                return begin + int(accepted[0])
+        return len(numbers)
 
     def stride(self, number: int) -> int:
         """One percent of the stiffness."""

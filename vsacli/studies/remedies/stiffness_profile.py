@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, stiffness_text
 from vsacli.studies.remedies.admissible_stiffness import (
@@ -20,10 +18,6 @@ from vsacli.studies.remedies.admissible_stiffness import (
     variable_stiffness_actuator,
 )
 from vsacli.studies.remedies.nearest_spline import DEGREE, Bounds, NoSplineError, nearest_spline
-from vsacli.trajectory.fits import INTERPOLATE
-from vsacli.trajectory.recorded.samples import SampledProfile, Samples
-from vsacli.trajectory.times import RecordedTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN_FACTORS = (1, 2, 4, 8)
 """Multiples of the margin tried where motor limits refuse the nearest profile: torques grow with 1/margin."""
@@ -148,25 +142,3 @@ def _reason(acceptance: Acceptance, joint: Joint, load: Load, change: Change | N
         return f"what {joint.name} may have is too narrow, or changes too fast, for a smooth profile"
     reason = acceptance.reason(joint, load.time, load.changed(*change.rows).command)
     return f"none that was tried keeps every limit of {joint.name}; with the nearest, {reason}"
-
-
-def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatArray]) -> Trajectory:
-    """A trajectory with the same steps, whose stiffness is recorded at them.
-
-    Args:
-        trajectory: what is to be changed.
-        changes: for joints by index what to add to the stiffness, its rate and its second derivative at the
-            steps, (3, steps), N m/rad (N/m) per s^k.
-    """
-    time = trajectory.times.block(0, trajectory.samples)
-    rows = trajectory.commanded[STIFFNESS.key].samples(0, trajectory.samples, time - trajectory.start).copy()
-    for joint, change in changes.items():
-        rows[:, joint] += change
-    values, *derivatives = rows
-    labels = tuple(f"column {joint}" for joint in range(len(values)))
-    samples = Samples.recorded(STIFFNESS, time, values, tuple(derivatives), labels)
-    commanded = {**trajectory.commanded, STIFFNESS.key: SampledProfile.of(samples, INTERPOLATE)}
-    name = f"{trajectory.name}-fixed"
-    return Trajectory(
-        RecordedTimes(time), trajectory.position, commanded, wrench=trajectory.wrench, name=name
-    )

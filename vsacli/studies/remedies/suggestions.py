@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from vsacli.base.json_records import Published, named
+from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -99,15 +100,9 @@ class JointChange(Published):
 
 @dataclass(frozen=True)
 class StiffnessProfile(Published):
-    """Give the stiffness another profile.
-
-    Attributes:
-        changes: of the joints that are not fine.
-        trajectory: the same motion with the new stiffness.
-    """
+    """Give the stiffness of the joints that are not fine another profile."""
 
     changes: tuple[JointChange, ...]
-    trajectory: Trajectory = field(repr=False, compare=False)
 
     possible: ClassVar = True
     shape: ClassVar = {"possible": "possible", "changes": "by_joint", "text": "sentence"}
@@ -124,19 +119,75 @@ class StiffnessProfile(Published):
 
 
 @dataclass(frozen=True)
-class Suggestions(Published):
-    """For each kind of change the smallest that makes a task possible, or why there is none.
+class OtherPreload(Published):
+    """Take the other preload: what it becomes, by joint."""
 
-    All are None where nothing needs to change.
+    preloads: Mapping[str, str]
+
+    shape: ClassVar = {"preloads": "preloads", "text": "sentence"}
+
+    @property
+    def sentence(self) -> str:
+        """What to do, without a full stop."""
+        return "change the preload of " + ", ".join(f"{joint} to {to}" for joint, to in self.preloads.items())
+
+
+@dataclass(frozen=True)
+class Remedy(Published):
+    """Changes that together make a task possible, as a whole run has confirmed.
+
+    Attributes:
+        size: root of the sum of the squares of all relative changes: the factor of the slow-down less 1, and
+            of each joint the root mean square of its change of stiffness over that of its stiffness.
+        robot: with another preload, if that is among the changes.
+        trajectory: with the changes.
+    """
+
+    size: float
+    robot: Robot = field(repr=False, compare=False)
+    trajectory: Trajectory = field(repr=False, compare=False)
+    slow_down: SlowDown | None = None
+    stiffness_offset: StiffnessOffset | None = None
+    stiffness_profile: StiffnessProfile | None = None
+    preload: OtherPreload | None = None
+
+    PARTS: ClassVar = ("slow_down", "preload", "stiffness_offset", "stiffness_profile")
+    shape: ClassVar = {"size": "size", **{f"{part}?": part for part in PARTS}, "text": "sentence"}
+
+    @property
+    def longer(self) -> float:
+        """Growth of the duration, relative to it."""
+        return 0.0 if self.slow_down is None else self.slow_down.factor - 1
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Which kinds of change it takes; a profile is a more general constant."""
+        kinds = {part for part in self.PARTS if getattr(self, part) is not None}
+        return frozenset(kinds | ({"stiffness_offset"} if self.stiffness_profile else set()))
+
+    @property
+    def sentence(self) -> str:
+        """What to do, without a full stop."""
+        parts = [getattr(self, part) for part in self.PARTS]
+        return ", and ".join(part.sentence for part in parts if part is not None)
+
+
+@dataclass(frozen=True)
+class Suggestions(Published):
+    """What makes a task possible: each kind of change by itself, and combinations.
+
+    Each kind is the smallest change that does, or why there is none; None where nothing needs to change.
 
     Attributes:
         near_singular: the margin that every step shall have.
+        remedies: what to choose from, the smallest first, those with another preload last.
     """
 
     near_singular: float
     slow_down: SlowDown | NotPossible | None = None
     stiffness_offset: StiffnessOffset | NotPossible | None = None
     stiffness_profile: StiffnessProfile | NotPossible | None = None
+    remedies: tuple[Remedy, ...] = ()
 
     KINDS: ClassVar = {
         "slow_down": "slow-down",
@@ -148,15 +199,23 @@ class Suggestions(Published):
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        """One sentence for each kind, under a heading."""
+        """A numbered sentence for each remedy under a heading, and why kinds do not do by themselves."""
         margin = f"a margin of at least {100 * self.near_singular:.6g} %"
         if self.slow_down is None:
             yield f"nothing to change: every step has {margin} and keeps every limit"
             return
-        yield f"suggestions, with any one of which every step has {margin} and keeps every limit:"
-        for kind, name in self.KINDS.items():
-            found = getattr(self, kind)
-            if isinstance(found, NotPossible):
-                yield f"- no {name}: {'; '.join(found.reasons)}"
-            else:
-                yield f"- {found.sentence}"
+        if self.remedies:
+            yield f"suggestions, with any one of which every step has {margin} and keeps every limit:"
+        else:
+            yield f"nothing that was tried gives every step {margin} and keeps every limit:"
+        yield from (f"{number}. {remedy.sentence}" for number, remedy in enumerate(self.remedies, 1))
+        yield from self._reasons()
+
+    def _reasons(self) -> Iterator[str]:
+        """Why kinds of change do not do by themselves, in one sentence if it is the same for all."""
+        found = {name: getattr(self, kind) for kind, name in self.KINDS.items()}
+        impossible = {name: each.reasons for name, each in found.items() if isinstance(each, NotPossible)}
+        if len(impossible) == len(found) and len(set(impossible.values())) == 1:
+            yield f"- another motion is needed: {'; '.join(impossible.popitem()[1])}"
+        else:
+            yield from (f"- no {name} alone: {'; '.join(reasons)}" for name, reasons in impossible.items())

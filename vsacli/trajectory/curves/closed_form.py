@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -74,6 +75,15 @@ class ClosedForm(ABC):
         first, last = self.span
         return replace(self, span=(first, stretch(last, first, factor)))
 
+    @abstractmethod
+    def raised(self, by: Sequence[float]) -> Self:
+        """The same profile with a constant added to each component."""
+
+
+def added(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
+    """The sum of two values of each component."""
+    return tuple(value + constant for value, constant in zip(values, by, strict=True))
+
 
 @dataclass(frozen=True, kw_only=True)
 class Constant(ClosedForm):
@@ -91,3 +101,7 @@ class Constant(ClosedForm):
         rows = np.zeros((self.signal.orders, self.components, len(time)))
         rows[0] = np.array(self.value)[:, None]
         return rows
+
+    def raised(self, by: Sequence[float]) -> Self:
+        """The same profile with a constant added to each component."""
+        return replace(self, value=added(self.value, by))

@@ -92,6 +92,10 @@ class Chain(ClosedForm):
         parts = tuple(replace(part, span=later(part.span)) for part in self.parts)
         return replace(self, span=later(self.span), parts=parts)
 
+    def raised(self, by: Sequence[float]) -> Self:
+        """The same profile with a constant added to each component of every part."""
+        return replace(self, parts=tuple(part.raised(by) for part in self.parts))
+
     def jumps(self, orders: int) -> Iterator[Jump]:
         """Between which parts the value or a derivative, `orders` functions in all, is discontinuous."""
         for index, (before, after) in enumerate(pairwise(self.parts), start=1):

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
+from typing import Self
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm
+from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, added
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +55,10 @@ class RestToRest(ClosedForm):
         for row, rate in zip(rows[1:], _rates(elapsed, remaining, last - first, self.degree), strict=False):
             np.multiply.outer(end - start, rate, out=row)
         return rows
+
+    def raised(self, by: Sequence[float]) -> Self:
+        """The same profile with a constant added to each component."""
+        return replace(self, start=added(self.start, by), end=added(self.end, by))
 
 
 def _rise(u: FloatArray, degree: int) -> FloatArray:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves.closed_form import ClosedForm
+from vsacli.trajectory.curves.closed_form import ClosedForm, added
 from vsacli.trajectory.curves.piecewise import stepwise
 
 RAMP_DEGREE = 9
@@ -69,6 +70,10 @@ class Sinusoids(ClosedForm):
             rows = _product(window.at(time), rows)
         rows[0] += np.array(self.offset)[:, None]
         return rows
+
+    def raised(self, by: Sequence[float]) -> Self:
+        """The same profile with a constant added to each component."""
+        return replace(self, offset=added(self.offset, by))
 
     def _series(self, time: FloatArray) -> FloatArray:
         """The sum without the offset."""

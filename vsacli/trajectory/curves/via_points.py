@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm
+from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, added
 
 SEAM = 1e-9
 """Largest jump between the expansions about two neighbouring points, relative to the peak of each derivative:
@@ -123,6 +123,10 @@ class ViaPoints(ClosedForm):
         for order, total in enumerate(series):
             rows[order, self._given] = total / np.float64(last - first) ** order
         return rows
+
+    def raised(self, by: Sequence[float]) -> Self:
+        """The same profile with a constant added to each component."""
+        return replace(self, points=tuple(added(point, by) for point in self.points))
 
     def extremes(self) -> Extremes:
         """The smallest and largest values, from the zeros of the first derivative.

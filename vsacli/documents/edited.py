@@ -1,0 +1,87 @@
+"""The text of a YAML file with other values in it; comments and layout stay as they are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import TypeAlias
+
+import yaml
+
+from vsacli.base.errors import InputError
+
+_Words: TypeAlias = tuple[str, ...]
+
+
+def edited(text: str, values: Mapping[str, str]) -> str:
+    """The text with texts at some paths replaced, or put in where there is none.
+
+    Args:
+        text: a YAML document that can be read.
+        values: new texts by path, e.g. `joints.0.actuator.preload`; entries of lists by index.
+
+    Raises:
+        InputError: a path leads nowhere, or through an alias, so that its anchor would change as well.
+    """
+    root = _root(text)
+    edits = (_edit(root, tuple(path.split(".")), value) for path, value in values.items())
+    for start, end, replacement in sorted(edits, reverse=True):
+        text = text[:start] + replacement + text[end:]
+    return text
+
+
+def texts_at(text: str, key: str) -> Iterator[tuple[str, str]]:
+    """Path and value of every text under a key, wherever in a YAML document."""
+    yield from _texts_at(_root(text), key, ())
+
+
+def _root(text: str) -> yaml.Node:
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    assert root is not None, "a document that can be read"
+    return root
+
+
+def _texts_at(node: yaml.Node, key: str, place: _Words) -> Iterator[tuple[str, str]]:
+    for word, entry in _entries(node):
+        if word == key and isinstance(entry, yaml.ScalarNode):
+            yield ".".join((*place, word)), entry.value
+        yield from _texts_at(entry, key, (*place, word))
+
+
+def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
+    """The words of a path that lead on from a node, and where to."""
+    if isinstance(node, yaml.MappingNode):
+        yield from ((key.value, entry) for key, entry in node.value)
+    elif isinstance(node, yaml.SequenceNode):
+        yield from ((str(index), entry) for index, entry in enumerate(node.value))
+
+
+def _edit(root: yaml.Node, words: _Words, value: str) -> tuple[int, int, str]:
+    """From where to where the text becomes what."""
+    *way, key = words
+    node = root
+    for word in way:
+        found = dict(_entries(node)).get(word)
+        if found is None:
+            raise InputError.one(f"{'.'.join(words)}: there is no {word!r}")
+        if not node.start_mark.index <= found.start_mark.index < node.end_mark.index:
+            raise InputError.one(f"{'.'.join(words)}: {word!r} is an alias, which others share")
+        node = found
+    if not isinstance(node, yaml.MappingNode):
+        raise InputError.one(f"{'.'.join(words)}: there is no {key!r}")
+    here = dict(_entries(node)).get(key)
+    if here is not None:
+        return here.start_mark.index, here.end_mark.index, _quoted(value)
+    return _insertion(node, f"{key}: {_quoted(value)}")
+
+
+def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
+    """A further entry before the first one of a mapping."""
+    first = node.value[0][0].start_mark
+    start = first.index
+    return start, start, f"{entry}, " if node.flow_style else f"{entry}\n{' ' * first.column}"
+
+
+def _quoted(value: str) -> str:
+    """A text as YAML may hold it: words plain, others in quotes."""
+    return value if value.isidentifier() else json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,205 @@
+"""One search over slow-down, stiffness and preload together, for the combination of least cost.
+
+Given the factor of the slow-down, what the links demand is known; given that, corridor and limits of a joint
+do not depend on the other joints. So the search has one dimension, along which joints are mended one by one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, evenly
+from vsacli.dynamics.inverse import command_of, elastic_torques
+from vsacli.robot.joint import Joint
+from vsacli.studies.remedies.acceptance import ImpossibleError, path_reason
+from vsacli.studies.remedies.admissible_stiffness import Load
+from vsacli.studies.remedies.combination import Combination, Form, constant_change
+from vsacli.studies.remedies.motions import evenly_chosen, joined, select, slowed, stiffened
+from vsacli.studies.remedies.slow_down import FACTOR_DENOMINATOR, LARGEST_FACTOR, WATCHED_STEPS
+from vsacli.studies.remedies.task import Task
+from vsacli.trajectory.motion import Motion
+
+STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
+"""Relative strides of the scan, each up to the factor before it: fine where a slow-down is small."""
+
+MOST_ROUNDS = 20
+"""Rounds of adding steps that refuse what the watched ones accept; two or three are usual."""
+
+PRELOAD_GAIN = 0.9
+"""Share to which the other preload must bring down the change of a joint, so that it is worth its while."""
+
+
+@dataclass(frozen=True)
+class CombinedSearch:
+    """A search for the combination of changes that mends a motion.
+
+    Attributes:
+        task: what is to be mended, by which rule, and at which cost.
+        form: of the changes of stiffness.
+        preloads: whether joints may take the other preload.
+    """
+
+    task: Task
+    form: Form = constant_change
+    preloads: bool = False
+
+    def smallest(self) -> Combination | None:
+        """The combination of least cost; confirmed on all steps if its changes are constants."""
+        return self._confirmed(WatchedSearch.smallest)
+
+    def fastest(self) -> Combination | None:
+        """The combination with the least slow-down, likewise."""
+        return self._confirmed(WatchedSearch.fastest)
+
+    def _confirmed(self, choose: Callable[[WatchedSearch], Combination | None]) -> Combination | None:
+        watched = evenly_chosen(self.task.trajectory, WATCHED_STEPS)
+        for _ in range(MOST_ROUNDS):
+            found = choose(WatchedSearch(self, watched))
+            refused = None if found is None or self.form is not constant_change else self._refused(found)
+            if refused is None:
+                return found
+            watched = joined([watched, refused])
+        return None
+
+    def _refused(self, found: Combination) -> Motion | None:
+        """Steps of the first block with any that refuse constant changes, with what was commanded at them."""
+        acceptance = self.task.acceptance_with(found)
+        change = np.zeros(self.task.trajectory.joints)
+        change[list(found.constants)] = list(found.constants.values())
+        for motion in acceptance.blocks(self.task.trajectory.stretched(found.factor)):
+            steps = np.flatnonzero(np.any(acceptance.refused(stiffened(motion, change)), axis=1))
+            if steps.size:
+                return slowed(select(motion, steps[evenly(len(steps), WATCHED_STEPS)]), 1 / found.factor)
+        return None
+
+    @cached_property
+    def choices(self) -> list[dict[str, Joint]]:
+        """What each joint may be by the word for its preload, which is empty if it stays as it is."""
+        robot = self.task.acceptance.robot
+        choices = [{"": joint} for joint in robot.joints]
+        for index, joint in enumerate(robot.joints):
+            opposite = joint.actuator.opposite_preload
+            if self.preloads and opposite is not None:
+                exchanged = robot.replace(f"joints.{index}.actuator.preload", opposite)
+                choices[index][opposite] = exchanged.joints[index]
+        return choices
+
+
+class WatchedSearch:
+    """A combined search that looks at some steps of the motion, and keeps what it finds at each factor."""
+
+    def __init__(self, search: CombinedSearch, watched: Motion) -> None:
+        self._search, self._watched = search, watched
+        self._found: dict[int, Combination | None] = {}
+
+    def fastest(self) -> Combination | None:
+        """The combination with the least factor that scan and bisection find."""
+        refused = FACTOR_DENOMINATOR - 1
+        for number in _scanned():
+            if self._at(number) is not None:
+                break
+            refused = number
+        else:
+            return None
+        while number - refused > 1:
+            middle = (number + refused) // 2
+            number, refused = (number, middle) if self._at(middle) is None else (middle, refused)
+        return self._at(number)
+
+    def smallest(self) -> Combination | None:
+        """The combination of least cost, by the scan, and then steps to either side that get shorter."""
+        best, at, cost = None, 0, self._search.task.cost
+        for number in _scanned():
+            if best is not None and cost.of_factor(number / FACTOR_DENOMINATOR) >= best.size:
+                break
+            found = self._at(number)
+            if found is not None and (best is None or found.size < best.size):
+                best, at = found, number
+        if best is None:
+            return None
+        step = _stride(at)
+        while step:
+            sides = {side: self._at(side) for side in (at - step, at + step) if side >= FACTOR_DENOMINATOR}
+            found, side = min(
+                ((each, side) for side, each in sides.items() if each is not None),
+                key=lambda pair: pair[0].size,
+                default=(best, at),
+            )
+            if found.size < best.size:
+                best, at = found, side
+            else:
+                step //= 2
+        return best
+
+    def _at(self, number: int) -> Combination | None:
+        """What mends every joint at a factor, if anything does."""
+        if number not in self._found:
+            try:
+                self._found[number] = self._mended(number / FACTOR_DENOMINATOR)
+            except ImpossibleError:
+                self._found[number] = None
+        return self._found[number]
+
+    def _mended(self, factor: float) -> Combination:
+        """The changes of all joints at a factor.
+
+        Raises:
+            ImpossibleError: some joint is refused whatever its stiffness.
+        """
+        motion, search = slowed(self._watched, factor), self._search
+        commanded = {**motion.variables(), **elastic_torques(search.task.acceptance.robot, motion)}
+        loads = [Load(motion.time, command_of(index, commanded)) for index in range(len(search.choices))]
+        for choices, load in zip(search.choices, loads, strict=True):
+            if reason := path_reason(choices[""], load.time, load.command):
+                raise ImpossibleError(reason)
+        found = [self._of_joint(choices, load) for choices, load in zip(search.choices, loads, strict=True)]
+        return Combination(
+            factor,
+            changes={index: change for index, (_, _, change) in enumerate(found) if change.any()},
+            preloads={index: preload for index, (_, preload, _) in enumerate(found) if preload},
+            size=math.hypot(search.task.cost.of_factor(factor), *(size for size, _, _ in found)),
+        )
+
+    def _of_joint(self, choices: dict[str, Joint], load: Load) -> tuple[float, str, FloatArray]:
+        """Cost, preload and change of stiffness of one joint; the preload is empty if it stays as it is."""
+        asked, best, reason = load.command.commanded["stiffness"], None, ImpossibleError()
+        for preload, joint in choices.items():
+            try:
+                change = self._change(joint, load)
+            except ImpossibleError as error:
+                reason = error
+                continue
+            size = self._search.task.cost.of_stiffness(asked, change) if change.any() else 0.0
+            if best is None or size < PRELOAD_GAIN * best[0]:
+                best = size, preload, change
+            if not size:
+                break
+        if best is None:
+            raise reason
+        return best
+
+    def _change(self, joint: Joint, load: Load) -> FloatArray:
+        acceptance = self._search.task.acceptance
+        if not acceptance.refused_commands(joint, load.command).any():
+            return np.zeros(len(load.time))
+        return self._search.form(acceptance, joint, load)
+
+
+def _scanned() -> Iterator[int]:
+    """The factors at which a search looks, in units of 1/FACTOR_DENOMINATOR."""
+    number, last = FACTOR_DENOMINATOR, LARGEST_FACTOR * FACTOR_DENOMINATOR
+    while number < last:
+        yield number
+        number += _stride(number)
+    yield last
+
+
+def _stride(number: int) -> int:
+    factor = number / FACTOR_DENOMINATOR
+    share = next(share for limit, share in STRIDES if factor <= limit)
+    return math.ceil(number * share)

@@ -1,0 +1,172 @@
+"""A task that is to be mended, and the remedies that follow from combinations of changes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+
+from vsacli.analysis.run import Run
+from vsacli.base.arrays import FloatArray
+from vsacli.base.units import STIFFNESS
+from vsacli.robot.joint import Joint
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.remedies.admissible_stiffness import Load, joint_loads
+from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness, with_raised_stiffness
+from vsacli.studies.remedies.combination import RELATIVE_CHANGE, Combination, Cost, constant_change
+from vsacli.studies.remedies.stiffness_offset import smallest_offset
+from vsacli.studies.remedies.stiffness_profile import Change, nearest_change
+from vsacli.studies.remedies.suggestions import (
+    JointChange,
+    Offset,
+    OtherPreload,
+    Remedy,
+    SlowDown,
+    StiffnessOffset,
+    StiffnessProfile,
+)
+from vsacli.trajectory.trajectory import Trajectory
+
+_Found = TypeVar("_Found")
+
+STEPS = slice(None, None, 2)
+"""The instants of a load that are steps."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a robot is asked to do, and the rule for every step.
+
+    Attributes:
+        acceptance: the rule, and the robot.
+        trajectory: what the robot is asked to do.
+        cost: how large a remedy is.
+    """
+
+    acceptance: Acceptance
+    trajectory: Trajectory
+    cost: Cost = RELATIVE_CHANGE
+
+    def acceptance_with(self, found: Combination) -> Acceptance:
+        """The rule for the robot with the preloads of a combination."""
+        return Acceptance(found.robot(self.acceptance.robot), self.acceptance.near_singular)
+
+    def with_constants(self, found: Combination) -> Remedy:
+        """The remedy of a combination whose changes of stiffness are constants."""
+        offsets = tuple(
+            Offset(joint.name, found.constants.get(index, 0.0), STIFFNESS.unit(joint.type))
+            for index, joint in enumerate(self.acceptance.robot.joints)
+            if "stiffness" in joint.actuator.commanded
+        )
+        return Remedy(
+            size=found.size,
+            robot=found.robot(self.acceptance.robot),
+            trajectory=with_raised_stiffness(self.trajectory.stretched(found.factor), found.constants),
+            slow_down=self._slow_down(found),
+            preload=self._preload(found),
+            stiffness_offset=StiffnessOffset(offsets) if found.changes else None,
+        )
+
+    def with_profiles(self, found: Combination) -> Remedy:
+        """The remedy with slow-down and preloads of a combination, and the nearest profiles that they admit.
+
+        Raises:
+            ImpossibleError: there is none for some joint.
+        """
+        slower, acceptance = self.trajectory.stretched(found.factor), self.acceptance_with(found)
+        robot = acceptance.robot
+        changes = for_refused_joints(acceptance, slower, partial(_nearest_change, acceptance))
+        summaries = tuple(_summary(robot.joints[index], change) for index, (_, change) in changes.items())
+        return Remedy(
+            size=self._size(found.factor, [(load, change.rows[0]) for load, change in changes.values()]),
+            robot=robot,
+            trajectory=with_changed_stiffness(
+                slower, {index: change.rows[:, STEPS] for index, (_, change) in changes.items()}
+            ),
+            slow_down=self._slow_down(found),
+            preload=self._preload(found),
+            stiffness_profile=StiffnessProfile(summaries) if summaries else None,
+        )
+
+    def constants(self) -> Combination:
+        """The smallest constant changes of stiffness that mend the task by themselves.
+
+        Raises:
+            ImpossibleError: there is none for some joint.
+        """
+        changes = for_refused_joints(
+            self.acceptance,
+            self.trajectory,
+            lambda joint, load: constant_change(self.acceptance, joint, load.at(STEPS)),
+        )
+        size = self._size(1.0, [(load.at(STEPS), change) for load, change in changes.values()])
+        return Combination(1.0, {index: change for index, (_, change) in changes.items()}, {}, size)
+
+    def _size(self, factor: float, changes: Iterable[tuple[Load, FloatArray]]) -> float:
+        sizes = [
+            self.cost.of_stiffness(load.command.commanded["stiffness"], change) for load, change in changes
+        ]
+        return math.hypot(self.cost.of_factor(factor), *sizes)
+
+    def _slow_down(self, found: Combination) -> SlowDown | None:
+        return SlowDown(found.factor, self.trajectory.duration) if found.factor > 1 else None
+
+    def _preload(self, found: Combination) -> OtherPreload | None:
+        names = self.acceptance.robot.joint_names
+        preloads = {names[index]: preload for index, preload in found.preloads.items()}
+        return OtherPreload(preloads) if preloads else None
+
+    def confirms(self, remedy: Remedy) -> bool:
+        """Whether a run over the whole of what is suggested keeps margin and limits."""
+        run = Run(remedy.robot, remedy.trajectory, near_singular=self.acceptance.near_singular)
+        for _ in run:
+            pass
+        report = run.report()
+        return report.verdict == "ok" and not any(
+            joint.margin < self.acceptance.near_singular for joint in report.joints
+        )
+
+
+def for_refused_joints(
+    acceptance: Acceptance, trajectory: Trajectory, find: Callable[[Joint, Load], _Found]
+) -> dict[int, tuple[Load, _Found]]:
+    """Load, and what is found for it, of each joint with any step that is not accepted, by index.
+
+    Raises:
+        ImpossibleError: with the reason of each joint for which nothing was found.
+    """
+    refused = np.flatnonzero(acceptance.refused_joints(trajectory)).tolist()
+    found: dict[int, tuple[Load, _Found]] = {}
+    reasons: list[str] = []
+    for index, load in zip(refused, joint_loads(acceptance.robot, trajectory, refused), strict=True):
+        try:
+            found[index] = load, find(acceptance.robot.joints[index], load)
+        except ImpossibleError as error:
+            reasons += error.reasons
+    if reasons:
+        raise ImpossibleError(*reasons)
+    return found
+
+
+def _nearest_change(acceptance: Acceptance, joint: Joint, load: Load) -> Change:
+    """The nearest profile, or the constant if that is nearer."""
+    try:
+        constant = smallest_offset(acceptance, joint, load.at(STEPS))
+    except ImpossibleError:
+        constant = None
+    return nearest_change(acceptance, joint, load, constant)
+
+
+def _summary(joint: Joint, change: Change) -> JointChange:
+    largest = int(np.abs(change.rows[0]).argmax())
+    return JointChange(
+        joint=joint.name,
+        largest=float(change.rows[0, largest]),
+        time=float(change.time[largest]),
+        rms=change.rms,
+        unit=STIFFNESS.unit(joint.type),
+    )
