@@ -102,8 +102,19 @@ def _document(
         content = {"type": "csv", "file": table} if declared is None else declared
         if signal is WRENCH and trajectory.wrench is not None:
             content = {**content, "frame": trajectory.wrench.frame}
-        entries = ", ".join(f"{key}: {json.dumps(value)}" for key, value in content.items())
-        yield f"{signal.key}: {{{entries}}}\n"
+        yield f"{signal.key}: {_in_one_line(content)}\n"
+
+
+def _in_one_line(content: Any) -> str:
+    """Content as YAML in flow style, words without quotes."""
+    match content:
+        case dict():
+            return "{" + ", ".join(f"{key}: {_in_one_line(each)}" for key, each in content.items()) + "}"
+        case list():
+            return "[" + ", ".join(map(_in_one_line, content)) + "]"
+        case str() if content.isidentifier():
+            return content
+    return json.dumps(content)
 
 
 def _write_table(
