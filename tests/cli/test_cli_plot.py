@@ -96,3 +96,11 @@ def test_unknown_format_is_a_usage_error(vsacli, feasible_result):
     done = vsacli("plot", feasible_result, "--format", "gif")
     assert done.code == 2
     assert "'gif' is not one of 'png', 'pdf', 'svg'" in done.err
+
+
+@pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "nonsense"])
+def test_the_backend_of_a_notebook_does_not_matter(tmp_path, feasible_result, backend, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", backend)
+    done = installed("plot", feasible_result, "-o", tmp_path, folder=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert all(line.startswith("wrote ") for line in done.stderr.splitlines())

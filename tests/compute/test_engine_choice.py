@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import re
 import stat
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +15,8 @@ from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 
 from vsacli.base.errors import InputError
-from vsacli.compute.engine import NUMPY, choice, choose
+from vsacli.compute.engine import NUMPY, choice, choose, compiled_engine, compiler
+from vsacli.compute.engine.cache import open_cache
 from vsacli.compute.engine.choice import LOOK_FROM
 from vsacli.compute.engine.compiled_engine import CompiledEngine, _loaded
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
@@ -145,3 +149,78 @@ def test_compiling_repays_neither_for_little_work_nor_for_long_code():
         True,
         False,
     ]
+
+
+# Environments in which "auto" computes with NumPy, and "c" says why it cannot
+
+
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        ("'", r"the environment variable CC is no command: \"'\" \(No closing quotation\)"),
+        pytest.param("cc -ffast-math", "'cc -ffast-math' asks for -ffast-math or", marks=needs_compiler),
+        pytest.param("cc -Ofast", "'cc -Ofast' asks for", marks=needs_compiler),
+        pytest.param("cc -ffinite-math-only", "'cc -ffinite-math-only' asks", marks=needs_compiler),
+    ],
+)
+def test_compiler_that_is_not_taken(command: str, reason: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("CC", command)
+    assert re.search(reason, choose("auto", KERNEL, 10_000_000).reason)
+    with pytest.raises(InputError, match=reason):
+        choose("c", KERNEL, 1)
+
+
+@needs_compiler
+@pytest.mark.parametrize("folder", ["/nonexistent", "/dev/full"])
+def test_without_a_folder_for_temporary_files(folder: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(tempfile, "tempdir", folder)
+    reason = "the folder for temporary files cannot be used: "
+    assert reason in choose("auto", KERNEL, 10_000_000).reason
+    with pytest.raises(InputError, match=reason):
+        choose("c", KERNEL, 1)
+
+
+@needs_compiler
+def test_a_cache_from_which_nothing_may_be_run(monkeypatch: pytest.MonkeyPatch, own_cache: Path):
+    choose("c", KERNEL, 1)
+    genuine = ctypes.CDLL
+
+    def forbidding(path: str) -> ctypes.CDLL:
+        if path.startswith(str(own_cache)):
+            raise OSError("failed to map segment from shared object")
+        return genuine(path)
+
+    monkeypatch.setattr(ctypes, "CDLL", forbidding)
+    _loaded.clear()
+    said: list[str] = []
+    assert choose("c", KERNEL, 1, tell=said.append).reason.startswith("C code computes, compiled now")
+    (sentence,) = said
+    assert sentence.endswith("failed to map segment from shared object; it is compiled anew")
+
+
+@needs_compiler
+def test_what_takes_long_is_announced_and_what_takes_too_long_refused(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(compiled_engine, "LONG_SECONDS", 0.1)
+    said: list[str] = []
+    choose("c", KERNEL, 1, tell=said.append)
+    assert re.fullmatch(r"compiling takes about \d+ s, this once \(at most 120 s\)", said[0])
+    _loaded.clear()
+    monkeypatch.setattr(compiled_engine, "MOST_OPERATIONS", 10)
+    monkeypatch.setenv("CC", "cc -DANOTHER")  # whose code is not in the cache
+    assert "would not repay" in choose("auto", KERNEL, 10_000_000).reason
+    with pytest.raises(InputError, match=r"a step takes \d+ operations, more than the 10 that are compiled"):
+        choose("c", KERNEL, 1)
+
+
+@needs_compiler
+def test_a_compiler_that_hangs_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    program(tmp_path, "slowcc", "exec sleep 60")
+    monkeypatch.setenv("CC", str(tmp_path / "slowcc"))
+    monkeypatch.setattr(compiler, "TIMEOUT", 0.2)
+    assert choose("auto", KERNEL, 10_000_000).reason.endswith("took more than 0.2 s")
+
+
+def test_a_relative_cache_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", "cache")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert open_cache().folder == tmp_path / ".cache" / "vsacli"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from oracles.scalar_vsa import Actuation, Curve, Side, actuation
-from samples.marks import slow_but
+from samples.marks import needs_compiler, slow_but
 from samples.shipped import shipped_run
 
 from vsacli import inverse_dynamics
@@ -18,7 +18,7 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.result import Result
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.joint import Joint
+from vsacli.robot.joint import Inertia, Joint, Link, Pose
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -143,3 +143,20 @@ def test_torques_of_springs_and_motors_add_up():
     peak = np.abs(result.tau_motor).max()
     # A few roundings of the largest term.
     np.testing.assert_allclose(motors.sum(axis=2), result.tau_e, rtol=0, atol=1e-13 * peak)
+
+
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("c", marks=needs_compiler)])
+@pytest.mark.parametrize("shipped", [("measured_1r", "measured_1r"), ("qbmove_arm_manual", "qbmove_arm")])
+def test_a_link_without_mass_asks_for_no_torque(shipped: tuple[str, str], engine: str) -> None:
+    """Its elastic torque is zero at all steps, whatever the motion: the springs then only hold each other."""
+    robot, trajectory = shipped_run(*shipped)
+    last = robot.joints[-1]
+    bare = dataclasses.replace(
+        last, link=Link(mass=0, com=(0, 0, 0), inertia=Inertia(xx=0, yy=0, zz=0)), damping=0
+    )
+    light = dataclasses.replace(robot, joints=(*robot.joints[:-1], bare), tool=Pose())
+    result = inverse_dynamics(light, trajectory, engine=engine)
+    tau_1, tau_2 = result.tau_spring[:, -1].T
+    assert not result.tau_e[:, -1].any()
+    assert np.all(tau_1 > 0)
+    np.testing.assert_allclose(tau_1, -tau_2, rtol=1e-9)  # eps over the margin, as for all deflections

@@ -153,6 +153,11 @@ def interpolated(x: Any) -> Any:
     return value + following * (x - node)
 
 
+def interpolated_at_a_constant(x: Any) -> Any:
+    """A place that does not depend on the sample."""
+    return x + interpolated(np.full_like(x, 0.3))
+
+
 CONTROL_FLOW = (
     square_root,
     swapped,
@@ -163,5 +168,6 @@ CONTROL_FLOW = (
     partly_used,
     counted,
     interpolated,
+    interpolated_at_a_constant,
 )
 """Functions of one value with loops, branches and tables."""

@@ -16,7 +16,7 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, has
 from vsacli.base.variables import Block
-from vsacli.compute.engine import Engine, choose
+from vsacli.compute.engine import Engine, Tell, choose, unheard
 from vsacli.dynamics.energy import RunEnergy
 from vsacli.dynamics.inverse import InverseDynamics, check_fit, compute_block, usual_block
 from vsacli.robot.model import Robot
@@ -47,6 +47,7 @@ class Run:
         threads: of compiled code; as many as there are processors if None.
         asked: names of the variables that the run is for; if recorded signals leave them too uncertain, the
             run is doubtful.
+        tell: learns of the engine what goes wrong before one is found, and what will take long.
 
     Attributes:
         choice: the engine that was chosen, and why.
@@ -68,6 +69,7 @@ class Run:
         engine: str = "numpy",
         threads: int | None = None,
         asked: Collection[str] = (JUDGED,),
+        tell: Tell = unheard,
     ) -> None:
         check_near_singular(near_singular)
         check_fit(robot, trajectory)
@@ -79,7 +81,7 @@ class Run:
         self._deflections = _integrated(deflections, robot, trajectory)
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
         kernel = InverseDynamics(robot, frame, near_singular, integrated=self._deflections is not None)
-        self.choice = choose(engine, kernel, trajectory.samples, threads)
+        self.choice = choose(engine, kernel, trajectory.samples, threads, tell)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
         self._energy = RunEnergy(robot)

@@ -119,6 +119,7 @@ def check_feasibility(
         engine=engine,
         threads=threads,
         asked=("flags",),
+        tell=talk.note,
     )
     if plot_folder is None:
         report = compute(run, talk)

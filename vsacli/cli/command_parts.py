@@ -119,8 +119,6 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> Inputs:
 
 def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
     """Compute block by block; a writer gets each block as it comes, and the report at the end."""
-    for warning in run.choice.warnings:
-        talk.note(warning)
     talk.detail(run.choice.reason)
     with writer or nullcontext(), talk.progress(run.trajectory.samples) as progress:
         for block in run:

@@ -95,6 +95,7 @@ def invdyn(
             engine=engine,
             threads=threads,
             asked=(JUDGED,) if variables is None else variables,
+            tell=talk.note,
         )
         report = compute(run, talk, writer)
         if figures is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import io
+import os
 import sys
 from collections.abc import Mapping, MutableMapping, Sequence
 from contextlib import suppress
@@ -89,6 +90,7 @@ SELDOM = 100_000
 def main() -> NoReturn:
     """Entry point of the command `vsacli`."""
     gc.set_threshold(SELDOM)
+    os.environ["MPLBACKEND"] = "agg"  # a notebook, whose terminal this may be, sets one that is not here
     if isinstance(sys.stdout, io.TextIOWrapper):  # a name may hold letters that the terminal has not
         sys.stdout.reconfigure(errors="backslashreplace")
     with unwinding_when_ended():

@@ -102,7 +102,8 @@ class InverseDynamics:
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74)."""
         links, given = self.links, self.arguments.unpack(rows)
-        torques = links.results.unpack(links(rows[: links.inputs]))
+        demanded = links(rows[: links.inputs])
+        torques = links.results.unpack([_as_row(torque, rows[0]) for torque in demanded])
         of_joints = {**given, **torques}
         drives = [
             drive(
@@ -115,6 +116,11 @@ class InverseDynamics:
         ]
         driven = {name: [getattr(each, name) for each in drives] for name in Drive._fields}
         return self.results.pack({**torques, **{name: _rows(of_all) for name, of_all in driven.items()}})
+
+
+def _as_row(torque: Scalar, row: Scalar) -> Scalar:
+    """Of a joint that moves nothing, the recursion finds a plain zero; the actuator takes rows of samples."""
+    return np.full_like(row, torque) if isinstance(torque, int | float) else torque
 
 
 def compute_block(

@@ -111,8 +111,9 @@ def open_cache() -> Cache:
 
 
 def _cache_folder() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "vsacli"
+    """That of the XDG base directory specification, where a relative path does not count."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    return (base if base.is_absolute() else Path.home() / ".cache") / "vsacli"
 
 
 def key_of(*parts: str) -> str:

@@ -7,17 +7,13 @@ from typing import NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.compute.engine.engines import Engine, Kernel, NumPyEngine, TracedEngine
+from vsacli.compute.engine.engines import Engine, Kernel, NumPyEngine, Tell, TracedEngine, unheard
 
 NAMES = ("numpy", "c", "auto")
 """Engines that may be asked for."""
 
 NUMPY_SECONDS = 0.9e-9
 """What NumPy takes for an operation on a sample."""
-
-COMPILER_START_SECONDS = 0.25
-COMPILER_SECONDS_PER_SQUARE = 2.5e-8
-"""What the compiler takes to start, and for the square of the number of operations."""
 
 LOOK_FROM = 20_000
 """Samples with which it is busy for longer than it takes to see whether there is compiled code."""
@@ -34,15 +30,15 @@ class Choice(NamedTuple):
     Attributes:
         engine: the engine chosen.
         reason: what computes, and why; a clause.
-        warnings: what went wrong before it was found, one sentence each.
     """
 
     engine: Engine
     reason: str
-    warnings: tuple[str, ...] = ()
 
 
-def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) -> Choice:
+def choose(
+    name: str, kernel: Kernel, samples: int, threads: int | None = None, tell: Tell = unheard
+) -> Choice:
     """The engine for a computation.
 
     Args:
@@ -50,6 +46,7 @@ def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) 
         kernel: what is computed.
         samples: over how many samples.
         threads: of compiled code; as many as there are processors if None.
+        tell: learns what goes wrong on the way, and what will take long, before it does.
 
     Raises:
         InputError: there is no engine of that name, or it is "c" and there is no C compiler that works, or
@@ -65,30 +62,29 @@ def choose(name: str, kernel: Kernel, samples: int, threads: int | None = None) 
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
     threads = threads or _processors()
-    warnings: list[str] = []
     try:
-        engine = CompiledEngine(system_compiler(), threads, warnings.append)
+        engine = CompiledEngine(system_compiler(), threads, tell)
         loaded = engine.prepare(kernel, lambda operations: name == "c" or _repays(operations, samples))
     except CompilerError as error:
         if name == "c":
             raise InputError.one(f"{error}; the engine numpy needs none") from error
-        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(warnings))
+        return Choice(_numpy(samples), f"NumPy computes: {error}")
     except NotImplementedError as error:
         if name == "c":
             raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
-        return Choice(_numpy(samples), f"NumPy computes: {error}", tuple(warnings))
+        return Choice(_numpy(samples), f"NumPy computes: {error}")
     if loaded is None:
-        return Choice(
-            _numpy(samples), f"NumPy computes: {samples} samples would not repay compiling", tuple(warnings)
-        )
+        return Choice(_numpy(samples), f"NumPy computes: {samples} samples would not repay compiling")
     when = "now" if loaded.compiled else "before"
-    return Choice(engine, f"C code computes, compiled {when}, in {_counted(threads)}", tuple(warnings))
+    return Choice(engine, f"C code computes, compiled {when}, in {_counted(threads)}")
 
 
 def _repays(operations: int, samples: int) -> bool:
     """Whether NumPy would be busy for longer than the compiler."""
-    compiling = COMPILER_START_SECONDS + COMPILER_SECONDS_PER_SQUARE * operations**2
-    return operations * samples * NUMPY_SECONDS > compiling
+    from vsacli.compute.engine.compiled_engine import MOST_OPERATIONS, compiling_seconds
+
+    repays = operations * samples * NUMPY_SECONDS > compiling_seconds(operations)
+    return repays and operations <= MOST_OPERATIONS
 
 
 def _numpy(samples: int) -> Engine:

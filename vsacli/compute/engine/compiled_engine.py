@@ -10,19 +10,27 @@ from typing import NamedTuple
 
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine.cache import LIBRARY, Cache, CacheError, key_of, open_cache
-from vsacli.compute.engine.compiler import Compiler, Library
-from vsacli.compute.engine.engines import Kernel, kernel_program
+from vsacli.compute.engine.compiler import TIMEOUT, Compiler, CompilerError, Library
+from vsacli.compute.engine.engines import Kernel, Tell, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.tracing import Program, Symbol
-
-Warn = Callable[[str], None]
-"""Receives a warning for the user."""
 
 Worthwhile = Callable[[int], bool]
 """Whether code of so many operations shall be compiled."""
 
 USUAL_ITERATIONS = 5
 """How often a loop is usually repeated."""
+
+
+COMPILER_START_SECONDS = 0.25
+COMPILER_SECONDS_PER_SQUARE = 2.5e-8
+"""What the compiler takes to start, and for the square of the number of operations."""
+
+LONG_SECONDS = 5.0
+"""From which on the user is told before."""
+
+MOST_OPERATIONS = 40_000
+"""Of a program that is compiled, those of 50 joints with cubic springs: gcc takes 40 s for it and 0.6 GB."""
 
 
 class Loaded(NamedTuple):
@@ -38,13 +46,13 @@ class CompiledEngine:
     Args:
         compiler: what compiles.
         threads: how many run at once.
-        warn: learns what is wrong with the cache of compiled code.
+        tell: learns what is wrong with the cache of compiled code, and what will take long.
     """
 
-    def __init__(self, compiler: Compiler, threads: int, warn: Warn) -> None:
+    def __init__(self, compiler: Compiler, threads: int, tell: Tell) -> None:
         self._compiler = compiler
         self._threads = threads
-        self._warn = warn
+        self._tell = tell
         self._loaded: dict[Kernel, Loaded] = {}
 
     def prepare(self, kernel: Kernel, worthwhile: Worthwhile = lambda _operations: True) -> Loaded | None:
@@ -54,7 +62,7 @@ class CompiledEngine:
             CompilerError: it cannot be compiled.
         """
         if kernel not in self._loaded:
-            loaded = _load(kernel, self._compiler, self._warn, worthwhile)
+            loaded = _load(kernel, self._compiler, self._tell, worthwhile)
             if loaded is None:
                 return None
             self._loaded[kernel] = loaded
@@ -66,13 +74,13 @@ class CompiledEngine:
         return self._loaded[kernel].library(rows, self._threads)
 
 
-def _load(kernel: Kernel, compiler: Compiler, warn: Warn, worthwhile: Worthwhile) -> Loaded | None:
+def _load(kernel: Kernel, compiler: Compiler, tell: Tell, worthwhile: Worthwhile) -> Loaded | None:
     """The library of a kernel; None if it is not there and not worth compiling.
 
     Args:
         kernel: what it computes.
         compiler: what compiles it.
-        warn: learns what is wrong with the cache, which is no reason to fail.
+        tell: learns what is wrong with the cache, which is no reason to fail, and what will take long.
         worthwhile: whether to compile so many operations if they are not in the cache.
 
     Raises:
@@ -81,13 +89,34 @@ def _load(kernel: Kernel, compiler: Compiler, warn: Warn, worthwhile: Worthwhile
     source, count = _source(kernel)
     key = key_of(source, compiler.identity)
     if key not in _loaded:
-        cache = _opened(warn)
-        path = None if cache is None else _found(cache, key, warn)
-        if path is not None:
-            _loaded[key] = Loaded(Library(path, kernel.outputs), compiled=False)
+        cache = _opened(tell)
+        kept = None if cache is None else _found(cache, key, kernel.outputs, tell)
+        if kept is not None:
+            _loaded[key] = Loaded(kept, compiled=False)
         elif worthwhile(count):
-            _loaded[key] = Loaded(_built(source, key, kernel.outputs, compiler, cache, warn), compiled=True)
+            _announce(count, tell)
+            _loaded[key] = Loaded(_built(source, key, kernel.outputs, compiler, cache, tell), compiled=True)
     return _loaded.get(key)
+
+
+def compiling_seconds(operations: int) -> float:
+    """What the compiler takes, about."""
+    return COMPILER_START_SECONDS + COMPILER_SECONDS_PER_SQUARE * operations**2
+
+
+def _announce(operations: int, tell: Tell) -> None:
+    """Say that it takes long, if it does.
+
+    Raises:
+        CompilerError: it takes too long.
+    """
+    if operations > MOST_OPERATIONS:
+        raise CompilerError(
+            f"a step takes {operations} operations, more than the {MOST_OPERATIONS} that are compiled"
+        )
+    seconds = compiling_seconds(operations)
+    if seconds > LONG_SECONDS:
+        tell(f"compiling takes about {seconds:.0f} s, this once (at most {TIMEOUT:g} s)")
 
 
 _loaded: dict[str, Loaded] = {}
@@ -112,33 +141,43 @@ def _weight(symbol: Symbol) -> int:
     return operation_count(symbol.operands[0].body) if symbol.operation == "branch" else 1
 
 
-def _opened(warn: Warn) -> Cache | None:
+def _opened(tell: Tell) -> Cache | None:
     try:
         return open_cache()
     except CacheError as error:
-        warn(f"{error}; compiled code is not kept")
+        tell(f"{error}; compiled code is not kept")
         return None
 
 
-def _found(cache: Cache, key: str, warn: Warn) -> Path | None:
+def _found(cache: Cache, key: str, outputs: int, tell: Tell) -> Library | None:
     try:
-        return cache.find(key)
+        path = cache.find(key)
+        return None if path is None else Library(path, outputs)
     except CacheError as error:
-        warn(str(error))
-        return None
+        tell(str(error))
+    except CompilerError as error:  # as in a folder from which nothing may be run
+        tell(f"{error}; it is compiled anew")
+    return None
 
 
 def _built(
-    source: str, key: str, outputs: int, compiler: Compiler, cache: Cache | None, warn: Warn
+    source: str, key: str, outputs: int, compiler: Compiler, cache: Cache | None, tell: Tell
 ) -> Library:
-    with TemporaryDirectory(prefix="vsacli-") as folder:
-        text, library = Path(folder) / "program.c", Path(folder) / LIBRARY
-        text.write_text(source, encoding="utf-8")
-        compiler.build(text, library)
-        loaded = Library(library, outputs)
-        if cache is not None:
-            try:
-                cache.store(key, library)
-            except CacheError as error:
-                warn(f"{error}; compiled code is not kept")
-        return loaded
+    try:
+        with TemporaryDirectory(prefix="vsacli-") as folder:
+            text, library = Path(folder) / "program.c", Path(folder) / LIBRARY
+            text.write_text(source, encoding="utf-8")
+            compiler.build(text, library)
+            loaded = Library(library, outputs)
+            if cache is not None:
+                _keep(cache, key, library, tell)
+            return loaded
+    except OSError as error:
+        raise CompilerError(f"the folder for temporary files cannot be used: {error.strerror}") from None
+
+
+def _keep(cache: Cache, key: str, library: Path, tell: Tell) -> None:
+    try:
+        cache.store(key, library)
+    except CacheError as error:
+        tell(f"{error}; compiled code is not kept")

@@ -26,8 +26,11 @@ NATIVE = "-march=native"
 FLAGS = ("-std=gnu11", "-O2", NATIVE, "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared")
 """None of those that let the compiler assume away NaN, or that change the arithmetic of the whole process."""
 
-TIMEOUT = 300.0
-"""Seconds after which a compiler counts as hanging."""
+TIMEOUT = 120.0
+"""Seconds that a compiler may take."""
+
+LIES = ("__FINITE_MATH_ONLY__ 1", "__FAST_MATH__ 1", "__ASSOCIATIVE_MATH__ 1", "__RECIPROCAL_MATH__ 1")
+"""Macros of options with which NaN goes unnoticed, or arithmetic is no longer what is written."""
 
 SAMPLES_PER_THREAD = 2048
 """Fewer are not worth a thread."""
@@ -69,12 +72,21 @@ def system_compiler() -> Compiler:
     Raises:
         CompilerError: there is none, or it does not work.
     """
-    return _examined(tuple(shlex.split(os.environ.get("CC") or "cc")), os.environ.get("PATH", ""))
+    wanted = os.environ.get("CC") or "cc"
+    try:
+        command = tuple(shlex.split(wanted)) or ("cc",)
+    except ValueError as error:
+        raise CompilerError(f"the environment variable CC is no command: {wanted!r} ({error})") from None
+    return _examined(command, os.environ.get("PATH", ""))
 
 
 @lru_cache(maxsize=4)
 def _examined(command: tuple[str, ...], _path: str) -> Compiler:
     macros = _output([*command, NATIVE, "-dM", "-E", "-x", "c", os.devnull])
+    if any(f"#define {lie}\n" in f"{macros}\n" for lie in LIES):
+        raise CompilerError(
+            f"{shlex.join(command)!r} asks for -ffast-math or the like, under which NaN goes unnoticed"
+        )
     return Compiler(command, "\n".join((macros, *platform.libc_ver(), *FLAGS)))
 
 
@@ -85,8 +97,10 @@ def _output(command: list[str]) -> str:
         )
     except FileNotFoundError:
         raise CompilerError(f"there is no C compiler {command[0]!r}") from None
-    except (OSError, subprocess.TimeoutExpired) as error:
+    except OSError as error:
         raise CompilerError(f"the C compiler {command[0]!r} cannot be run: {error}") from None
+    except subprocess.TimeoutExpired:
+        raise CompilerError(f"the C compiler {command[0]!r} took more than {TIMEOUT:g} s") from None
     if done.returncode:
         lines = done.stderr.strip().splitlines() or [f"it ended with {done.returncode} and no message"]
         raise CompilerError(f"the C compiler {command[0]!r} fails: {lines[0]}")

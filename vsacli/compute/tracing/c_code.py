@@ -266,5 +266,6 @@ def _kinds_of_operands(symbol: Symbol) -> list[Kind]:
         return [Kind.TRUTH, symbol.kind, symbol.kind]
     if symbol.operation == "bits":
         return [Kind.TRUTH, Kind.BITS]
-    kind = next(operand.kind for operand in symbol.operands if isinstance(operand, Symbol))
+    of_constants = Kind.INDEX if symbol.operation == "take" else Kind.REAL
+    kind = next((operand.kind for operand in symbol.operands if isinstance(operand, Symbol)), of_constants)
     return [kind] * len(symbol.operands)
