@@ -61,6 +61,15 @@ def test_a_new_trajectory_suits_every_robot_that_comes_along(path: Path, tmp_pat
     assert report_of(robot, trajectory_template(robot), tmp_path).verdict == "ok"
 
 
+@pytest.mark.parametrize("joints", ["R", "P"])
+@pytest.mark.parametrize("limits", [(-0.436332, 0.436332), (0.5, 0.6), (-3.01, -2.99), (0.12344, 1)])
+def test_a_new_trajectory_is_not_rounded_beyond_limits(
+    joints: str, limits: tuple[float, float], tmp_path: Path
+) -> None:
+    robot = robot_of(robot_template(joints), tmp_path).replace("joints.0.limits.position", limits)
+    assert report_of(robot, trajectory_template(robot), tmp_path).verdict == "ok"
+
+
 def torque_steps(robot: Robot, text: str, folder: Path) -> list[float]:
     """The jump of each motor torque at the start."""
     return [abs(step) for joint in report_of(robot, text, folder).joints for step in joint.torque_step]

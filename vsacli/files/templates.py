@@ -132,7 +132,12 @@ def _position(robot: Robot) -> Values:
 
 
 def _written(joint: Joint, position: float) -> str:
-    return f"{math.degrees(position):.3g} deg" if joint.is_revolute else f"{position:.3g}"
+    """The position in a few digits; in all, if fewer would round it beyond a limit."""
+    low, high = joint.limits.position
+    shown, unit = (math.degrees(position), " deg") if joint.is_revolute else (position, "")
+    short = f"{shown:.3g}"
+    value = math.radians(float(short)) if joint.is_revolute else float(short)
+    return f"{short}{unit}" if low <= value <= high else repr(position)
 
 
 def _way(joint: Joint) -> tuple[float, float]:

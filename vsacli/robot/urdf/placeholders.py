@@ -4,6 +4,7 @@ A joint carries the links beyond it at a distance from its axis. Bounds of these
 configurations give a bound I of the inertia about the axis, and with the mass m the torque
 g sqrt(m I), which by Schwarz's inequality is at least that of gravity, however the arm stands and the axis
 points. So also the springs of a vertical axis, which gravity does not load, fit the arm that they accelerate.
+To this comes what the joint's damping asks for in a slow motion.
 """
 
 from __future__ import annotations
@@ -19,6 +20,10 @@ from vsacli.robot.urdf.serial_chain import STANDARD_GRAVITY, ChainJoint
 
 DEFLECTION = {True: 0.1, False: 0.01}
 """By how much the largest load deflects the springs of a revolute (rad) and of a prismatic (m) joint."""
+
+SLOW = {True: 1.0, False: 0.2}
+"""Velocity of a slow motion, rad/s and m/s, which the springs carry the damping of; that of wrists in URDF
+files exceeds their weight many times."""
 
 HARDENING = 0.05
 """k_c/k times the square of this deflection; gives the k_c/k of 5 rad^-2 that the paper's springs have."""
@@ -77,15 +82,15 @@ class Placeholders(NamedTuple):
 
 
 class JointLoad(NamedTuple):
-    """What a joint carries at most: mass, and inertia about its axis; again the mass if it is prismatic."""
+    """What a joint carries at most.
 
-    mass: float
+    Attributes:
+        torque: of weight and damping, N m (N).
+        inertia: about its axis, kg m^2 (the mass, kg).
+    """
+
+    torque: float
     inertia: float
-
-    @property
-    def torque(self) -> float:
-        """Weight at the radius of gyration, N m; of a prismatic joint the weight, N."""
-        return STANDARD_GRAVITY * math.sqrt(self.mass * self.inertia)
 
     @property
     def is_there(self) -> bool:
@@ -148,7 +153,9 @@ def joint_loads(
     for joint, row, link in zip(reversed(joints), reversed(rows), reversed(links), strict=True):
         radius, height = _centre(row, link)
         about_axis = beyond.farther(abs(row.a)).joined(link, radius)
-        loads.append(JointLoad(about_axis.mass, about_axis.second if joint.is_revolute else about_axis.mass))
+        inertia = about_axis.second if joint.is_revolute else about_axis.mass
+        weight = STANDARD_GRAVITY * math.sqrt(about_axis.mass * inertia)
+        loads.append(JointLoad(weight + SLOW[joint.is_revolute] * joint.urdf.damping, inertia))
         strokes = (0.0,) if joint.is_revolute else joint.urdf.limit.position or (0.0,)
         length = math.hypot(row.a, max(abs(row.d + stroke) for stroke in strokes))
         distance = math.hypot(radius, max(abs(row.d + height + stroke) for stroke in strokes))
