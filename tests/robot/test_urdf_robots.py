@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.metadata
 import re
 from collections.abc import Iterator, Mapping
@@ -19,6 +20,7 @@ from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.files.templates import trajectory_template
+from vsacli.robot.plausibility import implausible
 from vsacli.robot.urdf import Conversion, import_urdf
 from vsacli.robot.urdf.link_tree import MOVING, Urdf, below
 from vsacli.robot.urdf.reader import read_urdf
@@ -68,6 +70,8 @@ def check(path: Path, conversion: Conversion, held: Mapping[str, float] | None =
     expected = np.array([oracle(path).torques(joints, *row, held) for row in zip(q, dq, ddq, strict=True)])
     np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND * np.abs(expected).max())
     assert conversion.residual.position < BOUND
+    # The rules on plausible numbers find nothing, even if the placeholders are taken for real.
+    assert implausible(dataclasses.replace(robot, placeholder=False).facts, ()) == ()
 
 
 def ends(urdf: Urdf) -> Iterator[str]:

@@ -447,6 +447,15 @@ FURTHER = [
 
 REST = [
     Slip(
+        "N mm/rad^3 as k_c",
+        "vsa_3r",
+        "rest_to_rest",
+        {"k_c: 2000": "k_c: 2000e3"},
+        "early hardening of springs",
+        "actuator.spring",
+        "",
+    ),
+    Slip(
         "a gear ratio left out",
         "scara_4",
         "scara_4",

@@ -19,7 +19,8 @@ from vsacli.documents.reading import read_document
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
-from vsacli.trajectory.plausibility import Facts, implausible
+from vsacli.trajectory.plausibility import implausible
+from vsacli.trajectory.plausibility.facts import Facts
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes, uniform_times_over
 from vsacli.trajectory.trajectory import Trajectory

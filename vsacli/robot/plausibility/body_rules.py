@@ -107,7 +107,9 @@ def _gravity(facts: Facts) -> Measured:
 
 
 def _gravities(facts: Facts) -> Iterator[Measured]:
-    yield _gravity(facts)
+    """Its size, unless there is none, as in space."""
+    if any(facts.gravity):
+        yield _gravity(facts)
 
 
 def _unit_vectors(facts: Facts) -> Iterator[Measured]:
@@ -245,12 +247,13 @@ BODY_RULES: tuple[Rule[Facts], ...] = (
         name="size of gravity",
         fields="`gravity`",
         measure=_gravities,
-        size="m/s^2",
+        size="m/s^2, if there is any",
+        low=0.02,
         high=30,
         usual=9.81,
-        finding="is more than that of any planet",
-        reason="on Jupiter it is 25",
-        slips=(Slip("mm/s^2", 1e-3), Slip("cm/s^2", 1e-2), Slip("ft/s^2", 0.3048)),
+        finding="is that of no planet or moon",
+        reason="on Jupiter it is 25, on Ceres 0.28",
+        slips=(Slip("mm/s^2", 1e-3), Slip("km/s^2", 1e3), Slip("cm/s^2", 1e-2), Slip("ft/s^2", 0.3048)),
     ),
     Rule(
         name="gravity as a direction",

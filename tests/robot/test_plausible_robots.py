@@ -1,0 +1,130 @@
+"""What is small, large, fast or weightless may be meant: no rule on plausible numbers finds anything."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samples.command_line import REPOSITORY, edited
+from samples.robots import random_joint
+
+from vsacli import DenavitHartenberg, Inertia, Joint, Limits, Link, Motor, Robot, load_robot
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.laws import Cubic, Exponential, Quadratic
+from vsacli.actuators.rigid import Rigid
+from vsacli.files.templates import robot_template
+
+
+def rod(mass: float, length: float, radius: float) -> Link:
+    """A rod along the x axis of its frame, which is at its far end."""
+    along, across = mass * radius**2 / 2, mass * (3 * radius**2 + length**2) / 12
+    return Link(mass=mass, com=(-length / 2, 0, 0), inertia=Inertia(xx=along, yy=across, zz=across))
+
+
+def arm(count: int, mass: float, length: float, radius: float, actuator, gravity=(0, 0, -9.81)) -> Robot:
+    """Rods one after the other, all alike."""
+    joints = tuple(
+        Joint(
+            name=f"joint_{number}",
+            type="revolute",
+            dh=DenavitHartenberg(a=length, alpha=0),
+            link=rod(mass, length, radius),
+            actuator=actuator,
+        )
+        for number in range(count)
+    )
+    return Robot(name="arm", gravity=gravity, joints=joints)
+
+
+def pair(motor: Motor, spring) -> Antagonistic:
+    return Antagonistic(motor=(motor, motor), spring=(spring, spring))
+
+
+MEANT = {
+    "a finger of three phalanges of 10 g": arm(
+        3, 0.01, 0.03, 0.006, pair(Motor(inertia=2e-6, max_torque=0.2), Exponential(c=0.02, a=8))
+    ),
+    "a finger of 1 g": arm(
+        2, 1e-3, 0.01, 0.002, Rigid(motor=Motor(inertia=3e-9, gear_ratio=256, max_torque=1e-4))
+    ),
+    "an excavator": arm(
+        3,
+        500,
+        3.0,
+        0.2,
+        pair(Motor(inertia=60, damping=2e3, max_torque=2e5), Cubic(k=2e5, k_c=2e6)),
+    ),
+    "a space manipulator": arm(
+        6, 60, 3.5, 0.15, Elastic(motor=Motor(inertia=1e-3, gear_ratio=1800), stiffness=1e5), (0, 0, 0)
+    ),
+    "on the Moon": arm(2, 5, 0.4, 0.05, Rigid(motor=Motor(inertia=0.5)), (0, 0, -1.62)),
+    "direct drive": arm(2, 3, 0.35, 0.04, Rigid(motor=Motor(inertia=8e-3, gear_ratio=1, max_velocity=50))),
+    "stiff gears on a light arm": arm(
+        1, 1.0, 0.3, 0.02, Elastic(motor=Motor(inertia=3e-5, gear_ratio=160), stiffness=1e4)
+    ),
+    "springs without stiffness at rest": arm(2, 1.0, 0.2, 0.02, pair(Motor(inertia=0.05), Quadratic(k=80))),
+    "a leg in a wheel": arm(1, 0.2, 0.1, 0.05, Rigid(motor=Motor(inertia=1e-3, max_velocity=40))),
+    "a snake of 30 modules": arm(30, 0.3, 0.08, 0.03, Rigid(motor=Motor(inertia=2e-6, gear_ratio=300))),
+}
+
+
+@pytest.mark.parametrize("robot", MEANT.values(), ids=MEANT)
+def test_extremes_that_are_built(robot):
+    assert robot.warnings == ()
+
+
+def test_ranges_that_are_meant():
+    robot = MEANT["an excavator"]
+    for limits in (
+        Limits(position=(-20 * np.pi, 20 * np.pi)),
+        Limits(position=(-1e9, 1e9), velocity=(-1e3, 1e3)),
+        Limits(position=(-12.5, 12.5), velocity=(-50, 50)),
+    ):
+        joints = tuple(Joint(**{**vars(joint), "limits": limits}) for joint in robot.joints)
+        assert Robot(name="arm", joints=joints).warnings == ()
+
+
+@pytest.mark.parametrize("actuator", ["antagonistic", "elastic", "rigid"])
+@pytest.mark.parametrize("joints", ["R", "P", "RRPR"])
+def test_templates_whose_placeholders_are_taken_for_real(joints, actuator, tmp_path):
+    path = tmp_path / "arm.yaml"
+    path.write_text(robot_template(joints, actuator).replace("placeholder: true", "placeholder: false"))
+    assert load_robot(path).warnings == ()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_random_robots_of_other_tests(seed):
+    rng = np.random.default_rng(seed)
+    joints = tuple(random_joint(rng, f"joint_{number}", letter) for number, letter in enumerate("RPRRP"))
+    assert Robot(name="random", joints=joints).warnings == ()
+
+
+@pytest.mark.parametrize(("column", "factor", "rule"), [(0, 57.3, "half a turn"), (1, 1000, "N mm/rad")])
+def test_a_table_of_a_spring_in_other_units(column, factor, rule, tmp_path):
+    text = (REPOSITORY / "robots" / "measured_spring.csv").read_text()
+    rows = [line.split(",") for line in text.splitlines() if line and line[0] in "-0123456789"]
+    table = [
+        [repr(float(cell) * (factor if each == column else 1)) for each, cell in enumerate(row)]
+        for row in rows
+    ]
+    (tmp_path / "measured_spring.csv").write_text("\n".join(["deflection,torque", *map(",".join, table)]))
+    path = edited(REPOSITORY / "robots" / "measured_1r.yaml", tmp_path / "arm.yaml")
+    assert any(rule in warning for warning in load_robot(path).warnings)
+
+
+def test_hostile_numbers_are_judged_without_an_error(tmp_path):
+    text = Path(REPOSITORY / "robots" / "vsa_3r.yaml").read_text()
+    path = tmp_path / "arm.yaml"
+    for right, wrong in (
+        ("mass: 6.7858", "mass: 1e-300"),
+        ("mass: 6.7858", "mass: 1e30"),
+        ("a: 0.30", "a: 1e30"),
+        ("alpha: pi/2", "alpha: -1e30"),
+        ("k: 400, k_c: 2000", "k: 1e-30, k_c: 1e30"),
+        ("inertia: 3.20", "inertia: 1e-30"),
+        ("[0, 0, -9.81]", "[1e30, 0, 1e30]"),
+    ):
+        path.write_text(text.replace(right, wrong))
+        assert load_robot(path).warnings, wrong
