@@ -48,7 +48,8 @@ def new() -> None:
 def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk: Talk) -> None:
     """Write a robot file with these joints, to be edited.
 
-    It can be computed with as it is. Each key has a comment; what is optional stands commented out.
+    It can be computed with as it is. Each key has a comment; what is optional stands commented out. Reports
+    say that its springs and motors are made up until the key `placeholder` is removed.
     """
     from vsacli.files.templates import robot_template
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
@@ -32,28 +31,26 @@ class HeldJoint(NamedTuple):
     position: float
     leader: str
 
+    @property
+    def follows(self) -> bool:
+        """Whether another joint takes it where it stands."""
+        return self.leader != self.urdf.name
+
     def __str__(self) -> str:
-        following = "" if self.leader == self.urdf.name else f" (follows {self.leader})"
+        following = f" (follows {self.leader})" if self.follows else ""
         return f"{self.urdf.name} at {self.position:.6g} {self.urdf.unit()}{following}"
 
     def warnings(self) -> Iterator[str]:
         """That it may not stand where it should, and how to mend that."""
-        mimic = self.urdf.mimic
-        if mimic is not None and self.leader == self.urdf.name:
+        mimic, limit = self.urdf.mimic, self.urdf.limit.position
+        if mimic is not None and not self.follows and self.position == _resting(self.urdf):
             reason = f"there is no joint {quoted(mimic.leader)}, which it should follow (<mimic>)"
             yield f"{self}: {reason}; if it stands elsewhere, say so by --hold {self.leader}=VALUE"
-        if not self._within_limits:
-            low, high = self.urdf.limit.position or (-math.inf, math.inf)
-            value = f"{max(low, min(high, self.position)):.6g}" if self.leader == self.urdf.name else "VALUE"
+        if limit is not None and not limit[0] - LIMIT_ROUNDING <= self.position <= limit[1] + LIMIT_ROUNDING:
+            low, high = limit
+            value = "VALUE" if self.follows else f"{max(low, min(high, self.position)):.6g}"
             limits = f"is outside its limits, {low:.6g} to {high:.6g} {self.urdf.unit()}"
             yield f"{self} {limits}; hold it elsewhere by --hold {self.leader}={value}"
-
-    @property
-    def _within_limits(self) -> bool:
-        if self.urdf.limit.position is None:
-            return True
-        low, high = self.urdf.limit.position
-        return low - LIMIT_ROUNDING <= self.position <= high + LIMIT_ROUNDING
 
 
 def held_joints(

@@ -83,8 +83,8 @@ def _robot(
 
 
 def _description(path: str, chain: SerialChain) -> str:
-    """Where the robot comes from; that joints do not stand at zero can be seen nowhere else in it."""
-    held = [f", {each}" for each in chain.held if each.position != 0]
+    """Where the robot comes from, and which joints stand elsewhere than at zero without following others."""
+    held = [f", {each}" for each in chain.held if each.position != 0 and not each.follows]
     origin = f"converted from {os.path.basename(path)}, from link {chain.base} to link {chain.tip}"
     return f"{origin}{''.join(held)}"
 
