@@ -15,6 +15,7 @@ from vsacli.base.atomic_files import already_there, check_target, reporting_stor
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.staging import remove, staging_name, sweep
+from vsacli.base.streams import STANDARD
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,8 @@ class Outputs:
                 and was not asked for, or cannot be written.
             InputError: the command reads it, or writes another file of this name.
         """
+        if str(path) == STANDARD:
+            raise InputError.one("standard output cannot hold this; name a file", path)
         with reporting_storage_errors(path):
             target = Path(os.path.realpath(path))
         if any(target == each.target for each in self._files):

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from vsacli.base.errors import InputError
-from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk
+from vsacli.base.streams import STANDARD
+from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -143,7 +144,8 @@ def refuse_input_as_output(output: Path, inputs: Iterable[str | Path]) -> None:
 
 def run_stem(robot_path: str, trajectory_path: str) -> str:
     """What the files of a run are called after, unless the user says otherwise."""
-    return f"{Path(robot_path).stem}-{Path(trajectory_path).stem}"
+    stems = ("stdin" if path == STANDARD else Path(path).stem for path in (robot_path, trajectory_path))
+    return "-".join(stems)
 
 
 def result_line(result: StoredResult) -> str:
@@ -156,8 +158,8 @@ def show_report(report: Report, as_json: bool, suggestions: Suggestions | None =
     """Print the report, and suggestions if there are; the exit code says what the report says."""
     if as_json:
         extra = {} if suggestions is None else {"suggestions": suggestions.as_json()}
-        click.echo(json.dumps({**report.as_json(), **extra}, indent=1))
+        say(json.dumps({**report.as_json(), **extra}, indent=1))
     else:
         texts = [str(report)] if suggestions is None else [str(report), str(suggestions)]
-        click.echo("\n".join(texts))
+        say("\n".join(texts))
     return EXIT_OF_VERDICT[report.verdict]

@@ -38,6 +38,7 @@ class Exit(enum.IntEnum):
     STORAGE = 4, "a file cannot be read or written (disk full, permission); the target is untouched"
     HUNG_UP = 129, "ended by SIGHUP, as when a terminal is closed; the target is untouched"
     INTERRUPTED = 130, "interrupted; the target is untouched"
+    CUT_OFF = 141, "data on standard output was cut off: its reader has gone, as `head` does"
     TERMINATED = 143, "ended by SIGTERM, as batch systems do; the target is untouched"
 
     def __new__(cls, code: int, meaning: str) -> Self:
@@ -71,6 +72,14 @@ def tell(message: str) -> None:
     """Print a message on stderr; a run does not fail because nobody can read it."""
     with suppress(OSError):
         click.echo(for_terminal(message), err=True)
+
+
+def say(report: str) -> None:
+    """Print what the exit code says as well; a reader that has gone has read enough of it."""
+    try:
+        click.echo(report)
+    except OutputClosedError:
+        _discard_buffer(sys.stdout)
 
 
 @dataclass(frozen=True)

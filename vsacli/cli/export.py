@@ -8,6 +8,7 @@ from typing import Any, TextIO
 import click
 
 from vsacli.base.errors import StorageError
+from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
@@ -67,7 +68,7 @@ def export(
     try:
         with open_stored(file) as stored:
             talk.detail(result_line(stored))
-            if output is None:
+            if output is None or output == STANDARD:
                 export_csv(stored, _stdout(), variables, **options)
                 sys.stdout.flush()
             else:

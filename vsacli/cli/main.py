@@ -115,7 +115,7 @@ def run(arguments: Sequence[str]) -> int:
     except InputError as error:
         return _fail(str(error), Exit.USAGE)
     except OutputClosedError:
-        return Exit.STORAGE
+        return Exit.CUT_OFF
     except StorageError as error:
         return _fail(str(error), Exit.STORAGE)
     except Exception:

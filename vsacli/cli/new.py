@@ -7,6 +7,7 @@ from collections.abc import Iterable
 import click
 
 from vsacli.actuators.kinds import ACTUATORS
+from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 
@@ -80,7 +81,7 @@ def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk
 
 
 def _write(text: str, output: str | None, overwrite: bool, talk: Talk, inputs: Iterable[str] = ()) -> None:
-    if output is None:
+    if output is None or output == STANDARD:
         click.echo(text, nl=False)
         return
     from vsacli.base.outputs import Outputs

@@ -25,7 +25,7 @@ from vsacli.cli.command_parts import (
     run_stem,
     trajectory_argument,
 )
-from vsacli.cli.console import Exit, Talk, talk_options
+from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.plot import draw_staged
 
 if TYPE_CHECKING:
@@ -235,5 +235,5 @@ def _run(
 
 
 def _show(report: SimulationReport, as_json: bool) -> Exit:
-    click.echo(json.dumps(report.as_json(), indent=1) if as_json else str(report))
+    say(json.dumps(report.as_json(), indent=1) if as_json else str(report))
     return Exit.OK if report.verdict == "ok" else Exit.VERDICT

@@ -13,6 +13,7 @@ from typing import NamedTuple, NoReturn
 
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.streams import STANDARD, place_of
 
 MAX_DOCUMENT_BYTES = 1_000_000
 """Size up to which a text document is read, and up to which the text of any input is kept."""
@@ -48,7 +49,7 @@ def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTE
     """
     name = os.fspath(path)
     check_input_file(name, max_bytes)
-    with _refusing(name), open(name, "rb") as file:
+    with _refusing(name), open(place_of(name), "rb") as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:  # grew since its size was looked up
         raise _too_large(name, len(content), max_bytes)
@@ -56,6 +57,20 @@ def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTE
         raise InputError.one("the file is empty", name)
     text = decode_utf8(content, name)
     return Source(name, hashlib.sha256(content).hexdigest(), text), text
+
+
+def is_table(path: str | os.PathLike[str]) -> bool:
+    """Whether a file is a CSV table rather than a document: by its name, or by how standard input begins.
+
+    Raises:
+        InputError: standard input cannot be read.
+    """
+    name = os.fspath(path)
+    if name != STANDARD:
+        return name.lower().endswith(".csv")
+    with _refusing(name), open(place_of(name), encoding="utf-8-sig", errors="replace") as file:
+        first = next((line for line in file if line.strip() and not line.startswith("#")), ":")
+    return ":" not in first  # a document begins with a key
 
 
 def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize) -> None:
@@ -66,13 +81,13 @@ def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize)
     """
     name = os.fspath(path)
     with _refusing(name):
-        status = os.stat(name)
+        status = os.stat(place_of(name))
     if stat.S_ISDIR(status.st_mode):
         raise InputError.one("is a directory, expected a file", name)
     if not stat.S_ISREG(status.st_mode):
         raise InputError.one("is no regular file (a device, pipe or socket)", name)
     if status.st_size > max_bytes:
-        with _refusing(name), open(name, "rb") as file:
+        with _refusing(name), open(place_of(name), "rb") as file:
             start = file.read(len(HDF5_SIGNATURE))
         _refuse_hdf5(start, name)
         raise _too_large(name, status.st_size, max_bytes)

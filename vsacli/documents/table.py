@@ -18,6 +18,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.streams import place_of
 from vsacli.documents.source import MAX_DOCUMENT_BYTES, Source, check_input_file, decode_utf8
 
 MAX_BYTES = 10_000_000_000
@@ -82,7 +83,7 @@ class Lines:
     @cached_property
     def _numbers(self) -> IndexArray:
         try:
-            with open(self.path, encoding="utf-8-sig", errors="replace") as file:
+            with open(place_of(self.path), encoding="utf-8-sig", errors="replace") as file:
                 numbers = [number for number, _ in _rows(file, self.header_line)]
         except OSError:
             numbers = []
@@ -110,7 +111,7 @@ def read_table(path: str | os.PathLike[str]) -> Table:
     name = os.fspath(path)
     check_input_file(name, MAX_BYTES)
     try:
-        with open(name, "rb") as content:
+        with open(place_of(name), "rb") as content:
             header = _read_header(content, name)
             digest, text = _survey(content, name)
         values = _read_rows(header, name)
@@ -180,7 +181,7 @@ def _read_rows(header: _Header, name: str) -> FloatArray:
         warnings.simplefilter("error", UserWarning)  # NumPy's way to say that there are no rows
         try:
             values = np.loadtxt(
-                os.path.abspath(name),
+                os.path.abspath(place_of(name)),
                 delimiter=header.separator,
                 comments=COMMENT,
                 encoding="latin-1",  # comments may be anything; numbers are ASCII
@@ -198,7 +199,7 @@ def _row_problems(header: _Header, name: str) -> list[Problem]:
     """The first problem of each kind, saying how many there are like it."""
     alike: dict[str, list[Problem]] = {}
     empty = True
-    with open(name, encoding="utf-8-sig", errors="replace") as file:
+    with open(place_of(name), encoding="utf-8-sig", errors="replace") as file:
         for number, line in _rows(file, header.line):
             empty = False
             for kind, message in _cell_problems(line, header):

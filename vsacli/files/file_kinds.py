@@ -13,10 +13,11 @@ from typing import Any
 
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
+from vsacli.base.streams import place_of
 from vsacli.control import poles
 from vsacli.documents import tree
 from vsacli.documents.json_schema import json_schema
-from vsacli.documents.source import HDF5_SIGNATURE, Problems, check_input_file, read_source
+from vsacli.documents.source import HDF5_SIGNATURE, Problems, check_input_file, is_table, read_source
 from vsacli.documents.yaml_tree import parse_yaml
 from vsacli.robot import file as robot_file
 from vsacli.trajectory import file as trajectory_file
@@ -77,7 +78,7 @@ def recognise(path: str | os.PathLike[str]) -> FileKind:
     suffix = Path(path).suffix.lower()
     if start.startswith(HDF5_SIGNATURE) or suffix == ".h5":
         return _stored_kind(path)
-    if suffix == ".csv":
+    if is_table(path):
         return FileKind.TABLE
     if start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
         return FileKind.URDF
@@ -86,7 +87,7 @@ def recognise(path: str | os.PathLike[str]) -> FileKind:
 
 def _beginning(path: str | os.PathLike[str]) -> bytes:
     try:
-        with open(path, "rb") as file:
+        with open(place_of(path), "rb") as file:
             return file.read(_BEGINNING_BYTES)
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror}", os.fspath(path)) from None

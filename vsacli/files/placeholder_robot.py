@@ -19,6 +19,7 @@ from vsacli.base.signals import COMMANDED
 from vsacli.documents import tree
 from vsacli.documents.fields import IDENTIFIER
 from vsacli.documents.reading import survey_document
+from vsacli.documents.source import is_table
 from vsacli.documents.table import read_table
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
 from vsacli.robot.model import Robot
@@ -49,7 +50,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     Raises:
         InputError: the file, or a CSV file that it names, cannot be read.
     """
-    if Path(path).suffix.lower() == ".csv":
+    if is_table(path):
         columns = read_table(path).columns
         names = _of_columns(columns) or _numbered(1)
         return PlaceholderRobot(_robot(names, _with_stiffness(columns, names)), ordered=True)

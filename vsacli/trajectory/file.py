@@ -16,6 +16,7 @@ from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
 from vsacli.documents.plausibility import numbers
 from vsacli.documents.reading import read_document
+from vsacli.documents.source import is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
@@ -134,7 +135,7 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     check_path(path, "load_trajectory(path, robot)")
     check_robot(robot)
     joints = CommandedJoints.of(robot)
-    if Path(path).suffix.lower() == ".csv":
+    if is_table(path):
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
         return recorded_trajectory(path, joints)
