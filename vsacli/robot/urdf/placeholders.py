@@ -29,8 +29,8 @@ HARDENING = 0.05
 """k_c/k times the square of this deflection; gives the k_c/k of 5 rad^-2 that the paper's springs have."""
 
 MOTOR_SHARE = 0.5
-"""Inertia of each motor relative to the largest that the joint carries. At the shoulders of the arms that come
-along after the Panda, the UR5 and the LWR it is 0.1 to 0.9; it grows towards their wrists."""
+"""Inertia of each motor relative to the largest that the joint carries. At the shoulders of the shipped arms
+after the Panda, the UR5 and the LWR it is 0.1 to 0.9; it grows towards their wrists."""
 
 DIGITS = 2
 """To which the constants are rounded; they are made up, and should look so."""
