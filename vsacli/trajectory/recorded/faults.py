@@ -1,0 +1,233 @@
+"""What is wrong with a column of samples: outliers, frozen and saturated stretches, wrapped angles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.trajectory.recorded.grain import ORDER, Grain
+from vsacli.trajectory.recorded.thresholds import (
+    ABRUPT_SHARE,
+    END_SAMPLES,
+    END_SHARE,
+    FIT_DEVIATIONS,
+    FROZEN_AT_END_STEPS,
+    FROZEN_STEPS,
+    JUMP_SHARE,
+    LEAST_SHARE,
+    MARGIN,
+    MOST_EVENTS,
+    MOST_TOGETHER,
+    NOISE_DEVIATIONS,
+    POLYNOMIAL,
+    QUANTA,
+    SATURATED_STEPS,
+    SPEED_SAMPLES,
+    WRAP_TOLERANCE,
+)
+
+END_WEIGHTS = np.append(1.0, -np.vander([0.0], 4) @ np.linalg.pinv(np.vander(np.arange(1.0, 11.0), 4)))
+"""Of a sample and the next ten, for the error of the prediction by a cubic through these."""
+
+
+@dataclass(frozen=True, eq=False)
+class Faults:
+    """Samples, or stretches of them, that are not what a sensor of a moving robot gives.
+
+    Attributes:
+        first: index of each, or of the first sample of each stretch, ascending; at least one.
+        last: of the last sample of each stretch.
+        sizes: how bad each is: what a sample is off by, how long a stretch lasts in s.
+    """
+
+    first: IndexArray
+    last: IndexArray
+    sizes: FloatArray
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.first)
+
+    @property
+    def worst(self) -> int:
+        """Which is the worst."""
+        return int(np.argmax(self.sizes))
+
+
+def outliers(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:
+    """Samples, or up to three together, that a smooth curve through their neighbours misses by far."""
+    size = np.abs(grain.differences)
+    centres = np.arange(len(size)) + ORDER // 2
+    off = size > np.maximum(NOISE_DEVIATIONS * grain.noise_at(centres), QUANTA * grain.quantum)
+    events = _events(centres[off], size[off])
+    isolated = [_isolated(time, values, event, grain) for event in events]
+    found = dict(_at_ends(values, grain))
+    for event, samples in zip(events, isolated, strict=True):
+        alike = [there for other, there in zip(events, isolated, strict=True) if 3 * other.size >= event.size]
+        if len(list(filter(None, alike))) >= LEAST_SHARE * len(alike):
+            found.update(samples)
+    if not found:
+        return None
+    where = np.array(sorted(found))
+    return Faults(where, where, np.array([found[sample] for sample in where.tolist()]))
+
+
+class _Event(NamedTuple):
+    """Samples first to last that have to do with differences that are too large, and the largest of those."""
+
+    first: int
+    last: int
+    size: float
+
+
+def _events(centres: IndexArray, size: FloatArray) -> list[_Event]:
+    """The largest."""
+    if not centres.size:
+        return []
+    starts = np.flatnonzero(np.append(True, np.diff(centres) > ORDER))
+    stops = np.append(starts[1:], len(centres)) - 1
+    largest = np.maximum.reduceat(size, starts)
+    chosen = np.argsort(-largest, kind="stable")[:MOST_EVENTS]
+    firsts, lasts = centres[starts[chosen]] - ORDER // 2, centres[stops[chosen]] + ORDER // 2
+    return list(map(_Event, firsts.tolist(), lasts.tolist(), largest[chosen].tolist()))
+
+
+def _at_ends(values: FloatArray, grain: Grain) -> Iterator[tuple[int, float]]:
+    """The first and the last sample if the next ones predict it far worse than they do each other."""
+    for end, inward in ((0, values), (len(values) - 1, values[::-1])):
+        if len(values) < 2 * END_SAMPLES:
+            continue
+        near = sliding_window_view(inward[: END_SAMPLES + len(END_WEIGHTS)], len(END_WEIGHTS))
+        error, *others = np.abs(near @ END_WEIGHTS)
+        noise = max(NOISE_DEVIATIONS * float(grain.noise_at(np.array([end]))[0]), QUANTA * grain.quantum)
+        if error > max(END_SHARE * max(others), noise * float(np.linalg.norm(END_WEIGHTS))):
+            yield end, float(error)
+
+
+def _isolated(
+    time: FloatArray, values: FloatArray, event: _Event, grain: Grain
+) -> list[tuple[int, float]]:
+    """The samples without which all near them lie on a polynomial, and by what they are off; mostly none."""
+    if event.last - event.first > 2 * ORDER + MOST_TOGETHER:
+        return []
+    first, last = max(0, event.first - MARGIN), min(len(values) - 1, event.last + MARGIN)
+    near, kept = values[first : last + 1], np.ones(last + 1 - first, dtype=bool)
+    noise = float(grain.noise_at(np.array([event.first]))[0])
+    least = max(NOISE_DEVIATIONS * noise, QUANTA * grain.quantum)
+    place = time[first : last + 1] - time[first]
+    powers = np.vander(2 * place / place[-1] - 1, POLYNOMIAL + 1)
+    for removed in range(MOST_TOGETHER + 1):
+        freedom = int(kept.sum()) - POLYNOMIAL - 1
+        if freedom < 2:
+            break
+        inverse = np.linalg.pinv(powers[kept])
+        residual = near - powers @ (inverse @ near[kept])
+        leverage = np.sum((powers @ inverse) ** 2, axis=1)
+        rest = np.sqrt(np.sum(residual[kept] ** 2) / freedom)
+        sure = max(FIT_DEVIATIONS * rest, least) * np.sqrt(1 + leverage)
+        if removed and np.all(np.abs(residual) >= sure, where=~kept):
+            samples = np.flatnonzero(~kept)
+            return [(first + sample, abs(float(residual[sample]))) for sample in samples.tolist()]
+        alone = np.where(kept, np.abs(residual) / np.maximum(1 - leverage, 1e-9), 0.0)
+        kept[int(np.argmax(alone))] = False
+    return []
+
+
+def frozen(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:
+    """Stretches of equal samples in a motion that goes on meanwhile, as a jump or an abrupt stop shows."""
+    first, last = _equal_runs(values, FROZEN_STEPS)
+    ends = (first == 0) | (last == len(values) - 1)
+    inner = (first >= SPEED_SAMPLES) & (last + 1 + SPEED_SAMPLES < len(values))
+    stuck = np.zeros(len(first), dtype=bool)
+    stuck[inner] = _catches_up(time, values, grain, first[inner], last[inner])
+    for run in np.flatnonzero(ends & (last - first >= FROZEN_AT_END_STEPS)).tolist():
+        stuck[run] = _stops_abruptly(values, grain, int(first[run]), int(last[run]))
+    return _stretches(time, first[stuck], last[stuck])
+
+
+def _catches_up(
+    time: FloatArray, values: FloatArray, grain: Grain, first: IndexArray, last: IndexArray
+) -> BoolArray:
+    """Whether after each run the signal jumps to where the speeds before and after it lead."""
+    after = last + 1
+    before_speed = _speed(time, values, first - SPEED_SAMPLES, first)
+    after_speed = _speed(time, values, after, after + SPEED_SAMPLES)
+    jump = values[after] - values[last]
+    expected = (before_speed + after_speed) / 2 * (time[after] - time[first])
+    least = np.maximum(QUANTA * grain.quantum, NOISE_DEVIATIONS * grain.noise_at(first))
+    share = np.divide(jump, expected, out=np.zeros_like(jump), where=expected != 0)
+    low, high = JUMP_SHARE
+    onward = before_speed * after_speed > 0
+    return np.asarray(onward & (np.abs(jump) >= least) & (low <= share) & (share <= high))
+
+
+def _speed(time: FloatArray, values: FloatArray, start: IndexArray, stop: IndexArray) -> FloatArray:
+    return np.asarray((values[stop] - values[start]) / (time[stop] - time[start]))
+
+
+def _stops_abruptly(values: FloatArray, grain: Grain, first: int, last: int) -> bool:
+    """Whether a run at an end of the record begins, or ends, at full speed."""
+    reach = SPEED_SAMPLES + 1
+    near = values[max(0, first - reach) : first + 1] if first else values[last : last + reach + 1][::-1]
+    steps = np.diff(near)
+    if len(steps) < reach:
+        return False
+    noise = float(grain.noise_at(np.array([first if first else last]))[0])
+    least = max(QUANTA * grain.quantum, NOISE_DEVIATIONS * noise, ABRUPT_SHARE * float(np.abs(steps).mean()))
+    return bool((np.all(steps > 0) or np.all(steps < 0)) and abs(steps[-1]) >= least)
+
+
+def saturated(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:
+    """Stretches at the largest or smallest value that are cut out of a motion which goes on beyond it."""
+    first, last = _equal_runs(values, SATURATED_STEPS)
+    extreme = (values[first] == values.max()) | (values[first] == values.min())
+    inner = extreme & (first >= 3) & (last + 3 < len(values))
+    first, last = first[inner], last[inner]
+    least = np.maximum(QUANTA * grain.quantum, NOISE_DEVIATIONS * grain.noise_at(first))
+    beyond = [_overshoot(values, first, -1) >= least, _overshoot(values, last, 1) >= least]
+    cut = beyond[0] & beyond[1]
+    return _stretches(time, first[cut], last[cut])
+
+
+def _overshoot(values: FloatArray, edge: IndexArray, outward: int) -> FloatArray:
+    """How much farther the motion would go that slows down towards an edge as it does before, seen from it.
+
+    Steps s1 (cut short), s2, s3 away from the edge; slowing down by c = s3 - s2 a step, it would go on by
+    s2^2 / (2 c) - s2/2 beyond the sample before the edge.
+    """
+    at = [values[edge + outward * step] for step in range(4)]
+    sign = np.sign(at[0] - at[1])
+    cut, step, before = (sign * (near - far) for near, far in zip(at, at[1:], strict=False))
+    slowing = np.maximum(before - step, np.finfo(float).tiny)
+    with np.errstate(over="ignore"):
+        farther = step**2 / (2 * slowing) - step / 2 - cut
+    return np.asarray(np.where(step > 0, np.minimum(farther, step), -1.0))
+
+
+def wraps(values: FloatArray) -> Faults | None:
+    """Jumps by about 2 pi amid small steps."""
+    steps = np.abs(np.diff(values))
+    near = np.abs(steps - 2 * np.pi) < WRAP_TOLERANCE
+    around = np.pad(steps, 1)
+    lone = near & (around[:-2] < WRAP_TOLERANCE) & (around[2:] < WRAP_TOLERANCE)
+    samples = np.flatnonzero(lone) + 1
+    return Faults(samples, samples, steps[lone]) if samples.size else None
+
+
+def _equal_runs(values: FloatArray, least: int) -> tuple[IndexArray, IndexArray]:
+    """First and last sample of each run of equal values with at least so many steps."""
+    same = np.concatenate(([False], values[1:] == values[:-1], [False]))
+    edges = np.flatnonzero(same[1:] != same[:-1])
+    first, last = edges[::2], edges[1::2]
+    long = last - first >= least
+    return first[long], last[long]
+
+
+def _stretches(time: FloatArray, first: IndexArray, last: IndexArray) -> Faults | None:
+    return Faults(first, last, time[last] - time[first]) if first.size else None

@@ -1,0 +1,82 @@
+"""How fine a column of samples is: the steps of its numbers, and the noise near each sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.trajectory.recorded.thresholds import BLOCK
+
+ORDER = 4
+NORMAL_MEDIAN = 0.6745
+"""Median of |x| of a normal distribution of deviation 1."""
+
+ROUNDING = 8 * np.finfo(float).eps
+"""Share of the largest value below which changes are rounding of equal ones."""
+
+FINEST = 0.01
+"""Quantile of the changes of steps that stands for the step of an encoder; smaller ones may be accidents."""
+
+CHUNK = 1024 * BLOCK
+"""Samples whose differences are weighted at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grain:
+    """What changes of a column mean nothing.
+
+    Attributes:
+        differences: (samples - 4,) divided differences of fourth order, scaled so that noise passes with its
+            own deviation; the motion, if sampled fast enough, hardly at all.
+        quantum: step of the numbers, of an encoder or of printed digits.
+        noise: (blocks,) standard deviation near each `BLOCK` of differences: by medians, which no outlier
+            changes, the largest of three blocks, as noise may begin with a motion.
+    """
+
+    differences: FloatArray
+    quantum: float
+    noise: FloatArray
+
+    @classmethod
+    def of(cls, time: FloatArray, values: FloatArray) -> Grain:
+        """Of a column with more than four samples, (samples,)."""
+        differences = _differences(time, values)
+        whole = len(differences) // BLOCK * BLOCK
+        rows = differences[:whole].reshape(-1, BLOCK) if whole else differences[None]
+        near = np.pad(np.median(np.abs(rows), axis=1) / NORMAL_MEDIAN, 1, mode="edge")
+        noise = np.maximum(np.maximum(near[:-2], near[1:-1]), near[2:])
+        return cls(differences, _quantum(values), noise)
+
+    def noise_at(self, samples: IndexArray) -> FloatArray:
+        """Standard deviation of the noise near samples."""
+        blocks = np.maximum(samples - ORDER // 2, 0) // BLOCK
+        return np.asarray(self.noise[np.minimum(blocks, len(self.noise) - 1)])
+
+
+def _differences(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Chunk by chunk, since the weights are as many as five columns."""
+    count = len(values) - ORDER
+    found = np.empty(count)
+    for start in range(0, count, CHUNK):
+        stop = min(start + CHUNK, count)
+        nodes = [time[start + i : stop + i] for i in range(ORDER + 1)]
+        span = nodes[-1] - nodes[0]
+        total, size = np.zeros(stop - start), np.zeros(stop - start)
+        for i, node in enumerate(nodes):
+            weight = np.ones(stop - start)
+            for other in (*nodes[:i], *nodes[i + 1 :]):
+                weight *= span / (node - other)
+            total += weight * values[start + i : stop + i]
+            size += weight**2
+        found[start:stop] = total / np.sqrt(size)
+    return found
+
+
+def _quantum(values: FloatArray) -> float:
+    """Small changes from step to step that are none of rounding; zero if there are none."""
+    changes = np.abs(np.diff(values, n=2))
+    changes = changes[changes > ROUNDING * np.abs(values).max()]
+    place = int(FINEST * len(changes))
+    return float(np.partition(changes, place)[place]) if len(changes) else 0.0

@@ -1,0 +1,84 @@
+"""The health of a recording, told before anything is fitted to it: what a sensor or a log file spoiled.
+
+A warning sums up a column: how often, when first, how badly at most, and what to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import POSITION
+from vsacli.base.units import time_text
+from vsacli.trajectory.recorded.arrays import SampleProblem
+from vsacli.trajectory.recorded.faults import Faults, frozen, outliers, saturated, wraps
+from vsacli.trajectory.recorded.grain import ORDER, Grain
+from vsacli.trajectory.recorded.samples import Samples
+from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
+
+
+def health(stamps: FloatArray, records: Sequence[Samples]) -> Iterator[SampleProblem]:
+    """What of a recording is hardly what was meant although it can be used.
+
+    Args:
+        stamps: (samples,) in s, as recorded.
+        records: the signals that are used, without problems.
+    """
+    if len(stamps) <= ORDER:
+        return
+    yield from stamp_faults(stamps)
+    for record in records:
+        for component in np.flatnonzero(record.given).tolist():
+            for faults, sentence in _of_column(stamps, record, component):
+                yield SampleProblem(record.signal.names[0], sentence, component, int(faults.first[0]))
+
+
+def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[tuple[Faults, str]]:
+    time, values = record.time, record.values[component]
+    if np.ptp(values) == 0:
+        return
+    grain = Grain.of(time, values)
+    if off := outliers(time, values, grain):
+        extent = _extent(off, stamps, [f"{size:.3g}" for size in off.sizes.tolist()])
+        yield (
+            off,
+            f"is off {_occasions(off, stamps)}, by {extent} from a smooth curve, amid samples that are on it:"
+            f" derivatives follow such outliers; delete {'the row' if off.count == 1 else 'these rows'}",
+        )
+    if stuck := frozen(time, values, grain):
+        yield (
+            stuck,
+            f"is frozen {_occasions(stuck, stamps)}, for {_lasting(stuck, stamps)}, while the motion goes on:"
+            " these samples were lost; delete the rows, or record again",
+        )
+    if cut := saturated(time, values, grain):
+        yield (
+            cut,
+            f"is cut off {_occasions(cut, stamps)}, for {_lasting(cut, stamps)}, at {values[cut.first[0]]:.4g},"
+            " beyond which the motion goes on: the sensor or the log file has no larger range; record again",
+        )
+    if record.signal is POSITION and (wrapped := wraps(values)):
+        yield (
+            wrapped,
+            f"jumps by 2 pi {_occasions(wrapped, stamps)}: an angle that was wrapped? Set unwrap: true under"
+            " position in a trajectory file",
+        )
+
+
+def _occasions(faults: Faults, stamps: FloatArray) -> str:
+    """When, or how often and when first."""
+    when = f"at t = {time_text(float(stamps[faults.first[0]]))}"
+    return when if faults.count == 1 else f"{faults.count} times, first {when}"
+
+
+def _lasting(faults: Faults, stamps: FloatArray) -> str:
+    return _extent(faults, stamps, [step_text(size) for size in faults.sizes.tolist()])
+
+
+def _extent(faults: Faults, stamps: FloatArray, sizes: Sequence[str]) -> str:
+    """The size of the only one, or of the worst with its time."""
+    size = sizes[faults.worst]
+    when = time_text(float(stamps[faults.first[faults.worst]]))
+    return size if faults.count == 1 else f"up to {size} (at t = {when})"
