@@ -128,4 +128,8 @@ def clean_records(seeds: range) -> Iterator[tuple[str, FloatArray, FloatArray]]:
                 rng = np.random.default_rng([seed, m, s])
                 rate = RATES[(seed + m + s) % len(RATES)]
                 time = np.arange(int(DURATION * rate) + 1) / rate
-                yield f"{motion_name}, {sensor_name}, {rate:g} Hz, seed {seed}", time, sensor(rng, motion(rng)(time))
+                yield (
+                    f"{motion_name}, {sensor_name}, {rate:g} Hz, seed {seed}",
+                    time,
+                    sensor(rng, motion(rng)(time)),
+                )

@@ -71,7 +71,8 @@ def test_trajectory_is_named_after_the_file_and_says_what_was_fitted(csv):
     trajectory = recorded_trajectory(path, JOINTS)
     assert trajectory.name == "swing-up"
     few = "on so few knots, derivatives are doubtful far into the record from both ends"
-    assert trajectory.warnings[:1] == (f"ddq, d3q, d4q come from a C6 spline through q; {few}",)
+    fitted = [warning for warning in trajectory.warnings if "spline" in warning]
+    assert fitted[:1] == [f"ddq, d3q, d4q come from a C6 spline through q; {few}"]
     assert trajectory.warnings[-1:] == (
         f"dstiffness, ddstiffness come from a C4 spline through stiffness; {few}",
     )

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES
-from vsacli.trajectory.recorded.arrays import checked_array, samples_of_arrays, time_problems, value_problems
+from vsacli.trajectory.recorded.arrays import checked_array, samples_of_arrays
+from vsacli.trajectory.recorded.problems import time_problems, value_problems
 from vsacli.trajectory.recorded.samples import SampledProfile
 
 EPS = np.finfo(float).eps

@@ -158,9 +158,17 @@ def _stored_rate(result: StoredResult) -> float:
     error = np.abs(time - (time[0] + step * np.arange(result.samples)))
     if error.max() > STEP_TOLERANCE * step:
         place = f"near t = {time_text(float(time[error.argmax()]))}"
-        message = f"the stored times are not equally spaced ({place}); export without --rate"
+        message = (
+            f"the stored times are not equally spaced ({place}); set rate: {_round(1 / step):g} in the"
+            f" trajectory file and run {result.command} again, or export without --rate"
+        )
         raise InputError.one(message, result.path)
     return 1 / step
+
+
+def _round(rate: float) -> float:
+    """A rate to three digits, as somebody would choose it."""
+    return float(f"{rate:.3g}")
 
 
 def _spans(result: StoredResult, variables: tuple[Variable, ...], stride: int) -> Iterator[tuple[int, int]]:

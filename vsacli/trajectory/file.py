@@ -159,7 +159,11 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
         profiles,
         wrench=None if wrench is None else WrenchProfile(profiles[WRENCH.key], wrench.frame),
         name=document.name,
-        warnings=[*_warnings(document, times, joints), *implausible(facts, source)],
+        warnings=[
+            *(warning for recording in recordings for warning in recording.warnings),
+            *_warnings(document, times, joints),
+            *implausible(facts, source),
+        ],
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, times)],
         sources=[source, *(recording.source for recording in recordings)],
     )
@@ -174,8 +178,11 @@ def _read_recordings(document: TrajectoryFile, folder: Path, joints: CommandedJo
         return []
     from vsacli.trajectory.recorded.recording import read_recording
 
-    resampled = document.rate is not None
-    recordings = [read_recording(file, joints, fits, resampled=resampled) for file, fits in wanted.items()]
+    resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)
+    recordings = [
+        read_recording(file, joints, fits, resampled=resampled, unwrap=unwrap)
+        for file, fits in wanted.items()
+    ]
     for other in recordings[1:]:
         recordings[0].check_times(other)
     return recordings

@@ -174,9 +174,9 @@ class Trajectory:
             **{each: tuple(map(of_joints.get, each.names)) for each in COMMANDED.values()},
             WRENCH: (wrench, dwrench, ddwrench),
         }
-        times, profiles = profiles_of_arrays(time, given, fit)
+        times, profiles, warnings = profiles_of_arrays(time, given, fit)
         exerted = WrenchProfile(profiles[WRENCH.key], wrench_frame) if WRENCH.key in profiles else None
-        return cls(times, profiles[POSITION.key], profiles, wrench=exerted, name=name)
+        return cls(times, profiles[POSITION.key], profiles, wrench=exerted, name=name, warnings=warnings)
 
     @property
     def joints(self) -> int:

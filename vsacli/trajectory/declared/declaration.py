@@ -20,6 +20,7 @@ from vsacli.documents.fields import (
     Items,
     PerJoint,
     Vector,
+    boolean,
     check_fields,
     choice,
     text,
@@ -156,7 +157,10 @@ class Recorded(Declaration):
             " squares, or a smoothing one for noise of any colour; by default what their noise asks for"
         )
         file = text("path of the CSV file, relative to the trajectory file")
-        return {**use.frame(), "file": file, "fit": choice(METHODS, doc, default=None)}
+        fields = {**use.frame(), "file": file, "fit": choice(METHODS, doc, default=None)}
+        if use.signal is POSITION:
+            fields["unwrap"] = boolean("take jumps by 2 pi out of revolute joints' angles", default=False)
+        return fields
 
     @classmethod
     def meaning(cls, use: Use) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +65,7 @@ def outliers(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | Non
     """Samples, or up to three together, that a smooth curve through their neighbours misses by far."""
     size = np.abs(grain.differences)
     centres = np.arange(len(size)) + ORDER // 2
-    off = size > np.maximum(NOISE_DEVIATIONS * grain.noise_at(centres), QUANTA * grain.quantum)
+    off = size > _noticeable(grain, centres)
     events = _events(centres[off], size[off])
     isolated = [_isolated(time, values, event, grain) for event in events]
     found = dict(_at_ends(values, grain))
@@ -105,38 +106,39 @@ def _at_ends(values: FloatArray, grain: Grain) -> Iterator[tuple[int, float]]:
             continue
         near = sliding_window_view(inward[: END_SAMPLES + len(END_WEIGHTS)], len(END_WEIGHTS))
         error, *others = np.abs(near @ END_WEIGHTS)
-        noise = max(NOISE_DEVIATIONS * float(grain.noise_at(np.array([end]))[0]), QUANTA * grain.quantum)
-        if error > max(END_SHARE * max(others), noise * float(np.linalg.norm(END_WEIGHTS))):
+        least = float(_noticeable(grain, np.array([end]))[0]) * float(np.linalg.norm(END_WEIGHTS))
+        if error > max(END_SHARE * max(others), least):
             yield end, float(error)
 
 
-def _isolated(
-    time: FloatArray, values: FloatArray, event: _Event, grain: Grain
-) -> list[tuple[int, float]]:
+def _isolated(time: FloatArray, values: FloatArray, event: _Event, grain: Grain) -> list[tuple[int, float]]:
     """The samples without which all near them lie on a polynomial, and by what they are off; mostly none."""
-    if event.last - event.first > 2 * ORDER + MOST_TOGETHER:
+    if event.last - event.first > 2 * (ORDER + MOST_TOGETHER):
         return []
     first, last = max(0, event.first - MARGIN), min(len(values) - 1, event.last + MARGIN)
     near, kept = values[first : last + 1], np.ones(last + 1 - first, dtype=bool)
-    noise = float(grain.noise_at(np.array([event.first]))[0])
-    least = max(NOISE_DEVIATIONS * noise, QUANTA * grain.quantum)
+    least = float(_noticeable(grain, np.array([event.first]))[0])
     place = time[first : last + 1] - time[first]
     powers = np.vander(2 * place / place[-1] - 1, POLYNOMIAL + 1)
-    for removed in range(MOST_TOGETHER + 1):
-        freedom = int(kept.sum()) - POLYNOMIAL - 1
-        if freedom < 2:
-            break
-        inverse = np.linalg.pinv(powers[kept])
-        residual = near - powers @ (inverse @ near[kept])
-        leverage = np.sum((powers @ inverse) ** 2, axis=1)
-        rest = np.sqrt(np.sum(residual[kept] ** 2) / freedom)
+    found: list[tuple[int, float]] = []
+    for _ in range(min(MOST_TOGETHER, len(near) - POLYNOMIAL - 3)):
+        residual, leverage = _misfit(powers, near, kept)
+        studentized = np.abs(residual) / np.sqrt(np.maximum(1 - leverage, 1e-9))
+        kept[int(np.argmax(np.where(kept, studentized, 0.0)))] = False
+        residual, leverage = _misfit(powers, near, kept)
+        rest = np.sqrt(np.sum(residual[kept] ** 2) / (kept.sum() - POLYNOMIAL - 1))
         sure = max(FIT_DEVIATIONS * rest, least) * np.sqrt(1 + leverage)
-        if removed and np.all(np.abs(residual) >= sure, where=~kept):
-            samples = np.flatnonzero(~kept)
-            return [(first + sample, abs(float(residual[sample]))) for sample in samples.tolist()]
-        alone = np.where(kept, np.abs(residual) / np.maximum(1 - leverage, 1e-9), 0.0)
-        kept[int(np.argmax(alone))] = False
-    return []
+        if np.all(np.abs(residual) >= sure, where=~kept):
+            samples = first + np.flatnonzero(~kept)
+            found = list(zip(samples.tolist(), np.abs(residual[~kept]).tolist(), strict=True))
+    unconfirmed = {0, len(values) - 1}  # nothing lies beyond the ends
+    return [] if unconfirmed & dict(found).keys() else found
+
+
+def _misfit(powers: FloatArray, values: FloatArray, kept: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Values minus the polynomial through those kept, and the leverage of each: its variance per noise."""
+    inverse = np.linalg.pinv(powers[kept])
+    return values - powers @ (inverse @ values[kept]), np.sum((powers @ inverse) ** 2, axis=1)
 
 
 def frozen(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:
@@ -160,11 +162,10 @@ def _catches_up(
     after_speed = _speed(time, values, after, after + SPEED_SAMPLES)
     jump = values[after] - values[last]
     expected = (before_speed + after_speed) / 2 * (time[after] - time[first])
-    least = np.maximum(QUANTA * grain.quantum, NOISE_DEVIATIONS * grain.noise_at(first))
     share = np.divide(jump, expected, out=np.zeros_like(jump), where=expected != 0)
     low, high = JUMP_SHARE
     onward = before_speed * after_speed > 0
-    return np.asarray(onward & (np.abs(jump) >= least) & (low <= share) & (share <= high))
+    return np.asarray(onward & (np.abs(jump) >= _noticeable(grain, first)) & (low <= share) & (share <= high))
 
 
 def _speed(time: FloatArray, values: FloatArray, start: IndexArray, stop: IndexArray) -> FloatArray:
@@ -178,8 +179,8 @@ def _stops_abruptly(values: FloatArray, grain: Grain, first: int, last: int) -> 
     steps = np.diff(near)
     if len(steps) < reach:
         return False
-    noise = float(grain.noise_at(np.array([first if first else last]))[0])
-    least = max(QUANTA * grain.quantum, NOISE_DEVIATIONS * noise, ABRUPT_SHARE * float(np.abs(steps).mean()))
+    noticeable = float(_noticeable(grain, np.array([first if first else last]))[0])
+    least = max(noticeable, ABRUPT_SHARE * float(np.abs(steps).mean()))
     return bool((np.all(steps > 0) or np.all(steps < 0)) and abs(steps[-1]) >= least)
 
 
@@ -189,7 +190,7 @@ def saturated(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | No
     extreme = (values[first] == values.max()) | (values[first] == values.min())
     inner = extreme & (first >= 3) & (last + 3 < len(values))
     first, last = first[inner], last[inner]
-    least = np.maximum(QUANTA * grain.quantum, NOISE_DEVIATIONS * grain.noise_at(first))
+    least = _noticeable(grain, first)
     beyond = [_overshoot(values, first, -1) >= least, _overshoot(values, last, 1) >= least]
     cut = beyond[0] & beyond[1]
     return _stretches(time, first[cut], last[cut])
@@ -203,7 +204,7 @@ def _overshoot(values: FloatArray, edge: IndexArray, outward: int) -> FloatArray
     """
     at = [values[edge + outward * step] for step in range(4)]
     sign = np.sign(at[0] - at[1])
-    cut, step, before = (sign * (near - far) for near, far in zip(at, at[1:], strict=False))
+    cut, step, before = (sign * (near - far) for near, far in pairwise(at))
     slowing = np.maximum(before - step, np.finfo(float).tiny)
     with np.errstate(over="ignore"):
         farther = step**2 / (2 * slowing) - step / 2 - cut
@@ -218,6 +219,11 @@ def wraps(values: FloatArray) -> Faults | None:
     lone = near & (around[:-2] < WRAP_TOLERANCE) & (around[2:] < WRAP_TOLERANCE)
     samples = np.flatnonzero(lone) + 1
     return Faults(samples, samples, steps[lone]) if samples.size else None
+
+
+def _noticeable(grain: Grain, samples: IndexArray) -> FloatArray:
+    """What is more than noise and steps of the numbers near samples."""
+    return np.maximum(NOISE_DEVIATIONS * grain.noise_at(samples), QUANTA * grain.quantum)
 
 
 def _equal_runs(values: FloatArray, least: int) -> tuple[IndexArray, IndexArray]:

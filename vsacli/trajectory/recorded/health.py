@@ -5,18 +5,19 @@ A warning sums up a column: how often, when first, how badly at most, and what t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
 from vsacli.base.units import time_text
-from vsacli.trajectory.recorded.arrays import SampleProblem
 from vsacli.trajectory.recorded.faults import Faults, frozen, outliers, saturated, wraps
 from vsacli.trajectory.recorded.grain import ORDER, Grain
+from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.samples import Samples
 from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
+from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE, LARGEST_TRAVEL
 
 
 def health(stamps: FloatArray, records: Sequence[Samples]) -> Iterator[SampleProblem]:
@@ -33,6 +34,23 @@ def health(stamps: FloatArray, records: Sequence[Samples]) -> Iterator[SamplePro
         for component in np.flatnonzero(record.given).tolist():
             for faults, sentence in _of_column(stamps, record, component):
                 yield SampleProblem(record.signal.names[0], sentence, component, int(faults.first[0]))
+
+
+def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterator[SampleProblem]:
+    """Positions too large for rad or m.
+
+    Args:
+        records: the signals that are used.
+        types: of the joints in question, "revolute" or "prismatic", by index: those without a unit.
+    """
+    for record in records:
+        for index, kind in types.items() if record.signal is POSITION else ():
+            name, largest = POSITION.names[0], float(np.abs(record.values[index]).max())
+            if kind == "revolute" and largest > LARGEST_ANGLE:
+                extent = f"{largest:.4g} rad, {largest / (2 * np.pi):.3g} turns"
+                yield SampleProblem(name, f"goes to {extent}; are these degrees? {_write('deg')}", index)
+            elif kind == "prismatic" and largest > LARGEST_TRAVEL:
+                yield SampleProblem(name, f"goes to {largest:.4g} m; are these mm? {_write('mm')}", index)
 
 
 def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[tuple[Faults, str]]:
@@ -56,8 +74,8 @@ def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[
     if cut := saturated(time, values, grain):
         yield (
             cut,
-            f"is cut off {_occasions(cut, stamps)}, for {_lasting(cut, stamps)}, at {values[cut.first[0]]:.4g},"
-            " beyond which the motion goes on: the sensor or the log file has no larger range; record again",
+            f"is cut off at {values[cut.first[0]]:.4g} {_occasions(cut, stamps)}, for {_lasting(cut, stamps)}"
+            " while the motion goes on: the sensor or the log file has no larger range; record again",
         )
     if record.signal is POSITION and (wrapped := wraps(values)):
         yield (
@@ -65,6 +83,10 @@ def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[
             f"jumps by 2 pi {_occasions(wrapped, stamps)}: an angle that was wrapped? Set unwrap: true under"
             " position in a trajectory file",
         )
+
+
+def _write(unit: str) -> str:
+    return f"Write [{unit}] after its name in the header, or [rad] or [m] if it is right"
 
 
 def _occasions(faults: Faults, stamps: FloatArray) -> str:

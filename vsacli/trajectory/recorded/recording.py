@@ -17,8 +17,9 @@ from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.robot.commanded_joints import CommandedJoints, takers
-from vsacli.trajectory.recorded.arrays import SampleProblem, time_problems, value_problems
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout
+from vsacli.trajectory.recorded.health import health, unit_doubts
+from vsacli.trajectory.recorded.problems import SampleProblem, time_problems, value_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -34,13 +35,15 @@ class Recording:
     Attributes:
         times: the column `time`.
         profiles: one for each signal that was asked for, in that order.
-        notes: what of the file is not used.
+        warnings: what of it a sensor or a log file spoiled.
+        notes: what of the file is not used, and what was taken out of it.
         source: the file.
         lines: those of its rows.
     """
 
     times: RecordedTimes
     profiles: tuple[SampledProfile, ...]
+    warnings: tuple[str, ...]
     notes: tuple[str, ...]
     source: Source
     lines: Lines
@@ -69,6 +72,7 @@ def read_recording(
     wanted: Mapping[Signal, str | None] = DEFAULT_FITS,
     *,
     resampled: bool = False,
+    unwrap: bool = False,
 ) -> Recording:
     """Read signals from a CSV file.
 
@@ -77,6 +81,7 @@ def read_recording(
         joints: those that are commanded.
         wanted: the signals to read, each with the method of its fit as in `fit_samples`.
         resampled: whether the steps will be other times than the recorded ones.
+        unwrap: whether to take jumps by 2 pi out of the positions of revolute joints.
 
     Raises:
         InputError: with file and line of everything that does not fit.
@@ -87,17 +92,20 @@ def read_recording(
     layout = column_layout(table.columns, joints, signals, file, table.header_line)
     time = _si(table, layout.time)
     records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
+    turns = list(_unwrapped(records, joints)) if unwrap else []
 
     problems = [*time_problems(time), *(problem for record in records for problem in value_problems(record))]
     if problems:
         raise InputError(_located(problem, table, layout) for problem in problems)
-    notes = tuple(f"{file}: {clause}" for clause in _unused(layout, signals))
+    found = [*health(time, records), *unit_doubts(records, _without_unit(table, layout, joints))]
+    warnings = tuple(str(_located(doubt, table, layout)) for doubt in found)
+    notes = tuple(f"{file}: {clause}" for clause in (*turns, *_unused(layout, signals)))
     source, lines = table.source, table.lines
     del table  # as large as the records, which may be fitted now
     profiles = tuple(
         SampledProfile.of(record, wanted[record.signal], resampled=resampled) for record in records
     )
-    return Recording(RecordedTimes(time), profiles, notes, source, lines)
+    return Recording(RecordedTimes(time), profiles, warnings, notes, source, lines)
 
 
 def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:
@@ -119,6 +127,28 @@ def _samples(
     )
     assert values is not None, "columns of values are required"
     return Samples.recorded(signal, time, values, tuple(derivatives), labels)
+
+
+def _unwrapped(records: Sequence[Samples], joints: CommandedJoints) -> Iterator[str]:
+    """Take jumps by 2 pi out of the positions of revolute joints, and say of how many."""
+    for record in records:
+        for index, (joint, kind) in enumerate(joints.types.items() if record.signal is POSITION else ()):
+            row = record.values[index]
+            turned = np.unwrap(row) if kind == "revolute" else row
+            jumps = int(np.count_nonzero(np.abs(np.diff(turned - row)) > np.pi))
+            if jumps:
+                row[:] = turned
+                yield f"{'a jump' if jumps == 1 else f'{jumps} jumps'} by 2 pi taken out of {joint}.q"
+
+
+def _without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -> dict[int, str]:
+    """The types of joints whose position has no unit in the header, by index."""
+    headings = {
+        index: table.columns[column.index]
+        for index, column in layout.quantities.get(POSITION.names[0], {}).items()
+    }
+    types = list(joints.types.values())
+    return {index: types[index] for index, heading in headings.items() if "[" not in heading}
 
 
 def _rows(table: Table, columns: Mapping[int, Column], components: int) -> FloatArray:
@@ -160,6 +190,7 @@ def recorded_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -
         profiles[POSITION.key],
         profiles,
         name=Path(path).stem,
+        warnings=recording.warnings,
         notes=recording.notes,
         sources=[recording.source],
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import time_text
-from vsacli.trajectory.recorded.arrays import SampleProblem
+from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.thresholds import (
     ENOUGH_ROWS,
     GAP_STEPS,
@@ -33,31 +33,30 @@ def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
     long = np.flatnonzero(steps > GAP_STEPS * usual)
     if long.size:
         worst = long[np.argmax(steps[long])]
-        message = (
-            f"has {_count(len(long), 'gap')}, the longest of {step_text(float(steps[worst]))} from t ="
-            f" {time_text(float(stamps[worst]))} on, where rows are usually {step_text(usual)} apart; what the"
-            " motion and torques are meanwhile is a guess of the spline: cut the recording there, or record again"
-        )
-        yield SampleProblem("time", message, sample=int(worst) + 1)
-    jitter = _jitter(stamps, steps, usual)
-    if jitter > JITTER_SHARE:
-        whole = float(f"{1 / usual:.3g}")
+        gaps = "a gap" if len(long) == 1 else f"{len(long)} gaps, the longest"
         yield SampleProblem(
             "time",
-            f"jitters: steps change by {100 * jitter:.2g} % from one to the next, around {step_text(usual)}. If"
-            " the sensor samples evenly and the stamps are late, this is noise of the motion; for equal steps"
-            f" of torques, as drives need them, set rate: {whole:g} in a trajectory file",
+            f"has {gaps} of {step_text(float(steps[worst]))} from t = {time_text(float(stamps[worst]))} on;"
+            f" rows are usually {step_text(usual)} apart. Motion and torques meanwhile are a guess of the"
+            " spline: cut the recording there, or record again",
+            sample=int(worst) + 1,
+        )
+    jitter = _jitter(stamps, steps, usual)
+    if jitter > JITTER_SHARE:
+        mean = float(np.mean(steps[steps <= GAP_STEPS * usual]))
+        rate = float(f"{1 / mean:.3g}")
+        yield SampleProblem(
+            "time",
+            f"jitters: steps of about {step_text(mean)} change by {100 * jitter:.2g} % from one to the next."
+            " Where stamps are late, not samples, this is noise of the motion. For torques at equal steps, as"
+            f" drives need them, set rate: {rate:g} in a trajectory file",
         )
 
 
 def step_text(step: float) -> str:
     """A short time in its unit."""
-    size, unit = (step, "s") if step >= 1 else (1e3 * step, "ms") if step >= 1e-3 else (1e6 * step, "us")
-    return f"{size:.4g} {unit}"
-
-
-def _count(count: int, word: str) -> str:
-    return f"1 {word}" if count == 1 else f"{count} {word}s"
+    size, unit = (step, "s") if step >= 1 else (1e3 * step, "ms") if step >= 9.9e-4 else (1e6 * step, "us")
+    return f"{size:.3g} {unit}"
 
 
 def _of_another_unit(usual: float, duration: float) -> str:
@@ -66,8 +65,8 @@ def _of_another_unit(usual: float, duration: float) -> str:
     for unit, factor in UNITS.items():
         if low <= usual * factor <= high:
             return (
-                f"looks like {unit}: {rows}; write time[{unit}] in the header if it is one of"
-                f" {step_text(usual * factor)} steps"
+                f"looks like {unit}: {rows}; if rows are {step_text(usual * factor)} apart,"
+                f" write time[{unit}] in the header"
             )
     return f"is hardly in seconds: {rows}; write its unit in the header, e.g. time[ms]"
 

@@ -1,14 +1,13 @@
 """From when on something in a recording is called a fault: one table, with reasons.
 
 "Clean records" are those of `tests/samples/clean_records.py`: sines, rest to rest with pauses, sweeps and
-velocity steps, with the noise of encoders, white or filtered. None of 600 gives a warning; the nearest any came
-to a threshold stands in brackets.
+velocity steps, with the noise of encoders, white or filtered. None of 640 gives a warning.
 """
 
 from __future__ import annotations
 
 GAP_STEPS = 5.0
-"""Length of a step, in median steps, that is a gap. A row or two that a bus lost are no guess of the spline."""
+"""Length of a step, in median steps, that is a gap. Over a row or two that a bus lost no spline guesses."""
 
 LONGEST_STEP = 0.5
 """Median step, s, beyond which stamps are hardly seconds: no robot is recorded at 2 Hz."""
@@ -17,13 +16,13 @@ SHORTEST_STEP = 2e-6
 """Median step, s, below which they are hardly seconds either: no joint is recorded at 500 kHz."""
 
 USUAL_STEPS = (1e-5, 0.2)
-"""Steps, s, that a recording has: 5 Hz to 100 kHz. The unit of stamps is the one with which theirs is among them."""
+"""Steps, s, that a recording has: 5 Hz to 100 kHz. The first unit with which steps are such is proposed."""
 
 ENOUGH_ROWS = 50
 """Rows below which steps of seconds may have been written by hand."""
 
 JITTER_SHARE = 0.05
-"""Median change from step to step, in steps, that is jitter, if it is more than digits that were cut off explain."""
+"""Median change from step to step, in steps, that is jitter, beyond what digits that were cut off explain."""
 
 BLOCK = 64
 """Samples over which noise is estimated by a median, which a fault of 20 of them does not change much."""
@@ -33,11 +32,11 @@ NOISE_DEVIATIONS = 8.0
 white noise 1e-8 are; the estimate by medians of 64 may be a third too small."""
 
 QUANTA = 4.0
-"""Steps of an encoder likewise: rounding moves a sample by half a step, its prediction from four others by one."""
+"""Steps of an encoder likewise: rounding moves a sample by half a step, its prediction by one at most."""
 
-FIT_DEVIATIONS = 6.0
-"""Deviations of its neighbours from a polynomial through them by which an outlier is off. At a kink, a jump or
-in a fast motion, which no polynomial follows, it is 2 at most."""
+FIT_DEVIATIONS = 8.0
+"""Deviations of its neighbours from a polynomial through them by which an outlier is off. A kink, a jump or
+a fast motion, which no polynomial follows, reaches 2."""
 
 MARGIN = 6
 """Samples on either side of what is off that a polynomial of degree `POLYNOMIAL` is put through."""

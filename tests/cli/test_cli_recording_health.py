@@ -1,0 +1,109 @@
+"""What a recording lacks is said by every command that reads it: file, line, column, time, remedy."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from samples.command_line import ROBOT
+
+TIME = np.arange(1001) / 500
+JOINTS = ("base", "shoulder", "elbow")
+
+
+def positions(seed=0):
+    noise = np.random.default_rng(seed).normal(0, 1e-5, (len(TIME), len(JOINTS)))
+    return 0.3 * np.sin(np.outer(TIME, [2.0, 2.5, 3.0])) + noise
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    def write(q, time=TIME, name="motion.csv", unit="", time_unit=""):
+        header = [f"time{time_unit}", *(f"{joint}.q{unit}" for joint in JOINTS)]
+        header += [f"{joint}.stiffness" for joint in JOINTS]
+        table = np.column_stack((time, q, np.full_like(q, 1000.0)))
+        np.savetxt(tmp_path / name, table, fmt="%.17g", delimiter=",", header=",".join(header), comments="")
+        return name
+
+    return write
+
+
+def test_a_clean_recording_is_not_doubted(vsacli, recorded):
+    report = json.loads(vsacli("invdyn", ROBOT, recorded(positions()), "--json").out)
+    assert [text for text in report["warnings"] if "motion.csv" in text] == []
+
+
+def test_outliers_stand_in_the_report_with_line_column_and_time(vsacli, recorded):
+    q = positions()
+    q[600, 1] += 6.2e-4
+    q[700, 1] -= 0.02
+    file = recorded(q)
+    for command in ("invdyn", "check-feasibility", "info"):
+        arguments = (file, "--robot", ROBOT) if command == "info" else (ROBOT, file)
+        out = vsacli(command, *arguments).out
+        assert (
+            f"{file}:602: shoulder.q is off 2 times, first at t = 1.200 s, by up to 0.02 (at t = 1.400 s)"
+            in out
+        )
+
+
+@pytest.mark.parametrize("start", [0.0, 1.7e9])
+def test_gap_frozen_sensor_and_stamps_since_1970(vsacli, recorded, start):
+    q, kept = positions(), (TIME < 1) | (TIME >= 1.2)
+    q[300:340, 2] = q[300, 2]
+    report = json.loads(vsacli("invdyn", ROBOT, recorded(q[kept], start + TIME[kept]), "--json").out)
+    assert report["self_check"]["passed"]
+    health = [text for text in report["warnings"] if "motion.csv" in text]
+    assert health[0].startswith(
+        f"motion.csv:502: time has a gap of 202 ms from t = {start + 0.998:.3f} s on;"
+    )
+    assert health[1].startswith(f"motion.csv:302: elbow.q is frozen at t = {start + 0.6:.3f} s, for 78 ms,")
+    assert len(health) == 2
+
+
+def test_wrapped_angles_are_unwrapped_on_demand(vsacli, recorded, tmp_path):
+    q = positions()
+    turned = q + np.array([1.0, 3.1, 0.0])
+    wrapped = (turned + np.pi) % (2 * np.pi) - np.pi
+    recorded(wrapped)
+    said = vsacli("check-feasibility", ROBOT, "motion.csv").out
+    assert "shoulder.q jumps by 2 pi 2 times, first at t = " in said
+    assert "Set unwrap: true under position in a trajectory file" in said
+
+    (tmp_path / "unwrapped.yaml").write_text(
+        "format: vsacli-trajectory/1\nname: unwrapped\n"
+        "position: {type: csv, file: motion.csv, unwrap: true}\n"
+        "stiffness: {type: csv, file: motion.csv}\n"
+    )
+    recorded(turned, name="turned.csv")
+    unwrapped = json.loads(vsacli("invdyn", ROBOT, "unwrapped.yaml", "--json").out)
+    assert "motion.csv: 2 jumps by 2 pi taken out of shoulder.q" in unwrapped["notes"]
+    assert not any("jumps by 2 pi" in text for text in unwrapped["warnings"])
+    expected = json.loads(vsacli("invdyn", ROBOT, "turned.csv", "--json").out)
+    peaks = [[joint["peak"]["tau_e"] for joint in report["joints"]] for report in (unwrapped, expected)]
+    np.testing.assert_allclose(*peaks, rtol=1e-9)
+
+
+def test_degrees_and_milliseconds_without_unit_are_doubted(vsacli, recorded):
+    q = np.degrees(positions())
+    said = vsacli("check-feasibility", ROBOT, recorded(q, 1000 * TIME)).out
+    assert "motion.csv: time looks like ms: rows are 2 s apart" in said
+    assert (
+        "motion.csv: base.q goes to 17.19 rad, 2.74 turns; are these degrees? Write [deg] after its name"
+        in said
+    )
+    said = vsacli("check-feasibility", ROBOT, recorded(q, 1000 * TIME, unit="[deg]", time_unit="[ms]")).out
+    assert "motion.csv" not in said
+
+
+def test_jittering_stamps_recommend_a_rate_also_where_torques_are_exported(vsacli, recorded):
+    late = TIME + np.random.default_rng(1).uniform(0, 1e-3, len(TIME))
+    done = vsacli("invdyn", ROBOT, recorded(positions(), late), "-o", "late.h5")
+    assert "motion.csv: time jitters: steps of about 2 ms change by" in done.out
+    assert "set rate: 500 in a trajectory file" in done.out
+    refused = vsacli("export", "late.h5", "--rate", "250")
+    assert refused.code == 2
+    assert (
+        "set rate: 500 in the trajectory file and run invdyn again, or export without --rate" in refused.err
+    )

@@ -1,0 +1,77 @@
+"""What keeps recorded samples from being used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.units import time_text
+from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
+from vsacli.trajectory.recorded.samples import Samples
+
+LARGEST_VALUE = 1e100
+"""Values beyond are no motion of a robot, and their squares, which a fit takes, would overflow."""
+
+
+@dataclass(frozen=True)
+class SampleProblem:
+    """Something wrong with recorded samples: first at the index `sample` (None: concerns all)."""
+
+    quantity: str
+    message: str
+    joint: int | None = None
+    sample: int | None = None
+
+    def __str__(self) -> str:
+        index = ", ".join(str(number) for number in (self.sample, self.joint) if number is not None)
+        return f"{self.quantity}[{index}] {self.message}" if index else f"{self.quantity} {self.message}"
+
+
+def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
+    """What keeps these times, (samples,) in s, from being those of a trajectory: at most one problem."""
+    finite, rising = np.isfinite(time), time[1:] > time[:-1]
+    if not finite.all():
+        sample = int(np.argmin(finite))
+        yield SampleProblem("time", f"must be finite, not {time[sample]}", sample=sample)
+    elif not rising.all():
+        sample = int(np.argmin(rising)) + 1
+        message = f"must increase strictly, but {time[sample]} s follows {time[sample - 1]} s"
+        yield SampleProblem("time", message, sample=sample)
+    elif len(time) > 1 and not SHORTEST <= time[-1] - time[0] <= LONGEST:
+        yield SampleProblem(
+            "time", f"must go on for {SHORTEST:g} to {LONGEST:g} s, not {time[-1] - time[0]:g} s"
+        )
+
+
+def value_problems(samples: Samples) -> Iterator[SampleProblem]:
+    """What keeps these values from being used: too few, or not finite, or not positive where they must be."""
+    signal, degree = samples.signal, samples.signal.spline_degree
+    name, count = signal.names[0], len(samples.time)
+    if count <= degree:
+        yield SampleProblem(
+            name, f"needs at least {degree + 1} samples for a C{degree - 1} spline, not {count}"
+        )
+    given, stamps = np.flatnonzero(samples.given).tolist(), samples.start + samples.time
+    for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
+        for joint, row in () if rows is None else zip(given, rows[given], strict=True):
+            yield from _breach(column, joint, stamps, row, np.isfinite(row), "finite")
+            small = ~(np.isfinite(row) & (np.abs(row) > LARGEST_VALUE))
+            yield from _breach(column, joint, stamps, row, small, f"at most {LARGEST_VALUE:g} in size")
+    if signal.positive:
+        for joint, row in zip(given, samples.values[given], strict=True):
+            yield from _breach(name, joint, stamps, row, ~(row <= 0), "positive")
+
+
+def _breach(
+    quantity: str, joint: int, time: FloatArray, row: FloatArray, holds: BoolArray, requirement: str
+) -> Iterator[SampleProblem]:
+    """The first sample at which a requirement does not hold, and how many there are."""
+    if holds.all():
+        return
+    first, count = int(np.argmin(holds)), len(holds) - int(np.count_nonzero(holds))
+    message = f"must be {requirement}, not {row[first]:g} (t = {time_text(float(time[first]))}"
+    message += ")" if count == 1 else f"; {count} such samples)"
+    yield SampleProblem(quantity, message, joint, first)
