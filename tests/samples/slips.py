@@ -447,6 +447,15 @@ FURTHER = [
 
 REST = [
     Slip(
+        "N mm s/rad as damping",
+        "ur5_6r",
+        "ur5_6r",
+        {"damping: 0.02 ": "damping: 20 "},
+        "damping beside torque",
+        "wrist_1.damping",
+        "20 N mm s/rad",
+    ),
+    Slip(
         "N mm/rad^3 as k_c",
         "vsa_3r",
         "rest_to_rest",

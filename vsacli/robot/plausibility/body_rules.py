@@ -89,8 +89,10 @@ def _densities(facts: Facts) -> Iterator[Measured]:
 
 
 def _gyrations(facts: Facts) -> Iterator[Measured]:
+    """Over the reach from the base frame on, since single wheels and rotors have little of their own."""
+    reach = facts.sizes.reach + math.hypot(*facts.base.xyz)
     for measured, gyration in zip(_masses(facts), facts.sizes.gyrations.tolist(), strict=True):
-        yield measured._replace(size=ratio(gyration, facts.sizes.reach))
+        yield measured._replace(size=ratio(gyration, reach))
 
 
 def _crowding(facts: Facts) -> Iterator[Measured]:
@@ -152,7 +154,7 @@ BODY_RULES: tuple[Rule[Facts], ...] = (
         measure=_strokes,
         size="times the reach of the robot",
         high=40,
-        usual=0.2,
+        usual=0.1,
         finding="is {size} times the reach of the robot",
         reason="even the track under an arm is shorter than so many arms",
         slips=(MILLIMETRES, CENTIMETRES),
@@ -222,10 +224,10 @@ BODY_RULES: tuple[Rule[Facts], ...] = (
         name="sizes of links",
         fields="`mass`, `inertia`",
         measure=_gyrations,
-        size="radius of gyration over the reach of the robot",
-        high=12,
+        size="radius of gyration over the reach of the robot, from the base frame on",
+        high=3,
         finding="makes a link whose radius of gyration is {size} times the reach of the robot",
-        reason="a link is not larger than the whole robot, but for single wheels and rotors",
+        reason="a link is not larger than the whole robot; in 349 chains of real robots none exceeds 1.9",
         advice="check the units of mass, inertia and lengths",
         explained_by=("lengths", "densities of links"),
     ),

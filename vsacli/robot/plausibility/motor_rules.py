@@ -15,6 +15,9 @@ from vsacli.robot.plausibility.facts import Facts, joint_path, motors, ratio
 TINY = 0.1
 """m"""
 
+FASTEST = 60.0
+"""rad/s, or m/s; higher limits of velocity mean none."""
+
 RPM = Slip("rpm", math.pi / 30)
 DEGREES_PER_SECOND = Slip("deg/s", math.pi / 180)
 GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
@@ -43,9 +46,9 @@ class _Driven(NamedTuple):
 
 def _motors(facts: Facts) -> Iterator[_Driven]:
     """All motors, unless they only stand in for others."""
-    for index, joint in enumerate(() if facts.placeholder else facts.joints):
+    for number, joint in enumerate(() if facts.placeholder else facts.joints):
         for at, motor in motors(joint):
-            yield _Driven(index, joint, at, motor)
+            yield _Driven(number, joint, at, motor)
 
 
 def _gear_ratios(facts: Facts, *, revolute: bool) -> Iterator[Measured]:
@@ -106,10 +109,28 @@ def _torques(facts: Facts, *, least: bool) -> Iterator[Measured]:
 
 
 def _joint_damping(facts: Facts) -> Iterator[Measured]:
-    for index, joint in enumerate(facts.joints):
+    for number, joint in enumerate(facts.joints):
         unit = "N m s/rad" if joint.is_revolute else "N s/m"
         size = ratio(joint.damping, facts.sizes.scale(joint))
-        yield Measured(joint_path(index, joint, "damping"), joint.damping, unit, size)
+        yield Measured(joint_path(number, joint, "damping"), joint.damping, unit, size)
+
+
+def _braking(facts: Facts) -> Iterator[Measured]:
+    """Damping at the largest velocity over the largest torque of all motors, if these are limited."""
+    for driven in _motors(facts):
+        joint, motor = driven.joint, driven.motor.at_joint
+        velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))
+        torque = sum(each.max_torque for each in joint.actuator.motors)
+        share = velocity / torque if velocity < FASTEST and math.isfinite(torque) else math.nan
+        yield driven.measured(
+            "damping",
+            "N m s/rad" if driven.rotary else "N s/m",
+            motor.damping * share * len(joint.actuator.motors),
+        )
+        unit = "N m s/rad" if joint.is_revolute else "N s/m"
+        yield Measured(
+            joint_path(driven.number, joint, "damping"), joint.damping, unit, joint.damping * share
+        )
 
 
 MOTOR_RULES: tuple[Rule[Facts], ...] = (
@@ -240,6 +261,18 @@ MOTOR_RULES: tuple[Rule[Facts], ...] = (
         explained_by=GEARS,
     ),
     Rule(
+        name="damping beside torque",
+        fields="`damping`, `motor.damping`",
+        measure=_braking,
+        size="torque that it takes at the largest velocity, over the largest torque of the motors",
+        high=1,
+        usual=0.05,
+        finding="takes, at the largest velocity of the joint, {size} times the largest torque of its motors",
+        reason="the joint could not go as fast as its limits say",
+        slips=(Slip("N mm s/rad", 1e-3, instead_of="N m s/rad"),),
+        explained_by=(*GEARS, "velocities of motors", "velocities of motors and joints", "weak motors"),
+    ),
+    Rule(
         name="damping of joints",
         fields="`damping`",
         measure=_joint_damping,
@@ -249,6 +282,6 @@ MOTOR_RULES: tuple[Rule[Facts], ...] = (
         finding="brakes, at 1 rad/s or 1 m/s, with {size} times the weight of the robot at its reach",
         reason="the robot could hardly move; placeholders in descriptions of real robots come to 50",
         slips=(Slip("N mm s/rad", 1e-3),),
-        explained_by=SIZES,
+        explained_by=(*SIZES, "damping beside torque"),
     ),
 )

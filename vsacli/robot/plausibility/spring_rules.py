@@ -23,8 +23,9 @@ TOO_SOFT = (
     Slip("kN m/rad", 1e3, instead_of="N m/rad"),
     Slip("N/mm", 1e3, instead_of="N/m"),
 )
+NEWTON_MILLIMETRES = Slip("N mm/rad", 1e-3, instead_of="N m/rad")
 TOO_STIFF = (
-    Slip("N mm/rad", 1e-3, instead_of="N m/rad"),
+    NEWTON_MILLIMETRES,
     Slip("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"),
 )
 """Units in which a stiffness is a smaller, or a larger number than in the expected one."""

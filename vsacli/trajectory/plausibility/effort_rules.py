@@ -11,7 +11,7 @@ from vsacli.documents.plausibility import Entry, Measured, Rule, Slip
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.body_rules import SIZES
 from vsacli.robot.plausibility.facts import ratio
-from vsacli.robot.plausibility.spring_rules import TOO_SOFT, TOO_STIFF, Corridor
+from vsacli.robot.plausibility.spring_rules import NEWTON_MILLIMETRES, TOO_SOFT, Corridor
 from vsacli.trajectory.plausibility.facts import Facts
 
 COMMON_FORCE, COMMON_MOMENT = 100.0, 10.0
@@ -21,7 +21,7 @@ WITH_LINEAR_PART = ("cubic", "polynomial")
 """Laws with a constant for the stiffness at rest; with others it is small at rest and grows fast."""
 
 
-STIFFNESS_UNITS = (*TOO_SOFT, *TOO_STIFF)
+STIFFNESS_UNITS = (*TOO_SOFT, NEWTON_MILLIMETRES)
 
 SPRINGS = ("stiff springs", "hardening of springs", "early hardening of springs")
 """Rules of the robot that explain what is found here."""
@@ -101,7 +101,7 @@ EFFORT_RULES: tuple[Rule[Facts], ...] = (
         finding="is {size} times the lowest that the springs give without load, {lower} {unit}",
         reason="below there is no way, and far above the linear part of the springs would not matter",
         slips=STIFFNESS_UNITS,
-        advice="check the units of both",
+        advice="check its unit and those of the springs",
         explained_by=SPRINGS,
     ),
     Rule(
@@ -115,7 +115,7 @@ EFFORT_RULES: tuple[Rule[Facts], ...] = (
         finding="is {size} times the lowest that the springs give without load, {lower} {unit}",
         reason="below there is no way; of the robots that come along none goes beyond 300",
         slips=STIFFNESS_UNITS,
-        advice="check the units of both",
+        advice="check its unit and those of the springs",
         explained_by=SPRINGS,
     ),
     Rule(
@@ -128,7 +128,7 @@ EFFORT_RULES: tuple[Rule[Facts], ...] = (
         finding="is {size} times the highest that the springs give without load, {upper} {unit}",
         reason="there is no way to so much",
         slips=STIFFNESS_UNITS,
-        advice="check the units of both",
+        advice="check its unit and those of the springs",
         explained_by=SPRINGS,
     ),
 )
