@@ -15,6 +15,9 @@ TURN = 2 * math.pi
 ROUNDED = 1e-3
 """Share by which an angle printed with a few digits may exceed a whole number of turns."""
 
+FASTEST = 60.0
+"""rad/s; limbs do not turn ten times a second."""
+
 UNLIMITED_ANGLE = 1e4
 """rad; who writes larger ones into limits wants none."""
 
@@ -164,7 +167,7 @@ BODY_RULES: tuple[Rule[Facts], ...] = (
         fields="`limits.velocity`",
         measure=_velocities,
         size="rad/s",
-        high=60,
+        high=FASTEST,
         usual=3,
         finding="is about ten turns a second or more",
         reason="limbs do not turn so fast; powers of ten from 100 on mean no limit",

@@ -7,16 +7,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from vsacli.actuators.motor import Motor
+from vsacli.documents.fields import declared
 from vsacli.documents.plausibility import Measured, NumberPath, Rule, Slip
 from vsacli.robot.joint import Joint
-from vsacli.robot.plausibility.body_rules import SIZES
+from vsacli.robot.plausibility.body_rules import FASTEST, SIZES
 from vsacli.robot.plausibility.facts import Facts, joint_path, motors, ratio
 
 TINY = 0.1
 """m"""
-
-FASTEST = 60.0
-"""rad/s, or m/s; higher limits of velocity mean none."""
 
 RPM = Slip("rpm", math.pi / 30)
 DEGREES_PER_SECOND = Slip("deg/s", math.pi / 180)
@@ -32,16 +30,12 @@ class _Driven(NamedTuple):
     at: NumberPath
     motor: Motor
 
-    def measured(self, name: str, unit: str, size: float) -> Measured:
+    def measured(self, name: str, size: float) -> Measured:
         """A field of the motor with a size."""
-        return Measured(
-            joint_path(self.number, self.joint, *self.at, name), getattr(self.motor, name), unit, size
-        )
-
-    @property
-    def rotary(self) -> bool:
-        """Whether its numbers are those of rotation."""
-        return self.joint.is_revolute or self.motor.gear_ratio is not None
+        kind = self.joint.type if name == "gear_ratio" or self.motor.gear_ratio is None else "revolute"
+        unit = declared(Motor)[name][0].quantity.unit(kind)
+        path = joint_path(self.number, self.joint, *self.at, name)
+        return Measured(path, getattr(self.motor, name), unit, size)
 
 
 def _motors(facts: Facts) -> Iterator[_Driven]:
@@ -54,13 +48,13 @@ def _motors(facts: Facts) -> Iterator[_Driven]:
 def _gear_ratios(facts: Facts, *, revolute: bool) -> Iterator[Measured]:
     for driven in _motors(facts):
         if driven.motor.gear_ratio is not None and driven.joint.is_revolute == revolute:
-            yield driven.measured("gear_ratio", "1" if revolute else "rad/m", abs(driven.motor.gear_ratio))
+            yield driven.measured("gear_ratio", abs(driven.motor.gear_ratio))
 
 
 def _rotors(facts: Facts) -> Iterator[Measured]:
     for driven in _motors(facts):
         size = ratio(driven.motor.at_joint.inertia, float(facts.sizes.inertias[driven.number]))
-        yield driven.measured("inertia", "kg m^2" if driven.rotary else "kg", size)
+        yield driven.measured("inertia", size)
 
 
 def _heavy_rotors(facts: Facts) -> Iterator[Measured]:
@@ -68,35 +62,34 @@ def _heavy_rotors(facts: Facts) -> Iterator[Measured]:
     for driven in _motors(facts) if facts.sizes.extent > TINY else ():
         lever = facts.sizes.extent if driven.joint.is_revolute else 1.0
         size = ratio(driven.motor.at_joint.inertia, facts.sizes.mass * lever**2)
-        yield driven.measured("inertia", "kg m^2" if driven.rotary else "kg", size)
+        yield driven.measured("inertia", size)
 
 
 def _motor_damping(facts: Facts) -> Iterator[Measured]:
     for driven in _motors(facts):
         size = driven.motor.damping / driven.motor.inertia
-        yield driven.measured("damping", "N m s/rad" if driven.rotary else "N s/m", size)
+        yield driven.measured("damping", size)
 
 
-def _shaft_velocities(facts: Facts) -> Iterator[Measured]:
+def _velocities(facts: Facts) -> Iterator[tuple[Measured, _Driven]]:
+    """Limits of velocity in rad/s, each with its motor and as its own size."""
     for driven in _motors(facts):
-        if driven.rotary and math.isfinite(driven.motor.max_velocity):
-            yield driven.measured("max_velocity", "rad/s", driven.motor.max_velocity)
+        measured = driven.measured("max_velocity", driven.motor.max_velocity)
+        if measured.unit == "rad/s" and math.isfinite(measured.value):
+            yield measured, driven
 
 
 def _joint_velocities(facts: Facts) -> Iterator[Measured]:
     """Largest velocity that the motor allows the joint, over the limit of the joint."""
-    for driven in _motors(facts):
-        velocity = driven.motor.at_joint.max_velocity
+    for measured, driven in _velocities(facts):
         limit = max(map(abs, driven.joint.limits.velocity))
-        if driven.rotary and math.isfinite(velocity):
-            size = velocity / limit if math.isfinite(limit) else math.nan
-            yield driven.measured("max_velocity", "rad/s", size)
+        yield measured._replace(size=ratio(driven.motor.at_joint.max_velocity, limit))
 
 
 def _output_velocities(facts: Facts) -> Iterator[Measured]:
-    for driven in _motors(facts):
-        if driven.joint.is_revolute and math.isfinite(driven.motor.max_velocity):
-            yield driven.measured("max_velocity", "rad/s", driven.motor.at_joint.max_velocity)
+    for measured, driven in _velocities(facts):
+        if driven.joint.is_revolute:
+            yield measured._replace(size=driven.motor.at_joint.max_velocity)
 
 
 def _torques(facts: Facts, *, least: bool) -> Iterator[Measured]:
@@ -105,32 +98,28 @@ def _torques(facts: Facts, *, least: bool) -> Iterator[Measured]:
         torque = driven.motor.at_joint.max_torque
         load = float(facts.sizes.loads[driven.number]) if least else facts.sizes.scale(driven.joint)
         if math.isfinite(torque) and (any(facts.gravity) or not least):
-            yield driven.measured("max_torque", "N m" if driven.rotary else "N", ratio(torque, load))
+            yield driven.measured("max_torque", ratio(torque, load))
 
 
 def _joint_damping(facts: Facts) -> Iterator[Measured]:
     for number, joint in enumerate(facts.joints):
-        unit = "N m s/rad" if joint.is_revolute else "N s/m"
-        size = ratio(joint.damping, facts.sizes.scale(joint))
-        yield Measured(joint_path(number, joint, "damping"), joint.damping, unit, size)
+        yield _damping(number, joint, ratio(joint.damping, facts.sizes.scale(joint)))
 
 
 def _braking(facts: Facts) -> Iterator[Measured]:
-    """Damping at the largest velocity over the largest torque of all motors, if these are limited."""
+    """What damping takes at the largest velocity of the joint, over the largest torque; 0 without a limit."""
     for driven in _motors(facts):
         joint, motor = driven.joint, driven.motor.at_joint
         velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))
-        torque = sum(each.max_torque for each in joint.actuator.motors)
-        share = velocity / torque if velocity < FASTEST and math.isfinite(torque) else math.nan
-        yield driven.measured(
-            "damping",
-            "N m s/rad" if driven.rotary else "N s/m",
-            motor.damping * share * len(joint.actuator.motors),
-        )
-        unit = "N m s/rad" if joint.is_revolute else "N s/m"
-        yield Measured(
-            joint_path(driven.number, joint, "damping"), joint.damping, unit, joint.damping * share
-        )
+        if velocity < FASTEST:
+            yield driven.measured("damping", motor.damping * velocity / motor.max_torque)
+            torque = sum(each.max_torque for each in joint.actuator.motors)
+            yield _damping(driven.number, joint, joint.damping * velocity / torque)
+
+
+def _damping(number: int, joint: Joint, size: float) -> Measured:
+    unit = "N m s/rad" if joint.is_revolute else "N s/m"
+    return Measured(joint_path(number, joint, "damping"), joint.damping, unit, size)
 
 
 MOTOR_RULES: tuple[Rule[Facts], ...] = (
@@ -199,7 +188,7 @@ MOTOR_RULES: tuple[Rule[Facts], ...] = (
     Rule(
         name="velocities of motors",
         fields="`max_velocity`",
-        measure=_shaft_velocities,
+        measure=lambda facts: (measured for measured, _ in _velocities(facts)),
         size="rad/s, as written",
         high=2500,
         usual=400,
@@ -213,7 +202,7 @@ MOTOR_RULES: tuple[Rule[Facts], ...] = (
         fields="`max_velocity`",
         measure=_output_velocities,
         size="rad/s, on the joint's side of the gear",
-        high=60,
+        high=FASTEST,
         usual=4,
         finding="is, on the joint's side of the gear, {size} rad/s",
         reason="limbs do not turn so fast",

@@ -11,7 +11,15 @@ import numpy as np
 from vsacli.base import units
 from vsacli.base.units import Quantity
 from vsacli.documents.plausibility import Measured, Rule, Slip
-from vsacli.robot.plausibility.body_rules import CENTIMETRES, DEGREES, MILLIMETRES, ROUNDED, SIZES, in_turns
+from vsacli.robot.plausibility.body_rules import (
+    CENTIMETRES,
+    DEGREES,
+    FASTEST,
+    MILLIMETRES,
+    ROUNDED,
+    SIZES,
+    in_turns,
+)
 from vsacli.robot.plausibility.facts import ratio
 from vsacli.trajectory.plausibility.facts import PER_SECOND, Facts
 
@@ -134,7 +142,7 @@ MOTION_RULES: tuple[Rule[Facts], ...] = (
         fields="`duration`, `times`",
         measure=lambda facts: _velocities(facts, revolute=True),
         size="rad/s, largest velocity",
-        high=60,
+        high=FASTEST,
         usual=2,
         finding="makes {joint} move at up to {size} {unit}",
         reason="limbs do not turn ten times a second",
