@@ -15,6 +15,7 @@ import pytest
 from samples.command_line import Outcome
 from samples.figures import Result, rest_to_rest
 from samples.plants import elastic, rigid, with_actuators
+from samples.remedies import written
 from samples.robots import vsa_3r
 
 from vsacli.analysis.run import inverse_dynamics
@@ -24,7 +25,7 @@ from vsacli.results.plots import compare_files, plot_feasibility, plot_stored
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
-from vsacli.studies.remedies import suggest, write_fixed
+from vsacli.studies.remedies import suggest
 from vsacli.studies.remedies.suggestions import NotPossible, StiffnessOffset, StiffnessProfile
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
@@ -316,7 +317,7 @@ def test_a_suggested_profile_is_of_the_antagonistic_joint_alone(robot: Robot, tm
     assert [offset.joint for offset in found.stiffness_offset.offsets] == ["elbow"]
     assert isinstance(found.stiffness_profile, StiffnessProfile)
     (remedy,) = [each for each in found.remedies if each.stiffness_profile]
-    path, table = write_fixed(remedy, tmp_path / "fixed.yaml")
+    path, table = written(remedy, tmp_path / "fixed.yaml")
     assert table.read_text().splitlines()[0] == "time,elbow.stiffness,elbow.dstiffness,elbow.ddstiffness"
     again = load_trajectory(path, robot)
     assert again.warnings == ()

@@ -73,7 +73,10 @@ def test_nothing_needs_to_change(vsacli, motion):
 
 def test_fixed_trajectory_runs_clean(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml")
-    assert (done.code, done.err) == (3, "wrote fixed.yaml and fixed.csv: suggestion 1\n")
+    assert (done.code, done.err) == (
+        3,
+        "suggestion 1 goes to fixed.yaml\nwrote fixed.yaml\nwrote fixed.csv\n",
+    )
     assert "suggestions, with any one of which" in done.out
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml", "fixed.csv"}
     run = vsacli("invdyn", ROBOT, "fixed.yaml")

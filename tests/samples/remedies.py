@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,12 @@ from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
+from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.variables import Block
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
 from vsacli.robot.model import Robot
+from vsacli.studies.remedies import Remedy, write_fixed
 from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
@@ -129,3 +132,10 @@ def pushed(trajectory: Trajectory, frame: str = "base") -> Trajectory:
         wrench=WrenchProfile(push, frame),
         name="pushed",
     )
+
+
+def written(remedy: Remedy, path: Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+    """The files of a remedy."""
+    with Outputs(overwrite=overwrite) as outputs:
+        write_fixed(remedy, path, outputs)
+    return outputs.paths

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from samples.remedies import pushed, rest_to_rest
+from samples.remedies import pushed, rest_to_rest, written
 from samples.robots import vsa_3r
 
 from vsacli import load_trajectory
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError, StorageError
+from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, WRENCH
-from vsacli.studies.remedies import Remedy, check_fixed_target, write_fixed
+from vsacli.studies.remedies import Remedy, check_fixed_target
 from vsacli.studies.remedies.acceptance import Acceptance
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
 from vsacli.studies.remedies.smallest_changes import AS_IT_IS
@@ -67,10 +68,10 @@ def fixed(trajectory):
 @pytest.mark.parametrize("task", TASKS)
 def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
     robot, remedy = vsa_3r(), fixed(TASKS[task])
-    trajectory, written = remedy.trajectory, write_fixed(remedy, tmp_path / "fixed.yaml")
-    assert written == (tmp_path / "fixed.yaml", tmp_path / "fixed.csv")
-    assert sorted(tmp_path.iterdir()) == sorted(written)
-    again = load_trajectory(written[0], robot)
+    trajectory, paths = remedy.trajectory, written(remedy, tmp_path / "fixed.yaml")
+    assert paths == (tmp_path / "fixed.yaml", tmp_path / "fixed.csv")
+    assert sorted(tmp_path.iterdir()) == sorted(paths)
+    again = load_trajectory(paths[0], robot)
     assert again.name == trajectory.name
     assert all("beyond its via points" in warning for warning in again.warnings)
     before, after = (each.block(0, each.samples) for each in (trajectory, again))
@@ -88,7 +89,7 @@ def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
 @pytest.mark.parametrize(("task", "kind"), [("polynomial", RestToRest), ("constant", Constant)])
 def test_position_stays_a_formula(tmp_path, task, kind):
     robot = vsa_3r()
-    path, table = write_fixed(fixed(TASKS[task]), tmp_path / "fixed.yml")
+    path, table = written(fixed(TASKS[task]), tmp_path / "fixed.yml")
     assert load_trajectory(path, robot).position == TASKS[task].position
     assert isinstance(TASKS[task].position, kind)
     assert ".q" not in table.read_text().splitlines()[0]
@@ -97,7 +98,7 @@ def test_position_stays_a_formula(tmp_path, task, kind):
 def test_many_steps_are_written_block_by_block(tmp_path):
     robot = vsa_3r()
     trajectory = with_changed_stiffness(rest_to_rest(4.0, rate=5000), {1: np.ones((3, 20_001))})
-    path, _ = write_fixed(Remedy(0.0, robot, trajectory), tmp_path / "long.yaml")
+    path, _ = written(Remedy(0.0, robot, trajectory), tmp_path / "long.yaml")
     again = load_trajectory(path, robot)
     assert again.samples == 20_001
     np.testing.assert_array_equal(
@@ -111,18 +112,18 @@ def test_neither_file_is_replaced_unless_asked(tmp_path, existing):
     robot = vsa_3r()
     remedy = Remedy(0.0, robot, with_changed_stiffness(SOFT, {}))
     for act in (
-        lambda: check_fixed_target(tmp_path / "fixed.yaml", overwrite=False),
-        lambda: write_fixed(remedy, tmp_path / "fixed.yaml"),
+        lambda: check_fixed_target(tmp_path / "fixed.yaml", Outputs()),
+        lambda: written(remedy, tmp_path / "fixed.yaml"),
     ):
         with pytest.raises(StorageError, match=rf"{existing}: exists already; .*--overwrite"):
             act()
     assert [path.name for path in tmp_path.iterdir()] == [existing]
     assert (tmp_path / existing).read_text() == "mine"
-    write_fixed(remedy, tmp_path / "fixed.yaml", overwrite=True)
+    written(remedy, tmp_path / "fixed.yaml", overwrite=True)
     assert load_trajectory(tmp_path / "fixed.yaml", robot).samples == SOFT.samples
 
 
 @pytest.mark.parametrize("name", ["fixed", "fixed.csv", "fixed.h5"])
 def test_name_must_be_that_of_a_yaml_file(tmp_path, name):
     with pytest.raises(InputError, match=rf"{name}: .*give a name that ends in \.yaml"):
-        check_fixed_target(tmp_path / name, overwrite=True)
+        check_fixed_target(tmp_path / name, Outputs(overwrite=True))

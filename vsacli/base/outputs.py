@@ -11,10 +11,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self, TextIO
 
-from vsacli.base.atomic_files import already_there, check_target, reporting_storage_errors
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.staging import remove, staging_name, sweep
+from vsacli.base.storage import already_there, check_target, reporting_storage_errors
 from vsacli.base.streams import STANDARD
 
 
@@ -94,21 +94,29 @@ class Outputs:
                 and was not asked for, or cannot be written.
             InputError: the command reads it, or writes another file of this name.
         """
+        target = self.check(path)
+        staged = self._in_new_folder(target) or self._staging(target)
+        with reporting_storage_errors(path):
+            staged.open("xb").close()
+        self._files.append(Staged(Path(path), target, staged))
+        return self._files[-1]
+
+    def check(self, path: str | Path) -> Path:
+        """Refuse what cannot be staged; the file that is meant, links followed.
+
+        Raises:
+            StorageError, InputError: as `file`.
+        """
         if str(path) == STANDARD:
             raise InputError.one("standard output cannot hold this; name a file", path)
         with reporting_storage_errors(path):
             target = Path(os.path.realpath(path))
         if any(target == each.target for each in self._files):
             raise InputError.one("would be written twice by this command; choose different names", path)
-        staged = self._in_new_folder(target)
-        if staged is None:
+        if self._in_new_folder(target) is None:
             self._check_inputs(path)
             check_target(path, overwrite=self._overwrite)
-            staged = self._staging(target)
-        with reporting_storage_errors(path):
-            staged.open("xb").close()
-        self._files.append(Staged(Path(path), target, staged))
-        return self._files[-1]
+        return target
 
     def folder(self, path: str | Path) -> None:
         """Ask for a folder, which is made if it does not exist.

@@ -16,7 +16,6 @@ from vsacli.cli.command_parts import (
     json_option,
     load_inputs,
     overwrite_option,
-    refuse_input_as_output,
     robot_argument,
     run_stem,
     show_report,
@@ -102,34 +101,31 @@ def check_feasibility(
     from vsacli.analysis.run import Run
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.remedies import check_fixed_target, fixed_paths, suggest
+    from vsacli.studies.remedies import check_fixed_target, suggest
 
     margin = NEAR_SINGULAR_MARGIN if near_singular is None else near_singular
     check_near_singular(margin)
-    if fixed is not None:
-        check_fixed_target(fixed, overwrite=overwrite)
-        for path in fixed_paths(fixed):
-            refuse_input_as_output(path, inputs.files)
-    stem = run_stem(robot, trajectory)
-    run = Run(
-        *inputs,
-        stop_on_infeasible=stop_on_infeasible,
-        near_singular=margin,
-        deflections=deflections,
-        engine=engine,
-        threads=threads,
-        asked=("flags",),
-        tell=talk.note,
-    )
-    if plot_folder is None:
-        report = compute(run, talk)
-    else:
-        with Outputs(overwrite=overwrite) as outputs:
-            report = _compute_and_draw(run, plot_folder, stem, outputs, talk)
-        talk.wrote(outputs)
-    suggestions = suggest(*inputs, margin) if advise or fixed is not None else None
-    if suggestions is not None and fixed is not None:
-        _write_fixed(suggestions, 1 if remedy is None else remedy, fixed, overwrite, talk)
+    with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
+        if fixed is not None:
+            check_fixed_target(fixed, outputs)
+        run = Run(
+            *inputs,
+            stop_on_infeasible=stop_on_infeasible,
+            near_singular=margin,
+            deflections=deflections,
+            engine=engine,
+            threads=threads,
+            asked=("flags",),
+            tell=talk.note,
+        )
+        if plot_folder is None:
+            report = compute(run, talk)
+        else:
+            report = _compute_and_draw(run, plot_folder, run_stem(robot, trajectory), outputs, talk)
+        suggestions = suggest(*inputs, margin) if advise or fixed is not None else None
+        if suggestions is not None and fixed is not None:
+            _write_fixed(suggestions, 1 if remedy is None else remedy, fixed, outputs, talk)
+    talk.wrote(outputs)
     return show_report(report, as_json, suggestions)
 
 
@@ -156,14 +152,14 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
     return report
 
 
-def _write_fixed(suggestions: Suggestions, number: int, path: str, overwrite: bool, talk: Talk) -> None:
+def _write_fixed(suggestions: Suggestions, number: int, path: str, outputs: Outputs, talk: Talk) -> None:
     """Write one of the suggestions, if there is one, and say what was written."""
     from vsacli.studies.remedies import write_fixed
 
     remedies = suggestions.remedies
     if number <= len(remedies):
-        written = write_fixed(remedies[number - 1], path, overwrite=overwrite)
-        talk.note(f"wrote {' and '.join(map(str, written))}: suggestion {number}")
+        write_fixed(remedies[number - 1], path, outputs)
+        talk.note(f"suggestion {number} goes to {path}")
         return
     if suggestions.slow_down is None:
         reason = "nothing needs to change"

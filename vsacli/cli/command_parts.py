@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from vsacli.base.errors import InputError
 from vsacli.base.streams import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say
 
@@ -130,16 +128,6 @@ def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
         if writer is not None:
             writer.finish(report.as_json())
     return report
-
-
-def refuse_input_as_output(output: Path, inputs: Iterable[str | Path]) -> None:
-    """Refuse to replace a file that the command reads, which --overwrite alone would allow.
-
-    Raises:
-        InputError: `output` is one of the inputs.
-    """
-    if os.path.exists(output) and any(os.path.samefile(output, path) for path in inputs):
-        raise InputError.one("is read by this command; choose another name for its output", output)
 
 
 def run_stem(robot_path: str, trajectory_path: str) -> str:

@@ -13,10 +13,10 @@ from typing import Any, Protocol, Self
 import h5py
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.atomic_files import check_free_space, reporting_storage_errors, storage_error
 from vsacli.base.errors import InputError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
+from vsacli.base.storage import check_free_space, reporting_storage_errors, storage_error
 from vsacli.base.variables import UNCERTAIN, VARIABLES, Variable, deviation, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes

@@ -10,7 +10,6 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from vsacli.base.atomic_files import check_target
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
@@ -31,33 +30,29 @@ def fixed_paths(path: str | Path) -> tuple[Path, Path, Path]:
     return document, document.with_suffix(".csv"), document.with_name(f"{document.stem}-robot.yaml")
 
 
-def check_fixed_target(path: str | Path, *, overwrite: bool) -> None:
+def check_fixed_target(path: str | Path, outputs: Outputs) -> None:
     """Refuse a YAML path that cannot be written, or beside which the others cannot.
 
     Raises:
         InputError: it does not end in .yaml or .yml.
-        StorageError: a file exists and `overwrite` is false, or its folder does not exist.
+        StorageError: as `Outputs.file`.
     """
     if Path(path).suffix not in (".yaml", ".yml"):
         raise InputError.one("the fixed trajectory is a YAML file; give a name that ends in .yaml", path)
     for file in fixed_paths(path):
-        check_target(file, overwrite=overwrite)
+        outputs.check(file)
 
 
-def write_fixed(remedy: Remedy, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
     """Write the trajectory of a remedy, and its robot if that has another preload.
 
     Signals stay formulas where they are; else they are recorded at the steps with all their derivatives, in a
     CSV file of the same stem. The robot file is that of the robot with the preload changed.
 
-    Returns:
-        The paths of the files that were written.
-
     Raises:
         InputError, StorageError: as `check_fixed_target`, or the robot file cannot be changed so, or the disk
-            fails; nothing is written then.
+            fails.
     """
-    check_fixed_target(path, overwrite=overwrite)
     document, table, robot = fixed_paths(path)
     trajectory, names = remedy.trajectory, remedy.robot.joint_names
     formulas = _formulas(trajectory)
@@ -69,11 +64,9 @@ def write_fixed(remedy: Remedy, path: str | Path, *, overwrite: bool = False) ->
         contents[table] = lambda file: _write_table(trajectory, recorded, names, file)
     if remedy.preload is not None:
         contents[robot] = lambda file: file.write(robot_text(remedy, robot.parent))
-    with Outputs(overwrite=overwrite) as outputs:
-        for target, write in contents.items():
-            with outputs.file(target).opened() as stream:
-                write(stream)
-    return tuple(contents)
+    for target, write in contents.items():
+        with outputs.file(target).opened() as stream:
+            write(stream)
 
 
 def _formulas(trajectory: Trajectory) -> dict[Signal, dict[str, Any] | None]:

@@ -1,0 +1,83 @@
+"""What can be in the way of writing a file, and the sentences for it."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from vsacli.base.errors import StorageError
+
+_REASON = {
+    errno.ENOSPC: "the disk is full",
+    errno.EDQUOT: "the disk quota is exhausted",
+    errno.EFBIG: "the file would exceed the largest file size allowed here",
+    errno.EACCES: "no permission to write into this folder",
+    errno.EROFS: "the file system is read-only",
+    errno.ENAMETOOLONG: "the file name is too long",
+}
+
+
+UNCHECKED_BYTES = 2**24
+"""Size up to which a file is sooner written than its disk is asked for room."""
+
+
+@contextlib.contextmanager
+def reporting_storage_errors(path: str | Path) -> Iterator[None]:
+    """Turn an OSError of the enclosed statements into a StorageError about `path`."""
+    try:
+        yield
+    except OSError as error:
+        raise storage_error(path, error) from error
+
+
+def storage_error(path: str | Path, error: OSError) -> StorageError:
+    """The sentence for an operating system error met while writing `path`."""
+    reason = _REASON.get(error.errno or 0, error.strerror or str(error))
+    return StorageError(path, f"cannot be written: {reason}; nothing was changed there")
+
+
+def check_target(path: str | Path, *, overwrite: bool) -> Path:
+    """The file that `path` means, links followed, if it may be written.
+
+    Raises:
+        StorageError: it exists and `overwrite` is false, it is no regular file, or its folder does not exist.
+    """
+    with reporting_storage_errors(path):
+        target = Path(os.path.realpath(path))
+        if target.is_dir():
+            raise StorageError(path, "is a folder; give the name of a file")
+        if not target.parent.is_dir():
+            raise StorageError(path, f"there is no folder {target.parent}; create it or choose another one")
+        if target.exists() and not target.is_file():
+            raise StorageError(path, "is not a regular file and cannot be replaced")
+        if target.exists() and not overwrite:
+            raise already_there(path)
+    return target
+
+
+def check_free_space(path: str | Path, size: int) -> None:
+    """Refuse a file of `size` bytes that its disk has no room for, from `UNCHECKED_BYTES` on.
+
+    Raises:
+        StorageError: with both sizes in MB.
+    """
+    if size < UNCHECKED_BYTES:
+        return
+    import shutil
+
+    with reporting_storage_errors(path):
+        free = shutil.disk_usage(Path(os.path.realpath(path)).parent).free
+    if size > free:
+        raise StorageError(
+            path,
+            f"needs {size / 1e6:.0f} MB, but the disk has {free / 1e6:.0f} MB left; "
+            "free some space, or store fewer variables with --variables",
+        )
+
+
+def already_there(path: str | Path) -> StorageError:
+    """What to say of a file that must not be replaced."""
+    return StorageError(path, "exists already; choose another name, or replace it with --overwrite")
