@@ -39,10 +39,10 @@ class PlaceholderConstants(NamedTuple):
 
     @property
     def only_motor(self) -> Motor:
-        """A motor that drives the joint alone."""
+        """A motor that drives the joint alone; its inertia has fewer digits than a division leaves."""
         ratio = abs(self.gear_ratio or 1.0)
         return Motor(
-            inertia=self.motor_inertia / (ratio * ratio),
+            inertia=float(f"{self.motor_inertia / (ratio * ratio):.12g}"),
             max_torque=self.max_torque / ratio,
             gear_ratio=self.gear_ratio,
         )

@@ -99,11 +99,13 @@ def _gyrations(facts: Facts) -> Iterator[Measured]:
 
 
 def _crowding(facts: Facts) -> Iterator[Measured]:
-    """The heaviest link, in the name of all."""
+    """The heaviest link, in the name of all, unless none has a mass, which the robot says by itself."""
     heaviest = max(_masses(facts), key=lambda measured: measured.value)
-    yield heaviest._replace(
-        size=ratio(facts.sizes.mass, facts.sizes.extent**3), beside={"extent": f"{facts.sizes.extent:.3g}"}
-    )
+    if heaviest.value > 0:
+        yield heaviest._replace(
+            size=ratio(facts.sizes.mass, facts.sizes.extent**3),
+            beside={"extent": f"{facts.sizes.extent:.3g}"},
+        )
 
 
 def _gravity(facts: Facts) -> Measured:

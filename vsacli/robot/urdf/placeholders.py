@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from vsacli.actuators.actuator import PlaceholderConstants
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.units import TORQUE
 from vsacli.robot.joint import DenavitHartenberg, Link
 from vsacli.robot.urdf.serial_chain import STANDARD_GRAVITY, ChainJoint
@@ -61,13 +62,14 @@ class Placeholders(NamedTuple):
 
     def constants(self, joint: ChainJoint, load: JointLoad) -> PlaceholderConstants:
         """Those of a joint with what it carries, its effort limit, and its gear."""
-        own = load.constants(DEFLECTION[joint.is_revolute])
+        gear = joint.urdf.gear_ratio if ACTUATORS[self.actuator].motor_count == 1 else None
+        own = load.constants(DEFLECTION[joint.is_revolute], gear or 1.0)
         return PlaceholderConstants(
             motor_inertia=own.motor_inertia if self.motor_inertia is None else self.motor_inertia,
             stiffness=own.stiffness if self.stiffness is None else self.stiffness,
             spring=own.spring if self.spring is None else self.spring,
             max_torque=joint.urdf.limit.effort or math.inf,
-            gear_ratio=joint.urdf.gear_ratio,
+            gear_ratio=gear,
         )
 
     def origin(self, field: str, joint: ChainJoint, load: JointLoad) -> str:
@@ -98,14 +100,14 @@ class JointLoad(NamedTuple):
         """Whether there is anything to carry."""
         return self.torque > LEAST_TORQUE and self.inertia > LEAST_INERTIA
 
-    def constants(self, deflection: float) -> PlaceholderConstants:
-        """Constants with which the load deflects the springs by so much, rad (m)."""
+    def constants(self, deflection: float, gear: float) -> PlaceholderConstants:
+        """Constants with which the load deflects the springs by so much, rad (m), of motors behind a gear."""
         if not self.is_there:
             return UNLOADED
         stiffness = _rounded(self.torque / deflection)
         k = _rounded(stiffness / 2)
         return PlaceholderConstants(
-            motor_inertia=_rounded(MOTOR_SHARE * self.inertia),
+            motor_inertia=_rounded(MOTOR_SHARE * self.inertia / gear**2) * gear**2,
             stiffness=stiffness,
             spring=(k, _rounded(HARDENING * k / deflection**2)),
         )
