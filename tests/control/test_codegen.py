@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import shutil
 import subprocess
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -224,3 +226,18 @@ def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(
             values[chosen], expected[chosen], rtol=0, atol=FLOAT_BOUND[name] * scale, err_msg=key
         )
+
+
+@needs_compiler
+def test_files_of_two_robots_do_not_go_together(tmp_path: Path) -> None:
+    """As a process leaves them that is killed between two names in a folder that was there."""
+    for name, robot in (("new", ROBOTS["3R"]), ("old", replace(ROBOTS["3R"], gravity=(0.0, 0.0, -1.62)))):
+        (tmp_path / name).mkdir()
+        for file, text in generate(robot).files.items():
+            (tmp_path / name / file).write_text(text, encoding="utf-8")
+    for name in ("vsa_3r.c", "vsa_3r_test.c"):
+        shutil.copy(tmp_path / "old" / name, tmp_path / "new" / name)
+        command = ["cc", "-std=c99", "-fsyntax-only", name]
+        done = subprocess.run(command, cwd=tmp_path / "new", capture_output=True, text=True, check=False)
+        assert done.returncode != 0
+        assert "this file and vsa_3r.h were not written together: generate both again" in done.stderr

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from vsacli.base.flags import Flag
 from vsacli.base.texts import for_comment
 from vsacli.control.codegen.interface import Array, Function, Structure
-from vsacli.control.codegen.scalar import WIDTH, signature
+from vsacli.control.codegen.scalar import DIGEST, WIDTH, signature
 from vsacli.robot.model import Robot
 
 
@@ -18,6 +18,7 @@ def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precis
     parts = [
         head,
         f"#ifndef {guard}\n#define {guard}",
+        f"/* The same in all files that were written together. */\n#define {prefix.upper()}_DIGEST {DIGEST}",
         '#ifdef __cplusplus\nextern "C" {\n#endif',
         _joints(prefix, robot),
         "\n".join(_flags(prefix)),

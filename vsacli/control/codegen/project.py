@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +16,7 @@ from vsacli.control.codegen.feedback_function import feedback_linearization_func
 from vsacli.control.codegen.header import comment, header_text
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.scalar import signature, source_text
+from vsacli.control.codegen.scalar import DIGEST, signature, source_text
 from vsacli.control.codegen.self_test import TOLERANCE, Reference, self_test_text
 from vsacli.robot.model import Robot
 
@@ -141,7 +142,13 @@ def generate(robot: Robot, precision: str = "double") -> Project:
         }
     except NotImplementedError as error:
         raise InputError.one(f"no C code can be made of {robot.name}: {error}") from error
-    return Project(files, omitted, robot.warnings)
+    return Project(_sealed(files), omitted, robot.warnings)
+
+
+def _sealed(files: dict[str, str]) -> dict[str, str]:
+    """The texts with their common digest."""
+    digest = hashlib.sha256("".join(files.values()).encode()).hexdigest()
+    return {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
 
 
 def _functions(robot: Robot) -> tuple[list[Function], list[str]]:

@@ -41,6 +41,19 @@ static inline int search(const {type} *nodes, int count, {type} x)
 """Functions beyond math.h; of the two sides of a comparison, maximum and minimum let NaN pass."""
 
 
+DIGEST = "0xd19e5700u"
+"""Stands in the texts for the digest of all of them until that is known; C that is read before is valid."""
+
+
+def included(prefix: str) -> str:
+    """How a file includes the header, of which it takes none but its own."""
+    return f"""#include "{prefix}.h"
+
+#if {prefix.upper()}_DIGEST != {DIGEST}
+#error "this file and {prefix}.h were not written together: generate both again"
+#endif"""
+
+
 _STRICT = """#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
 #error "compile without -ffast-math and -ffinite-math-only: what is not finite would go unnoticed"
 #endif"""
@@ -137,8 +150,7 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
     declarations = list(table_declarations(tables, dialect))
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
     helpers = [_helper(name, precision) for name in HELPERS if name in used]
-    includes = f'#include "{prefix}.h"\n\n#include <math.h>'
-    parts = [head, includes, _STRICT, "\n".join(declarations), *helpers, *bodies]
+    parts = [head, included(prefix), "#include <math.h>", _STRICT, "\n".join(declarations), *helpers, *bodies]
     return "\n\n".join(filter(None, parts)) + "\n"
 
 

@@ -10,6 +10,7 @@ from vsacli.base.arrays import FloatArray, over_time
 from vsacli.base.signals import POSITION, orders_of_derivation
 from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.interface import Array, Function
+from vsacli.control.codegen.scalar import included
 from vsacli.control.gains import STIFFNESS_ORDER
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
@@ -146,7 +147,8 @@ def self_test_text(
     """The test program; arguments as of `vsacli.control.codegen.scalar.source_text`."""
     parts = [
         head,
-        f'#include "{prefix}.h"\n\n#include <math.h>\n#include <stdio.h>',
+        included(prefix),
+        "#include <math.h>\n#include <stdio.h>",
         f"enum {{ CASES = {CASES} }};",
         _COMPARISON.format(tolerance=TOLERANCE[precision]),
     ]
