@@ -19,7 +19,7 @@ from vsacli.compute.engine.compiler import Library
 from vsacli.compute.engine.engines import kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.control.codegen.interface import Array, Function, Structure
-from vsacli.control.codegen.scalar import source_text
+from vsacli.control.codegen.scalar import DIGEST, source_text
 
 pytestmark = needs_compiler
 
@@ -77,6 +77,7 @@ def test_of_single_samples(tmp_path: Path) -> None:
     results = Structure("results", "", (Array("y", (Everything.outputs,), ""),))
     function = Function("all", "", (("values", values),), results, Everything())
     (tmp_path / "each.h").write_text(
+        f"#define EACH_DIGEST {DIGEST}\n"
         "typedef struct { double x[2]; } each_values;\n"
         f"typedef struct {{ double y[{Everything.outputs}]; }} each_results;\n"
         "unsigned each_all(const each_values *values, each_results *results);\n"
