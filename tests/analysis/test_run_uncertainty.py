@@ -132,8 +132,8 @@ def test_torques_that_are_not_determined_make_a_run_doubtful():
     text = str(report).splitlines()
     assert text[0].endswith("DOUBTFUL (3 of 3 joints)")
     assert any(
-        line.startswith("elbow: tau_motor is not determined by the record: +- ")
-        and line.endswith("% of its root mean square, more than 10.00 %")
+        line.startswith("elbow: tau_motor is not determined by the record: it may be wrong by ")
+        and line.endswith(" N m; 10 % is allowed")
         for line in text
     )
     spread = report.joints[0].uncertainty.variables["tau_motor"]
@@ -159,11 +159,30 @@ def test_it_is_what_was_asked_for_that_must_be_determined():
 def test_a_component_that_is_not_determined_makes_doubtful_what_depends_on_it():
     report = inverse_dynamics(vsa_3r(), swinging(STEADY, known=False)).report
     assert report.verdict == "doubtful"
-    assert str(report).count("is not determined by the record, since a derivative") == 3
+    assert str(report).count("is not determined by the record, since a signal") == 3
     assert report.as_json()["joints"][0]["uncertainty"]["variables"]["tau_motor"]["rms"] is None
     run = Run(vsa_3r(), swinging(STEADY, known=False), asked=["q"])
     assert list(run)
     assert [bool(joint.uncertainty.undetermined) for joint in run.report().joints] == [False, False, True]
+
+
+@pytest.mark.parametrize(("deviations", "verdict"), [(STEADY, "ok"), (SHAKY, "doubtful")])
+def test_a_bound_decides_without_being_stated(deviations, verdict):
+    trajectory = swinging(deviations)
+    position = dataclasses.replace(trajectory.position, known=False)
+    result = inverse_dynamics(
+        limited(position=0.2999), Trajectory(trajectory.times, position, trajectory.commanded, name="bound")
+    )
+    assert result.report.verdict == ("over_limit" if verdict == "ok" else verdict)
+    assert np.isnan(result.tau_motor_std).all()
+    assert np.isnan(result.q_std).all()
+    spread = result.report.joints[0].uncertainty.variables["tau_motor"]
+    assert math.isnan(spread.rms)
+    assert math.isnan(spread.share)
+    stated = inverse_dynamics(vsa_3r(), trajectory).report.joints[0].uncertainty.variables["tau_motor"]
+    assert spread.bound == stated.bound == 2 * stated.share
+    assert "+- unknown, wrong by at most " in str(result.report)
+    assert result.report.joints[0].uncertainty.limits == {}  # no deviation to allow for
 
 
 def test_the_doubtful_ends_of_a_record_do_not_count():
@@ -178,6 +197,7 @@ def test_the_doubtful_ends_of_a_record_do_not_count():
     position = Frayed(steady.exact, steady.covariances, doubtful=(0.21, 0.11))
     ends = Trajectory(UniformTimes(SPAN[1], 500.0), position, swinging(STEADY).commanded, name="frayed")
     assert inverse_dynamics(vsa_3r(), ends).report.verdict == "ok"
+    assert "doubtful end" not in str(inverse_dynamics(vsa_3r(), ends).report)
     shorter = dataclasses.replace(position, doubtful=(0.19, 0.11))
     cut = Trajectory(ends.times, shorter, ends.commanded, name="frayed")
     assert inverse_dynamics(vsa_3r(), cut).report.verdict == "doubtful"
@@ -207,7 +227,7 @@ def test_doubtful_is_worse_than_infeasible():
 
 
 def test_a_spread_that_is_not_a_number_determines_nothing():
-    assert not Spread("tau_motor", math.nan, math.nan, math.nan, "N m").determined
-    assert Spread("tau_motor", 0.0, 0.0, 0.0, "N m").determined
+    assert not Spread("tau_motor", math.nan, math.nan, math.nan, math.nan, 9.0, "N m").determined
+    assert Spread("tau_motor", 0.0, 0.0, 0.0, 0.0, 9.0, "N m").determined
     assert JointUncertainty().undetermined == ()
     assert deviation("d4q") == "d4q_std"

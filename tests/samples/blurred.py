@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.trajectory.curves.closed_form import ClosedForm
 
 
@@ -26,6 +26,7 @@ class Blurred:
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     doubtful: tuple[float, float] = (0.0, 0.0)
+    known: bool = True
     fit: Any = field(init=False)
 
     def __post_init__(self) -> None:
@@ -43,6 +44,10 @@ class Blurred:
     @property
     def estimate(self) -> Blurred:
         return self
+
+    @property
+    def stated(self) -> BoolArray:
+        return np.full(self.components, self.known)
 
     @property
     def estimated(self) -> tuple[str, ...]:

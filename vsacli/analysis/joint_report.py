@@ -25,7 +25,7 @@ UNKNOWN = (math.nan, math.nan)
 
 
 DETERMINED = 0.1
-"""Largest share of a variable's root mean square that its standard deviation may have."""
+"""Largest share of a variable's root mean square by which it may be wrong."""
 
 JUDGED = "tau_motor"
 """The variable that a run is for, unless others are asked for."""
@@ -56,25 +56,30 @@ class Spread(Stored):
     Attributes:
         name: of the variable.
         rms: root mean square of its standard deviation; of the motor with the larger one, if it is one of
-            motors. NaN if the records do not determine it.
+            motors. NaN if none can be stated, as the records do not determine a derivative.
         max: largest standard deviation.
         share: of the root mean square of the variable itself that `rms` is; the larger one of both motors.
-        unit: of the deviations.
+        bound: share by which the variable may be wrong, twice `share`; where none is stated, what trials with
+            such records left. NaN if nothing can be said.
+        peak: largest size of the variable itself.
+        unit: of all but the share.
     """
 
     name: str
     rms: float
     max: float
     share: float
+    bound: float
+    peak: float
     unit: str
 
     key: ClassVar = "name"
-    shape: ClassVar = named("rms", "max", "share", "unit")
+    shape: ClassVar = named("rms", "max", "share", "bound", "peak", "unit")
 
     @property
     def determined(self) -> bool:
         """Whether the records determine the variable to `DETERMINED`."""
-        return self.share <= DETERMINED
+        return self.bound <= DETERMINED
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Self
 from vsacli.analysis import report_text as text
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
+from vsacli.analysis.uncertainty_text import uncertainty_lines
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.tables import aligned
 
@@ -74,7 +75,7 @@ class Report(Stored):
                 *aligned(text.joint_rows(self.joints)),
                 *text.warnings_and_notes(self.warnings, self.notes),
                 *(sentence for joint in self.joints for sentence in text.sentences(joint)),
-                *text.uncertainty_lines(self.joints),
+                *uncertainty_lines(self.joints),
                 *text.stops(self.joints, self.drifts),
                 *text.start(self.joints),
                 *text.end(self.joints),

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointDrift, JointReport, Spread, Worst
+from vsacli.analysis.joint_report import JointDrift, JointReport, Worst
 from vsacli.analysis.self_check import SelfCheck
 from vsacli.base.flags import Flag
 from vsacli.base.units import POSITION, TORQUE, VELOCITY, time_text
@@ -59,14 +59,14 @@ def joint_rows(joints: Iterable[JointReport]) -> list[tuple[str, ...]]:
 
 def _row(joint: JointReport) -> tuple[str, ...]:
     torque = TORQUE.unit(joint.type)
-    motors = " / ".join(_number(peak) for peak in _of_motors(joint, joint.peak_tau_motor))
+    motors = " / ".join(number(peak) for peak in of_motors(joint, joint.peak_tau_motor))
     return (
         joint.name,
-        f"{_number(joint.peak_tau_e)} {torque}",
+        f"{number(joint.peak_tau_e)} {torque}",
         f"{motors} {torque}",
         _span(joint.stiffness_min, joint.stiffness_max),
         *(
-            (_corridor(*joint.reachable), _percent(joint.margin))
+            (_corridor(*joint.reachable), percent(joint.margin))
             if "stiffness" in _kind(joint).commanded
             else ("-", "-")
         ),
@@ -78,7 +78,7 @@ def _kind(joint: JointReport) -> type[Actuator]:
     return kind
 
 
-def _of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
+def of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
     """Of a pair of numbers those of the motors that the joint has."""
     return pair[: _kind(joint).motor_count]
 
@@ -86,7 +86,7 @@ def _of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ..
 def _corridor(lower: float, upper: float) -> str:
     if math.isnan(lower):
         return "nothing"
-    return f"from {_number(lower)}" if math.isinf(upper) else f"{_number(lower)}-{_number(upper)}"
+    return f"from {number(lower)}" if math.isinf(upper) else f"{number(lower)}-{number(upper)}"
 
 
 def _span(low: float, high: float) -> str:
@@ -95,12 +95,12 @@ def _span(low: float, high: float) -> str:
     return f"{low:.6g}" if low == high else f"{low:.6g}-{high:.6g}"
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     """One decimal for large numbers, three digits for small ones and for those that no machine has."""
     return "-" if math.isnan(value) else f"{value:.1f}" if 10 <= abs(value) < HUGE else f"{value:.3g}"
 
 
-def _percent(share: float) -> str:
+def percent(share: float) -> str:
     """Two decimals, or one digit of what is smaller."""
     if math.isnan(share):
         return "none"
@@ -171,10 +171,11 @@ def _not_finite(joint: JointReport, worst: Worst) -> str:
 
 
 def _limit(joint: JointReport, worst: Worst) -> str:
-    return f"{_excess(worst)} (first at {time_text(joint.first_time[worst.kind])})"
+    return f"{excess(worst)} (first at {time_text(joint.first_time[worst.kind])})"
 
 
-def _excess(worst: Worst) -> str:
+def excess(worst: Worst) -> str:
+    """By how much a limit is exceeded, and where."""
     whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
     value, bound = _apart(worst.value, worst.bound)
     relation = "below" if worst.value < worst.bound else "above"
@@ -189,41 +190,11 @@ _SENTENCES = {
 }
 
 
-def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
-    """How uncertain the motor torques of recorded motions are, and what that means for the rest."""
-    found = [(joint, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
-    for joint, uncertainty in found:
-        yield from (f"{joint.name}: {_undetermined(spread)}" for spread in uncertainty.undetermined)
-        for kind, steps in uncertainty.steps.items():
-            if steps:
-                share = f"{steps} of {count(joint.steps[kind])}"
-                yield f"{joint.name}: {share} that are {kind} may be otherwise within their uncertainty"
-        for worst in uncertainty.limits.values():
-            yield f"{joint.name}: {_excess(worst)} by less than its uncertainty, and does not count"
-    torques = [(joint.name, each.variables[JUDGED]) for joint, each in found if JUDGED in each.variables]
-    if torques:
-        yield _by_joint("motor torque: ", [_spread(name, spread) for name, spread in torques])
-
-
-def _spread(name: str, spread: Spread) -> str:
-    if math.isnan(spread.rms):
-        return f"{name} not determined"
-    return f"{name} +- {spread.rms:.2g} {spread.unit} ({_percent(spread.share)})"
-
-
-def _undetermined(spread: Spread) -> str:
-    what = f"{spread.name} is not determined by the record"
-    if math.isnan(spread.rms):
-        return f"{what}, since a derivative that it depends on is not"
-    share, most = _percent(spread.share), _percent(DETERMINED)
-    return f"{what}: +- {spread.rms:.2g} {spread.unit} is {share} of its root mean square, more than {most}"
-
-
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
     """Where the motors are at the first step, which of them move, and the largest step of a torque there."""
-    yield _by_joint("start motors at: ", [_positions(joint, joint.start_theta, "first") for joint in joints])
+    yield by_joint("start motors at: ", [_positions(joint, joint.start_theta, "first") for joint in joints])
     yield from _moving("motors move at the start: ", joints, [joint.start_dtheta for joint in joints])
-    steps = [(max(_of_motors(joint, joint.torque_step)), joint) for joint in joints]
+    steps = [(max(of_motors(joint, joint.torque_step)), joint) for joint in joints]
     defined = [entry for entry in steps if not math.isnan(entry[0])]
     if defined:
         step, joint = max(defined, key=lambda entry: entry[0])
@@ -234,12 +205,12 @@ def end(joints: Sequence[JointReport]) -> Iterator[str]:
     """Where the motors are at the last step, and which of them still move; nothing if it was not computed."""
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
-    yield _by_joint("end motors at: ", [_positions(joint, joint.end_theta, "last") for joint in joints])
+    yield by_joint("end motors at: ", [_positions(joint, joint.end_theta, "last") for joint in joints])
     yield from _moving("motors move at the end: ", joints, [joint.end_dtheta for joint in joints])
 
 
 def _positions(joint: JointReport, theta: tuple[float, float], step: str) -> str:
-    positions = _of_motors(joint, theta)
+    positions = of_motors(joint, theta)
     if any(map(math.isnan, positions)):
         return f"{joint.name} undefined ({step} step infeasible)"
     return f"{joint.name} {_signed(positions)} {POSITION.unit(joint.type)}"
@@ -251,7 +222,7 @@ def _moving(
     """The joints whose motors do not rest at an end of the motion, and how fast they are."""
     fastest = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
     moving = [
-        f"{joint.name} {_signed(_of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
+        f"{joint.name} {_signed(of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
         for joint, dtheta in zip(joints, velocities, strict=True)
         if any(
             abs(speed) > max(RESTING_SHARE * peak, ROUNDING_SHARE * fastest)
@@ -259,7 +230,7 @@ def _moving(
         )
     ]
     if moving:
-        yield _by_joint(label, moving)
+        yield by_joint(label, moving)
 
 
 def _signed(values: Iterable[float]) -> str:
@@ -271,16 +242,16 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
     energies = [energy for _, _, energy in joints]
     if not any(math.isnan(energy.spent) for energy in energies):
         spent, recovered = (
-            _number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
+            number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
         )
         name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
-        held = f"; springs hold up to {_number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
+        held = f"; springs hold up to {number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
         yield f"energy: motors spend {spent} J, take back {recovered} J{held}"
     paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
     if paired:
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
         unit = TORQUE.unit(joint_type)
-        effort, load = f"{_number(most.co_contraction)} {unit}", f"{_number(most.load)} {unit}"
+        effort, load = f"{number(most.co_contraction)} {unit}", f"{number(most.load)} {unit}"
         yield f"co-contraction: up to {effort} rms for each motor ({name}), its load takes {load}"
 
 
@@ -297,7 +268,7 @@ def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterat
 def drift_lines(drifts: Sequence[JointDrift]) -> Iterator[str]:
     """How far integrated deflections drifted, if they were."""
     if drifts:
-        yield _by_joint("drift of the integration: ", [_drift_of(drift) for drift in drifts])
+        yield by_joint("drift of the integration: ", [_drift_of(drift) for drift in drifts])
 
 
 def _drift_of(drift: JointDrift) -> str:
@@ -306,7 +277,7 @@ def _drift_of(drift: JointDrift) -> str:
     return f"{drift.joint} {drift.largest:.1e} {drift.unit} at {time_text(drift.time)}"
 
 
-def _by_joint(label: str, entries: Sequence[str]) -> str:
+def by_joint(label: str, entries: Sequence[str]) -> str:
     """What is to be said of each joint, a few to a line."""
     lines = [
         ", ".join(entries[first : first + JOINTS_PER_LINE])

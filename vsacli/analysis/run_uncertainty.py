@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.actuators.limit_check import ALLOWED_DEVIATIONS
 from vsacli.actuators.reach import margin
 from vsacli.analysis.joint_report import JUDGED, JointUncertainty, Spread, Worst
-from vsacli.base.arrays import AnyArray, FloatArray
+from vsacli.base.arrays import AnyArray, BoolArray, FloatArray
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.variables import UNCERTAIN, VARIABLES, Block, deviation
 from vsacli.compute.engine import NUMPY, Engine
@@ -83,9 +83,11 @@ class RunUncertainty:
         for name, array in deviations.items():
             values = getattr(block, name)
             array[np.isnan(values)] = np.nan
+            unstated = self._deviations.unstated[name]
             if name in self._shown:
-                powers = self._powers.setdefault(name, _Powers(values.shape[1:]))
+                powers = self._powers.setdefault(name, _Powers(unstated))
                 powers.add(values[inside], array[inside])
+            array[:, unstated] = np.nan
         stored = {deviation(name): array for name, array in deviations.items()}
         block = Block(**{**block.arrays(), **stored, "flags": block.flags.copy()})
         for index in range(len(self._robot.joints)):
@@ -132,9 +134,15 @@ class RunUncertainty:
 class _Powers:
     """Sums over steps of the squares of a variable and of its deviation, (joints[, 2])."""
 
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        self._count, self._values, self._deviations = np.zeros((3, *shape))
-        self._largest = np.zeros(shape)
+    def __init__(self, unstated: BoolArray) -> None:
+        """Begin.
+
+        Args:
+            unstated: of which the deviation must not be stated, (joints[, 2]).
+        """
+        self._unstated = unstated
+        self._count, self._values, self._deviations = np.zeros((3, *unstated.shape))
+        self._peak, self._largest = np.zeros((2, *unstated.shape))
 
     def add(self, values: FloatArray, deviations: FloatArray) -> None:
         """Merge steps, (samples, joints[, 2]); those without a value do not count."""
@@ -142,6 +150,7 @@ class _Powers:
         self._count += np.sum(exists, axis=0)
         self._values += np.sum(values**2, axis=0, where=exists)
         self._deviations += np.sum(deviations**2, axis=0, where=exists)
+        self._peak = np.maximum(self._peak, np.max(np.abs(values), axis=0, where=exists, initial=0.0))
         self._largest = np.maximum(self._largest, np.max(deviations, axis=0, where=exists, initial=0.0))
 
     def spreads(self, name: str, types: AnyArray) -> Iterator[tuple[int, Spread]]:
@@ -149,14 +158,14 @@ class _Powers:
         with np.errstate(invalid="ignore"):
             size, rms = np.sqrt([self._values / self._count, self._deviations / self._count])
         for index, joint_type in enumerate(types):
-            if not np.any(self._count[index]):
+            there = self._count[index] > 0
+            if not there.any():
                 continue
             least = SMALLEST_SHARE * np.nanmax(size[types == joint_type])
             scale = np.maximum(size[index], least)
             share = np.divide(rms[index], scale, out=np.zeros_like(scale), where=rms[index] != 0)
-            unit = VARIABLES[name].quantity.unit(joint_type)
-            rms_of_worst, largest, worst_share = (
-                float(np.max(each, where=self._count[index] > 0, initial=0.0))
-                for each in (rms[index], self._largest[index], share)
-            )
-            yield index, Spread(name, rms_of_worst, largest, worst_share, unit)
+            stated = {"rms": rms[index], "max": self._largest[index], "share": share}
+            stated = {key: np.where(self._unstated[index], np.nan, each) for key, each in stated.items()}
+            every = {**stated, "bound": ALLOWED_DEVIATIONS * share, "peak": self._peak[index]}
+            worst = {key: float(np.max(each, where=there, initial=0.0)) for key, each in every.items()}
+            yield index, Spread(name=name, unit=VARIABLES[name].quantity.unit(joint_type), **worst)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.reach import margin
-from vsacli.base.arrays import AnyArray, FloatArray
+from vsacli.base.arrays import AnyArray, BoolArray, FloatArray
 from vsacli.base.signals import orders_of_derivation
 from vsacli.base.variables import UNCERTAIN, Block
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
@@ -36,8 +36,12 @@ class Uncertainty:
     """Standard deviations of what recorded signals have a part in: computed at some times, linear in between.
 
     Times at which a value does not exist, as the step is infeasible or singular, play no part. The deviation
-    is NaN where the value depends on components of which the record does not say enough, or does not exist
-    one deviation away to either side.
+    is NaN where the value depends on components of which nothing can be said, or does not exist one deviation
+    away to either side.
+
+    Attributes:
+        unstated: by name of the variable, where it depends on components whose deviation is a mere bound and
+            must not be stated, (joints[, 2]).
     """
 
     def __init__(self, robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> None:
@@ -61,7 +65,9 @@ class Uncertainty:
             _deviations(robot, trajectory, self._elapsed[start : start + batch], engine)
             for start in range(0, count, batch)
         ]
-        self._known = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        names = list(parts[0].deviations)
+        self._known = {name: np.concatenate([part.deviations[name] for part in parts]) for name in names}
+        self.unstated = {name: np.any([part.unstated[name] for part in parts], axis=0) for name in names}
 
     def at(self, time: FloatArray) -> dict[str, FloatArray]:
         """By the names of the variables, and of `MARGIN`, at any times: each (samples, joints[, 2])."""
@@ -77,31 +83,51 @@ class Uncertainty:
         return np.moveaxis(found.reshape(*known.shape[1:], len(time)), -1, 0)
 
 
+class _Part(NamedTuple):
+    """What is found at some times, by name of the variable.
+
+    Attributes:
+        deviations: (times, joints[, 2]), NaN where there is no value, infinite where nothing can be said.
+        unstated: where they must not be stated, (joints[, 2]).
+    """
+
+    deviations: dict[str, FloatArray]
+    unstated: dict[str, BoolArray]
+
+
 class _Shift(NamedTuple):
-    """A change of one function of one component by its standard deviation, (times,)."""
+    """A change of one function of one component by its standard deviation, (times,).
+
+    Attributes:
+        name: of the function.
+        component: its index.
+        stated: whether the deviation may be stated.
+        size: of the deviation.
+    """
 
     name: str
     component: int
+    stated: bool
     size: FloatArray
 
 
-def _deviations(
-    robot: Robot, trajectory: Trajectory, elapsed: FloatArray, engine: Engine
-) -> dict[str, FloatArray]:
-    """By name, (times, ...): NaN where there is no value, infinite where nothing can be said of it."""
+def _deviations(robot: Robot, trajectory: Trajectory, elapsed: FloatArray, engine: Engine) -> _Part:
+    """Of all variables that recorded signals have a part in, at some times from the first step on, s."""
     motion = trajectory.at(trajectory.start + elapsed)
     estimates = trajectory.estimates
     covariances = {signal: estimate.covariance(elapsed) for signal, estimate in estimates.items()}
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [
-        _Shift(name, component, row)
+        _Shift(name, component, bool(estimates[signal].stated[component]), row)
         for signal, spread in spreads.items()
         for component, rows in enumerate(spread)
         for name, row in zip(signal.names, rows, strict=True)
     ]
     values, gradients = _values_and_gradients(robot, motion, shifts, engine)
-    found = {}
+    found, unstated = {}, {}
+    hidden = np.array([not shift.stated for shift in shifts])
     for name, value in values.items():
+        unstated[name] = np.any(gradients[name][hidden] != 0, axis=(0, 1))
         variance, first = np.zeros_like(value), 0
         for signal, covariance in covariances.items():
             gradient = gradients[name][first : first + len(covariance) * signal.orders]
@@ -112,8 +138,8 @@ def _deviations(
     for signal, spread in spreads.items():
         for name, rows in zip(signal.names, np.moveaxis(spread, 1, 0), strict=True):
             if name in estimates[signal].estimated:
-                found[name] = rows.T
-    return found
+                found[name], unstated[name] = rows.T, ~estimates[signal].stated
+    return _Part(found, unstated)
 
 
 def _spreads(covariance: FloatArray) -> FloatArray:

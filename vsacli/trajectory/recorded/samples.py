@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import Fit, fit_samples, mismatches
 from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences
+from vsacli.trajectory.fits.unresolved import Unresolved, unresolved
 from vsacli.trajectory.times import stretch
 
 
@@ -196,13 +198,36 @@ class SampledProfile:
     def covariance(self, time: FloatArray) -> FloatArray:
         """Of value and derivatives at any times of the span, (components, orders, orders, samples).
 
-        Zero for what is given; NaN for components of which the record does not determine enough to say.
+        Zero for what is given; NaN for components of which nothing can be said, as those with a vibration
+        that may be motion. Of those that are not `stated` it is a bound by experience.
         """
         found = self.fit.covariance(time)
+        for each in self._unresolved:
+            found[each.members] = each.covariance(time)
+        found[self._vibrating] = np.nan
         given = [name not in self.estimated for name in self.signal.names]
         found[:, given] = 0
         found[:, :, given] = 0
         return found
+
+    @cached_property
+    def stated(self) -> BoolArray:
+        """Of which components a standard deviation may be stated, (components,)."""
+        stated = np.ones(self.components, dtype=bool)
+        for part in self.fit.parts:
+            known = part.smoothing
+            stated[part.members] = known is None or (known.resolved and not known.lines.others)
+        return stated
+
+    @property
+    def _vibrating(self) -> list[int]:
+        """Components with lines in the spectrum that may be noise or motion."""
+        parts = [part for part in self.fit.parts if part.smoothing and part.smoothing.lines.others]
+        return [member for part in parts for member in part.members.tolist()]
+
+    @cached_property
+    def _unresolved(self) -> list[Unresolved]:
+        return list(unresolved(self.fit, self.signal.orders))
 
     def stretched(self, factor: float) -> SampledProfile:
         """The same profile, slower by a factor; the warnings are those about the record."""
