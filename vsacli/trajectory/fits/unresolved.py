@@ -13,7 +13,7 @@ from vsacli.trajectory.fits.information import Posterior
 
 CAUTION = 2.0
 """Factor between what resolutions differ by and what is taken for a standard deviation. With motions of
-minimum jerk or with steps of velocity within 50 and 200 ms, twelve colours of noise, 250 Hz and 1 kHz, torques
+minimum jerk or steps of velocity within 50 and 200 ms, twelve colours of noise, 250 Hz and 1 kHz, torques
 that were wrong by more than 5 % were so by up to 4.3 times as much: twice this deviation."""
 
 PROBES = 500
