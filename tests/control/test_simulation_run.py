@@ -20,7 +20,7 @@ from vsacli.base.flags import Flag
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, Tolerances, perturbed, simulate
-from vsacli.control.simulation.integrator import RateFilter
+from vsacli.control.simulation.state_trajectory import RateFilter
 from vsacli.control.simulation.state_vector import Phase
 
 GAINS = Gains.from_poles([-20] * 4, [-20] * 2)

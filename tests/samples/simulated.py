@@ -14,12 +14,14 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
+from vsacli.control.simulation.budget import Budget
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.controllers import LinearizingFeedback
 from vsacli.control.simulation.history import History, history
-from vsacli.control.simulation.integrator import Integrator, Tolerances, continuous
+from vsacli.control.simulation.integrator import Integrator, Tolerances
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.simulate import InitialError
+from vsacli.control.simulation.state_trajectory import continuous
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
@@ -88,8 +90,10 @@ def linearized_run(
     reference = Reference(trajectory)
     loop = ClosedLoop(robot, LinearizingFeedback(robot, reference, gains), reference)
     start = loop.packing.pack(*loop.plant.unpacked(start_of(robot, paired, trajectory, error)))
-    integrator = Integrator(list(boundaries(loop, start)), Tolerances(), lambda _: None)
-    integrated = continuous(loop, integrator, trajectory.times.block(0, trajectory.samples), start)
+    times = trajectory.times.block(0, trajectory.samples)
+    budget = Budget(None, times)
+    integrator = Integrator(list(boundaries(loop, start)), Tolerances(), budget, lambda _: None)
+    integrated = continuous(loop, integrator, times, start)
     past = history(robot, loop, integrated)
     return past, State(past.q_actual, past.dq_actual, past.theta_actual, past.dtheta_actual)
 

@@ -106,6 +106,13 @@ def _numbers(_context: click.Context, _parameter: click.Parameter, written: str)
 @click.option("--rtol", type=float, default=1e-9, show_default=True, help="Of the integration, relative.")
 @click.option("--atol", type=float, default=1e-10, show_default=True, help="Of the integration, absolute.")
 @click.option(
+    "--budget",
+    metavar="N",
+    type=int,
+    help="Evaluations of the equations of motion after which a run ends, incomplete; by default 200000, or "
+    "100 a step if that is more.",
+)
+@click.option(
     "-o",
     "--output",
     metavar="FILE",
@@ -179,6 +186,7 @@ def _prepared(
     tolerance: str,
     rtol: float,
     atol: float,
+    budget: int | None,
 ) -> partial[Simulation]:
     """The simulation that the options describe."""
     from vsacli.control.simulation import (
@@ -205,6 +213,7 @@ def _prepared(
         measured=measured,
         goal_tolerance=GoalTolerance.from_text(tolerance),
         tolerances=Tolerances(rtol, atol),
+        budget=budget,
     )
 
 

@@ -41,7 +41,7 @@ class ClosedLoop:
         return np.clip(demand, -limit, limit)
 
     def derivative(self, time: float, vector: FloatArray) -> FloatArray:
-        """Time derivative of the state vector while the controller acts."""
+        """Time derivatives of state vectors (..., entries) at a time while the controller acts."""
         return self.derivative_under(self.demand(time, vector), time, vector)
 
     def derivative_under(self, demand: FloatArray, time: float, vector: FloatArray) -> FloatArray:
@@ -49,7 +49,7 @@ class ClosedLoop:
         phase = self.packing.unpack(vector)
         ddq, ddtheta = self.accelerations(time, phase, demand)
         integral = self.controller.error_rates(time, phase)
-        return np.concatenate((phase.dq, ddq, phase.dtheta, ddtheta, *integral))
+        return np.concatenate((phase.dq, ddq, phase.dtheta, ddtheta, *integral), axis=-1)
 
     def accelerations(
         self, time: float | FloatArray, phase: Phase, demand: FloatArray

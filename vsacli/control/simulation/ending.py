@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 from vsacli.base.flags import Flag
 
+DIVERGED = "diverged"
+INCOMPLETE = "incomplete"
+
 
 @dataclass(frozen=True)
 class Ending:
@@ -17,12 +20,14 @@ class Ending:
         reason: what happened, as part of a sentence.
         flag: what marks the last step of the joint to blame.
         joint: its index; None, like the flag, if there is none.
+        verdict: on a run that ends so, unless a flag says it.
     """
 
     time: float
     reason: str
     flag: Flag | None = None
     joint: int | None = None
+    verdict: str = DIVERGED
 
     def described(self, joint_names: Sequence[str]) -> str:
         """The end as a sentence."""

@@ -9,7 +9,7 @@ from vsacli.base.simulation_variables import ERRORS, SIMULATION_VARIABLES, TRACK
 from vsacli.base.variables import Block
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
-from vsacli.control.simulation.integrator import StateTrajectory
+from vsacli.control.simulation.state_trajectory import StateTrajectory
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -15,21 +14,17 @@ from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
+from vsacli.control.simulation.budget import Budget, Progress
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.controllers import Feedforward, LinearizingFeedback
 from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.history import History, history
-from vsacli.control.simulation.integrator import (
-    Integrator,
-    Progress,
-    StateTrajectory,
-    Tolerances,
-    continuous,
-    sampled,
-)
+from vsacli.control.simulation.integrator import Integrator, Tolerances
 from vsacli.control.simulation.joint_tracking import Deviation, joint_trackings, stiffness_warnings
 from vsacli.control.simulation.reference import Reference
+from vsacli.control.simulation.rounding import check_rounding
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
+from vsacli.control.simulation.state_trajectory import StateTrajectory, continuous, sampled
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import check_fit, compute_block
 from vsacli.robot.model import Robot
@@ -102,6 +97,9 @@ class Simulation:
         return f"Simulation of {self.report}"
 
 
+PEAK_SAMPLES = 100
+"""Samples at which the largest torque of a motion is sought: an order of magnitude is wanted."""
+
 _AMPLIFIED = (
     "model and start are exact, so what strayed are the errors of the integration, which this motion "
     "amplifies and nothing feeds back: with another --rtol it ends elsewhere"
@@ -118,6 +116,7 @@ def simulate(
     measured: Measured = "state",
     goal_tolerance: GoalTolerance = GoalTolerance(),
     tolerances: Tolerances = Tolerances(),
+    budget: int | None = None,
     progress: Progress = lambda _: None,
 ) -> Simulation:
     """Integrate the full model (5) of a robot under a controller.
@@ -132,6 +131,8 @@ def simulate(
             and motors at the steps of the trajectory, between which it holds its torques.
         goal_tolerance: how far off the joints may be at the end of the run.
         tolerances: of the integration.
+        budget: after how many evaluations of the equations of motion a run ends, incomplete; by default
+            200,000, or 100 for each step of the trajectory where that is more.
         progress: called with the time reached, s.
 
     Raises:
@@ -144,16 +145,14 @@ def simulate(
     check_measured(measured, gains)
     loop = _closed_loop(robot, trajectory, model or robot, gains)
     start = start_state(robot, trajectory, initial_error)
-    integrate = continuous if measured == "state" else sampled
-    integrated = _integrate(loop, trajectory, start, integrate, tolerances, progress)
+    integrated = _integrate(robot, loop, trajectory, start, measured, tolerances, budget, progress)
     past = history(robot, loop, integrated)
     joints = joint_trackings(robot, past, goal_tolerance)
     ideal: tuple[Deviation, ...] = ()
     if measured == "positions":
-        with_full_state = simulate(
-            robot, trajectory, gains=gains, model=model, initial_error=initial_error, tolerances=tolerances
-        )
-        ideal = tuple(joint.q for joint in with_full_state.report.joints)
+        conditions: Any = {"gains": gains, "model": model, "initial_error": initial_error}
+        full = simulate(robot, trajectory, **conditions, tolerances=tolerances, budget=budget)
+        ideal = tuple(joint.q for joint in full.report.joints)
     verdict = verdict_on(past, joints, integrated.ending)
     exact = gains is None and (model is None or model is robot) and initial_error.is_zero
     report = SimulationReport(
@@ -164,7 +163,9 @@ def simulate(
         duration=trajectory.duration,
         verdict=verdict,
         ending=None if integrated.ending is None else integrated.ending.described(robot.joint_names),
-        evaluations=integrated.evaluations,
+        evaluations=integrated.effort.evaluations,
+        budget=integrated.effort.budget,
+        methods=integrated.effort.methods,
         warnings=(
             *(*robot.warnings, *trajectory.warnings),
             *(stiffness_warnings(robot, past) if integrated.ending is None else ()),
@@ -198,12 +199,20 @@ def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gain
     return ClosedLoop(robot, LinearizingFeedback(model, reference, gains), reference)
 
 
+def _peak_torque(robot: Robot, trajectory: Trajectory) -> float:
+    """The largest torque of a motor along a trajectory, of `PEAK_SAMPLES` samples, N m (N)."""
+    motion = trajectory.at(np.linspace(*trajectory.times.span, PEAK_SAMPLES))
+    return float(np.nanmax(np.abs(compute_block(robot, motion).tau_motor)))
+
+
 def _integrate(
+    robot: Robot,
     loop: ClosedLoop,
     trajectory: Trajectory,
     start: State,
-    integrate: Callable[[ClosedLoop, Integrator, FloatArray, FloatArray], StateTrajectory],
+    measured: Measured,
     tolerances: Tolerances,
+    limit: int | None,
     progress: Progress,
 ) -> StateTrajectory:
     """Integrate as far as the controller has torques and the springs obey their laws."""
@@ -212,6 +221,9 @@ def _integrate(
     if last is not None and last.time <= times[0]:
         raise InputError.one("the controller's model cannot execute the start of the trajectory")
     vector = loop.packing.pack(*loop.plant.unpacked(start))
-    integrator = Integrator(list(boundaries(loop, vector)), tolerances, progress)
-    integrated = integrate(loop, integrator, times if last is None else times[times <= last.time], vector)
+    check_rounding(robot, loop, vector, float(times[0]), _peak_torque(robot, trajectory))
+    reached = times if last is None else times[times <= last.time]
+    integrator = Integrator(list(boundaries(loop, vector)), tolerances, Budget(limit, reached), progress)
+    integrate = continuous if measured == "state" else sampled
+    integrated = integrate(loop, integrator, reached, vector)
     return integrated if integrated.ending is not None else integrated._replace(ending=last)

@@ -15,8 +15,9 @@ from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import aligned
 from vsacli.base.units import POSITION
-from vsacli.control.simulation.ending import Ending
+from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
 from vsacli.control.simulation.history import History
+from vsacli.control.simulation.integrator import Method
 from vsacli.control.simulation.joint_tracking import (
     HEADER,
     Deviation,
@@ -26,7 +27,7 @@ from vsacli.control.simulation.joint_tracking import (
     row,
 )
 
-VERDICTS = ("ok", "over_limit", "strayed", "singular", "infeasible", "diverged")
+VERDICTS = ("ok", "over_limit", "strayed", "singular", "infeasible", INCOMPLETE, DIVERGED)
 """From best to worst; the worst that applies wins."""
 
 _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
@@ -35,15 +36,15 @@ _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Fl
 def verdict_on(history: History, joints: Sequence[JointTracking], ending: Ending | None) -> str:
     """The worst of `VERDICTS` that applies.
 
-    A flag of any step speaks for its own; "strayed" are joints off course where the run was to end, and
-    "diverged" is a run whose early end no flag explains.
+    A flag of any step speaks for its own, joints off course where the run was to end for "strayed", and
+    an early end that no flag explains for itself.
     """
     flags = int(np.bitwise_or.reduce(history.flags, axis=None))
     applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
     if ending is None and any(joint.off_course for joint in joints):
         applies.add("strayed")
     if ending is not None and ending.flag is None:
-        applies.add("diverged")
+        applies.add(ending.verdict)
     return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
 
 
@@ -77,6 +78,8 @@ class SimulationReport(Stored):
         verdict: the worst of `VERDICTS` that applies; see `verdict_on`.
         ending: why it ended early, as a sentence; None if it did not.
         evaluations: of the equations of motion.
+        budget: how many there might have been; 0 in reports written before there was one.
+        methods: of integration, each from its time on; none in such reports.
         warnings: why the inputs may not be what was meant.
         notes: how they were understood, where that is not obvious.
         joints: one report a joint.
@@ -96,12 +99,16 @@ class SimulationReport(Stored):
     warnings: tuple[str, ...]
     with_full_state: tuple[Deviation, ...]
     notes: tuple[str, ...] = ()
+    budget: int = 0
+    methods: tuple[Method, ...] = ()
 
     format: ClassVar = "vsacli-simulation-report/1"
     shape: ClassVar = {
         **named("format", "verdict", "robot", "trajectory", "controller", "samples", "duration", "complete"),
         "largest_error?": "largest_error",
-        **named("ending", "evaluations", "warnings", "notes", "joints", "with_full_state"),
+        **named(
+            "ending", "evaluations", "budget", "methods", "warnings", "notes", "joints", "with_full_state"
+        ),
     }
 
     @property
@@ -129,6 +136,7 @@ class SimulationReport(Stored):
                 *([] if self.ending is None else [self.ending]),
                 *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
                 *self._loss(),
+                *self._effort(),
             ]
         )
 
@@ -147,3 +155,10 @@ class SimulationReport(Stored):
                 f"{joint.name}: with the full state the q error is {ideal.peak:.2g} {unit} at its peak, "
                 f"{ideal.final:.2g} {unit} at the end"
             )
+
+    def _effort(self) -> Iterator[str]:
+        """How it was integrated."""
+        if self.methods:
+            first, *others = self.methods
+            changes = "".join(f", from t = {method.start:.6g} s on {method.name}" for method in others)
+            yield f"integrated by {first.name}{changes}: {self.evaluations} evaluations of {self.budget}"
