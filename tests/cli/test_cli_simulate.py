@@ -106,6 +106,21 @@ def test_a_run_that_ends_off_the_command_has_strayed(vsacli, quick, tmp_path, to
     assert vsacli("info", "s.h5").out.rstrip().endswith(done.out.rstrip())
 
 
+def test_a_run_whose_budget_is_used_up_is_written_with_exit_code_3(vsacli, quick, tmp_path):
+    done = vsacli("simulate", ROBOT, quick, "--budget", "400", "-o", "s.h5", "--json")
+    assert done.code == Exit.VERDICT
+    report = json.loads(done.out)
+    assert (report["verdict"], report["complete"], report["budget"]) == ("incomplete", False, 400)
+    assert report["ending"].startswith("the budget of 400 evaluations of the equations of motion is used up")
+    assert [method["name"] for method in report["methods"]] == ["DOP853", "Radau"]
+    assert 0 < report["methods"][1]["from"] < 1
+    with StoredSimulation.open(tmp_path / "s.h5") as stored:
+        assert (stored.verdict, stored.complete) == ("incomplete", False)
+        assert 1 < stored.samples == report["samples"] < 26
+        assert np.abs(stored.read("q_error")).max() < 1e-7
+    assert "INCOMPLETE" in vsacli("info", "s.h5").out
+
+
 def test_perturbed_runs_are_repeatable(vsacli, quick):
     arguments = ("simulate", ROBOT, quick, "--perturb", "0.02", "--json", "--overwrite", "-o", "s.h5")
     first, second, other = vsacli(*arguments), vsacli(*arguments), vsacli(*arguments, "--seed", "1")
@@ -136,6 +151,8 @@ def test_measured_positions_are_reported(vsacli, quick):
         (("--initial-error", "much"), "expected a number, or one for each joint"),
         (("--tolerance", "tight"), "--tolerance: expected a number in rad (m) such as 0.01, or a share"),
         (("--rtol", "0"), "the tolerances must be positive"),
+        (("--budget", "0"), "the budget must be at least 1 evaluation, not 0"),
+        ((*FEEDBACK, "--poles", "-1e6"), "its poles are too fast to be simulated: rounding of"),
         (("--perturb", "2"), "the relative error of the model must lie between 0 and 1"),
         (("--initial-stiffness-error", "-100"), "no state at the start has this position and stiffness"),
     ],
