@@ -33,7 +33,7 @@ class Exit(enum.IntEnum):
     USAGE = 2, "usage or input error: one line for each problem; nothing written"
     VERDICT = (
         3,
-        "done, but steps are infeasible, singular or over a limit, or a record is too uncertain",
+        "done, but steps are infeasible, singular or over a limit, records doubtful or simulations astray",
     )
     STORAGE = 4, "a file cannot be read or written (disk full, permission); the target is untouched"
     HUNG_UP = 129, "ended by SIGHUP, as when a terminal is closed; the target is untouched"
