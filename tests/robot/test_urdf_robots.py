@@ -45,8 +45,8 @@ angles again; without such angles, agreement is to 1e-13."""
 
 SAMPLES = 5
 
-QUICK = ("panda.urdf", "alex_psyonic_hands.urdf", "talos_reduced.urdf", "xarm7.urdf")
-"""Hands whose fingers follow each other, one with offsets, one below a torso; wrists with much damping."""
+QUICK = ("panda.urdf", "alex_psyonic_hands.urdf", "xarm7.urdf")
+"""Hands whose fingers follow each other, one with offsets; a wrist with much damping."""
 
 BY_SPEED = [arm[:3] if arm[0] in QUICK else slow(*arm[:3]) for arm in ARM.findall(PAGE)]
 
