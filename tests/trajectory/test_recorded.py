@@ -9,6 +9,7 @@ import pytest
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.robot.commanded_joints import CommandedJoints
+from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 
 JOINTS = CommandedJoints({"base": "revolute", "elbow": "revolute"}, exempt={})
@@ -44,7 +45,7 @@ def by_number(*names):
 
 def problems(path, wanted=(POSITION, STIFFNESS)):
     with pytest.raises(InputError) as caught:
-        read_recording(path, JOINTS, dict.fromkeys(wanted))
+        read_recording(path, JOINTS, dict.fromkeys(wanted, FitChoice()))
     assert {problem.file for problem in caught.value.problems} == {str(path)}
     return [(problem.line, problem.message) for problem in caught.value.problems]
 
@@ -71,30 +72,29 @@ def test_trajectory_is_named_after_the_file_and_says_what_was_fitted(csv):
     trajectory = recorded_trajectory(path, JOINTS)
     assert trajectory.name == "swing-up"
     few = "on so few knots, derivatives are doubtful far into the record from both ends"
-    fitted = [warning for warning in trajectory.warnings if "spline" in warning]
-    assert fitted[:1] == [f"ddq, d3q, d4q come from a C6 spline through q; {few}"]
-    assert trajectory.warnings[-1:] == (
-        f"dstiffness, ddstiffness come from a C4 spline through stiffness; {few}",
-    )
+    # random numbers determine nothing
+    assert any("is not determined by the record" in each for each in trajectory.warnings)
+    assert any(each.startswith("ddq, d3q, d4q") and few in each for each in trajectory.warnings)
+    assert any("dstiffness, ddstiffness" in each for each in trajectory.warnings)
     (source,) = trajectory.sources
     assert (source.path, source.text) == (str(path), path.read_text())
     assert source.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def test_only_wanted_signals_are_needed_and_unused_ones_are_noted(csv):
-    position = read_recording(csv(columns(*by_joint("q"))), JOINTS, {POSITION: None})
+    position = read_recording(csv(columns(*by_joint("q"))), JOINTS, {POSITION: FitChoice()})
     assert [profile.signal for profile in position.profiles] == [POSITION]
     assert position.notes == ()
 
     path = csv(columns(*by_joint("q", "stiffness", "dq")))
-    stiffness = read_recording(path, JOINTS, {STIFFNESS: None})
+    stiffness = read_recording(path, JOINTS, {STIFFNESS: FitChoice()})
     assert [profile.signal for profile in stiffness.profiles] == [STIFFNESS]
     assert stiffness.notes == (f"{path}: its columns of q are not used",)
 
 
 def test_profiles_come_in_the_order_asked_for(csv):
     recording = read_recording(
-        csv(columns(*by_joint("q", "stiffness"))), JOINTS, dict.fromkeys([STIFFNESS, POSITION])
+        csv(columns(*by_joint("q", "stiffness"))), JOINTS, dict.fromkeys([STIFFNESS, POSITION], FitChoice())
     )
     assert [profile.signal for profile in recording.profiles] == [STIFFNESS, POSITION]
 
@@ -170,7 +170,7 @@ def test_too_few_rows(csv):
 
 
 def recording(csv, time, name):
-    return read_recording(csv(columns(*by_joint("q"), time=time), name), JOINTS, {POSITION: None})
+    return read_recording(csv(columns(*by_joint("q"), time=time), name), JOINTS, {POSITION: FitChoice()})
 
 
 def test_files_with_equal_times_may_be_combined(csv):

@@ -11,6 +11,7 @@ from vsacli.base.signals import POSITION
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -109,7 +110,7 @@ def test_all_units_that_do_not_fit_are_named_with_the_line():
 def test_a_column_with_two_units_appears_twice():
     write("m.csv", ["time", "q1[rad]", "q1[deg]", "q2"], TIME, motion(), motion()[:, :1])
     with pytest.raises(InputError, match=r"m.csv:1: column 'q1' appears 2 times"):
-        read_recording("m.csv", JOINTS, {POSITION: None})
+        read_recording("m.csv", JOINTS, {POSITION: FitChoice()})
 
 
 def test_lines_are_those_of_the_file_with_comments():
@@ -120,7 +121,7 @@ def test_lines_are_those_of_the_file_with_comments():
     with pytest.raises(
         InputError, match=r"^m.csv:13: time must increase strictly, but 0.008 s follows 0.008 s"
     ):
-        read_recording("m.csv", JOINTS, {POSITION: None})
+        read_recording("m.csv", JOINTS, {POSITION: FitChoice()})
 
 
 @pytest.mark.parametrize("derivatives", [False, True])
@@ -152,11 +153,11 @@ def test_noisy_record_runs_and_reports_its_fit(robot):
     position, rigidity = result.report.as_json()["fits"]
     assert (position["signal"], position["degree"], rigidity["signal"]) == ("q", 7, "stiffness")
     for column, joint in zip(position["columns"], ("arm", "slide"), strict=True):
-        assert (column["name"], column["method"]) == (joint, "lsq")
+        assert (column["name"], column["method"]) == (joint, "smooth")
         assert column["residual"]["rms"] == pytest.approx(1e-5, rel=0.1)
     assert {column["method"] for column in rigidity["columns"]} == {"interpolate"}
     assert (
-        "q, dq, ddq, d3q, d4q come from a C6 least-squares spline near the samples of q: "
+        "q, dq, ddq, d3q, d4q come from a C6 smoothing spline near the samples of q: "
         in result.report.warnings[0]
     )
 
@@ -206,7 +207,7 @@ def test_rate_that_is_not_possible(robot):
 def test_fit_that_is_asked_for():
     write("m.csv", ["time", "q1", "q2"], TIME, motion())
     for method, exact in (("lsq", False), ("interpolate", True), (None, True)):
-        (profile,) = read_recording("m.csv", JOINTS, {POSITION: method}).profiles
+        (profile,) = read_recording("m.csv", JOINTS, {POSITION: FitChoice(method)}).profiles
         assert profile.fit.exact.all() == exact
     with pytest.raises(InputError, match="fit must be one of lsq, interpolate, smooth, not 'spline'"):
         Trajectory.from_samples(TIME, motion(), fit="spline")
@@ -223,3 +224,34 @@ def test_fit_in_the_file(robot):
     Path("m.yaml").write_text(text.replace("FIT", "spline"))
     with pytest.raises(InputError, match=r"^m.yaml:4: fit: unknown word 'spline'; valid: lsq, interpolate"):
         load_trajectory("m.yaml", robot)
+
+
+def test_what_is_known_of_noise_in_the_file(robot):
+    rng = np.random.default_rng(0)
+    time = np.arange(2001) / 200
+    q = np.column_stack([np.sin(time), np.cos(2 * time)]) + 1e-4 * rng.standard_normal((2001, 2))
+    write("m.csv", ["time", "q1", "q2"], time, q)
+    text = "format: vsacli-trajectory/1\nname: m\nposition: {type: csv, file: m.csv, KEYS}\n"
+    text += "stiffness: {type: constant, value: 900}\n"
+
+    def load(keys):
+        Path("m.yaml").write_text(text.replace("KEYS", keys))
+        return load_trajectory("m.yaml", robot)
+
+    (summary,) = load("noise: [1e-4, 2e-4], bandwidth: 2").fits
+    assert [column["noise"] for column in summary["columns"]] == [1e-4, 2e-4]
+    assert {column["method"] for column in summary["columns"]} == {"smooth"}
+    # four knot spans to a period of 2 Hz, in 10 s
+    assert {column["knots"] for column in summary["columns"]} == {81}
+    assert load("noise: 1e-4").fits[0]["columns"][1]["noise"] == 1e-4
+    for keys, said in (
+        ("noise: [1e-4, -1]", r"^m.yaml:3: noise of \S+: must be positive|noise"),
+        ("noise: 0", "must be positive"),
+        ("bandwidth: -2", r"^m.yaml:3: bandwidth: must be positive"),
+        (
+            "bandwidth: 2, fit: lsq",
+            "m.yaml:3: position: bandwidth: only smoothing splines have one",
+        ),
+    ):
+        with pytest.raises(InputError, match=said):
+            load(keys)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vsacli.base.errors import InputError
@@ -205,6 +205,7 @@ sizes = st.floats(-300, 99).map(lambda power: 10.0**power)
 scales = st.floats(-29, 28).map(lambda power: 10.0**power)
 
 
+@settings(deadline=None)  # the first imports SciPy
 @given(
     seed=st.integers(0, 1000),
     count=st.integers(8, 40),

@@ -27,6 +27,7 @@ from vsacli.trajectory.times import Times, UniformTimes, uniform_times_over
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from vsacli.trajectory.fits import FitChoice
     from vsacli.trajectory.recorded.recording import Recording
 
 FORMAT = "vsacli-trajectory/1"
@@ -171,9 +172,9 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
 
 def _read_recordings(document: TrajectoryFile, folder: Path, joints: CommandedJoints) -> list[Recording]:
     """Each CSV file once, for the signals that are wanted from it; all with the times of the first."""
-    wanted: dict[Path, dict[Signal, str | None]] = defaultdict(dict)
+    wanted: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
     for signal, declared in document.recorded.items():
-        wanted[folder / declared.file][signal] = declared.fit
+        wanted[folder / declared.file][signal] = declared.chosen
     if not wanted:
         return []
     from vsacli.trajectory.recorded.recording import read_recording

@@ -7,10 +7,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, make_dataclass
 from functools import cache
-from typing import Any, ClassVar, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 
+from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION, WRENCH, Signal
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_FRAMES
@@ -23,10 +24,14 @@ from vsacli.documents.fields import (
     boolean,
     check_fields,
     choice,
+    number,
     text,
     value,
 )
 from vsacli.trajectory.curves import ClosedForm
+
+if TYPE_CHECKING:
+    from vsacli.trajectory.fits import FitChoice
 
 SAME_TIME = 1e-9
 """Times whose difference is a smaller share than this are the same, but for rounding in a file."""
@@ -62,6 +67,10 @@ class Use:
         """The field of a list of values, e.g. `role` "to pass"."""
         plural = self.signal.key + ("es" if self.signal.key.endswith(("s", "ch")) else "s")
         return self._field(Items(self._kind), plural + role)
+
+    def size(self, doc: str) -> Any:
+        """The field of a positive value in the unit of the signal, which may be absent."""
+        return value(self._kind, doc, check=POSITIVE, default=None)
 
     def frame(self) -> dict[str, Any]:
         """The field that says along whose axes a wrench is given; none for other signals."""
@@ -146,6 +155,8 @@ class Recorded(Declaration):
 
     file: str
     fit: str | None
+    noise: Values | None
+    bandwidth: float | None
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
@@ -157,10 +168,31 @@ class Recorded(Declaration):
             " squares, or a smoothing one for noise of any colour; by default what their noise asks for"
         )
         file = text("path of the CSV file, relative to the trajectory file")
-        fields = {**use.frame(), "file": file, "fit": choice(METHODS, doc, default=None)}
+        bandwidth = "frequency in Hz above which there is no motion; by default the record tells"
+        fields = {
+            **use.frame(),
+            "file": file,
+            "fit": choice(METHODS, doc, default=None),
+            "noise": use.size("standard deviation of the noise of a sample; by default the record tells"),
+            "bandwidth": number(units.RATE, bandwidth, check=POSITIVE, default=None),
+        }
         if use.signal is POSITION:
             fields["unwrap"] = boolean("take jumps by 2 pi out of revolute joints' angles", default=False)
         return fields
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        from vsacli.trajectory.fits import SMOOTH
+
+        if self.bandwidth is not None and self.fit not in (None, SMOOTH):
+            message = f"only smoothing splines have one; leave it out, or fit: {self.fit}"
+            yield FieldProblem(("bandwidth",), message)
+
+    @property
+    def chosen(self) -> FitChoice:
+        """What is said of the spline."""
+        from vsacli.trajectory.fits import FitChoice
+
+        return FitChoice(self.fit, self.noise, self.bandwidth)
 
     @classmethod
     def meaning(cls, use: Use) -> str:

@@ -2,6 +2,22 @@
 
 from vsacli.trajectory.fits.fit import Fit
 from vsacli.trajectory.fits.fit_text import mismatches
-from vsacli.trajectory.fits.selection import INTERPOLATE, LEAST_SQUARES, METHODS, SMOOTH, fit_samples
+from vsacli.trajectory.fits.selection import (
+    INTERPOLATE,
+    LEAST_SQUARES,
+    METHODS,
+    SMOOTH,
+    FitChoice,
+    fit_samples,
+)
 
-__all__ = ["INTERPOLATE", "LEAST_SQUARES", "METHODS", "SMOOTH", "Fit", "fit_samples", "mismatches"]
+__all__ = [
+    "INTERPOLATE",
+    "LEAST_SQUARES",
+    "METHODS",
+    "SMOOTH",
+    "Fit",
+    "FitChoice",
+    "fit_samples",
+    "mismatches",
+]

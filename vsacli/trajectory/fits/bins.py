@@ -25,11 +25,13 @@ class Whitened(NamedTuple):
         rows: (blocks, rows, columns), see `information.Rows`.
         target: (blocks, rows).
         log_scale: logarithm of the determinant of what the covariance was divided by, twice negative.
+        variance: of the errors, if that of samples is known.
     """
 
     rows: FloatArray
     target: FloatArray
     log_scale: float
+    variance: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +47,8 @@ class Bins:
         design: (bins, degree + 1), means of the B-splines at the same samples: averaging costs no bias.
         first: index of the first of these B-splines, (bins,).
         gaps: distance from one mean time to the next, in bins, (bins - 1,); infinite where they are unlinked.
+        samples: in a bin, on average.
+        noise: standard deviation of a sample's noise, if it is known.
     """
 
     start: float
@@ -55,9 +59,13 @@ class Bins:
     design: FloatArray
     first: IndexArray
     gaps: FloatArray
+    samples: float
+    noise: float | None = None
 
     @classmethod
-    def of(cls, time: FloatArray, row: FloatArray, spans: int, degree: int) -> Bins:
+    def of(
+        cls, time: FloatArray, row: FloatArray, spans: int, degree: int, noise: float | None = None
+    ) -> Bins:
         """Averages of samples.
 
         Args:
@@ -65,6 +73,7 @@ class Bins:
             row: (samples,).
             spans: of the spline, of equal length.
             degree: of the spline.
+            noise: standard deviation of a sample's noise, if it is known.
         """
         start, span = float(time[0]), float(time[-1] - time[0]) / spans
         place = np.clip((time - start) / span, 0, spans * (1 - 1e-15))
@@ -87,6 +96,8 @@ class Bins:
             design=np.stack([mean(each) for each in basis], axis=1),
             first=used // BINS_PER_SPAN,
             gaps=np.where(gaps > LONGEST_LINK, np.inf, gaps),
+            samples=len(time) / len(used),
+            noise=noise,
         )
 
     @property
@@ -121,7 +132,26 @@ class Bins:
         ordered = sort_rows(first, rows * scale[:, None], self.coefficients)
         target = np.zeros(ordered.blocks.shape[:2])
         target[ordered.block, ordered.place] = errors * scale
-        return Whitened(ordered.blocks, target, 2 * float(np.sum(np.log(scale))))
+        variance = self._noise_variance(correlation)
+        return Whitened(ordered.blocks, target, 2 * float(np.sum(np.log(scale))), variance)
+
+    def _noise_variance(self, correlation: float) -> float | None:
+        """Of a mean, if that of a sample is known; its noise is taken for a process of first order.
+
+        Args:
+            correlation: of two neighbouring means, from which that of samples follows; if negative, none.
+        """
+        if self.noise is None:
+            return None
+        count = max(1.0, self.samples)
+        of_samples = 1 - np.geomspace(1, 1e-6, 200)[1:]
+        passed = of_samples**count
+        sums = (1 - passed) / (1 - of_samples)
+        # the sum over all pairs of a bin, and that over the pairs of two neighbouring bins
+        within = (count * (1 + of_samples) - 2 * of_samples * sums) / (1 - of_samples)
+        between = of_samples * sums**2
+        share = np.interp(correlation, between / within, within / count**2, left=1 / count)
+        return float(self.noise**2 * share)
 
     def differences(self, order: int) -> FloatArray:
         """Rows of the differences of the coefficients, (blocks, rows, columns), and units behind the last.

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 ORDERS = {7: 5, 5: 3}
 """Value and derivatives that are needed, by the degree of the splines."""
 
+PROBES = 500
+"""Times that the root mean square of a deviation is taken of."""
+
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -54,6 +57,13 @@ class Part:
         """
         spans = (self.spline.k + 1) // 2
         return float(np.ptp(self.knots[: spans + 1])), float(np.ptp(self.knots[-spans - 1 :]))
+
+    @property
+    def inside(self) -> tuple[float, float]:
+        """First and last time, s, of the stretch that is not doubtful; the middle half if that is longer."""
+        first, last = self.knots[[0, -1]].tolist()
+        start, end = np.minimum(self.doubtful, (last - first) / 4).tolist()
+        return first + start, last - end
 
     def at(self, time: FloatArray, orders: int) -> FloatArray:
         """Value and derivatives, shape (orders, members, samples).
@@ -176,7 +186,7 @@ class Fit:
         for part, posterior in zip(self.parts, self._posteriors, strict=True):
             if posterior is not None:
                 basis = local_basis(part.spline.t, self.degree, time, orders)
-                unit = self._units(part)
+                unit = self._units(part, posterior)
                 found[part.members] = unit[:, None, None, None] ** 2 * of_derivatives(posterior, basis)
         return found
 
@@ -185,14 +195,29 @@ class Fit:
         """Of the coefficients of each part; None if nothing can be said of them."""
         return [part.posterior(self.time) for part in self.parts]
 
-    def _units(self, part: Part) -> FloatArray:
-        """Of the deviations of the posterior, (members,)."""
-        if part.smooth and part.smoothing is not None:
-            return np.array([part.smoothing.unit])
-        return np.asarray(self.noise[part.members])
+    def _units(self, part: Part, posterior: Posterior) -> FloatArray:
+        """Of the deviations of the posterior, (members,): as large as what is stated of the part."""
+        known = part.smoothing
+        if part.smooth and known is not None:
+            return np.array([known.unit])
+        units = self.noise[part.members]
+        if known is None:
+            return np.asarray(units)
+        order, probes = ORDERS[self.degree] - 1, np.linspace(*part.inside, PROBES)
+        basis = local_basis(part.spline.t, self.degree, probes, order + 1)
+        found = units * np.sqrt(np.mean(of_derivatives(posterior, basis)[order, order]))
+        size = np.sqrt(np.mean(part.spline(probes, nu=order) ** 2, axis=0))
+        return np.asarray(units * np.maximum(1.0, known.relative * size / found))
 
 
-def join(degree: int, parts: Sequence[Part], time: FloatArray, rows: FloatArray, noise: FloatArray) -> Fit:
+def join(
+    degree: int,
+    parts: Sequence[Part],
+    time: FloatArray,
+    rows: FloatArray,
+    noise: FloatArray,
+    given: FloatArray,
+) -> Fit:
     """The fit that consists of parts.
 
     Args:
@@ -202,6 +227,7 @@ def join(degree: int, parts: Sequence[Part], time: FloatArray, rows: FloatArray,
         rows: (components, samples), what was fitted.
         noise: estimated standard deviation of the samples, (components,); that of parts that are not exact
             is taken from their residual.
+        given: what the user says it is, (components,), NaN where nothing.
     """
     components = len(rows)
     residual, largest, noise = np.zeros(components), np.zeros(components), noise.copy()
@@ -212,4 +238,5 @@ def join(degree: int, parts: Sequence[Part], time: FloatArray, rows: FloatArray,
             residual[part.members] = np.sqrt(np.mean(error**2, axis=1))
             largest[part.members] = np.abs(error).max(axis=1)
             noise[part.members] = np.sqrt(np.sum(error**2, axis=1) / freedom)
+    noise = np.where(np.isnan(given), noise, given)
     return Fit(components, degree, tuple(parts), residual, largest, noise, time)

@@ -20,6 +20,7 @@ from vsacli.trajectory.fits.selection import (
     SMALLEST_SHARE,
     SMOOTH,
 )
+from vsacli.trajectory.fits.smoothing import Smoothing
 
 SHARE = 0.05
 """Of the root mean square of a derivative by which a given one may differ: measured ones do."""
@@ -82,24 +83,27 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
         if known is None:
             continue
         label = _members([part], labels)
-        lines = ", ".join(f"{frequency:.4g}" for frequency in known.lines.others[:LISTED_LINES])
-        if not part.smooth and lines:
-            yield (
-                f"{value} of {label} has a vibration at {lines} Hz beyond a smooth motion; if it is none of"
-                " the motion, fit: smooth takes it for noise"
-            )
+        if known.lines.others:
+            yield f"{value} of {label} has a vibration at {_vibration(known)}"
         if not known.resolved:
             yield (
                 f"{highest} of {label} is not determined by the record: no two resolutions of a smoothing"
-                f" spline agree on it, the best have a deviation of {100 * known.relative:.2g} %"
+                " spline agree on it; record it with less noise, or say by bandwidth: (Hz) above which"
+                " frequency there is no motion"
             )
         elif not known.determined:
             yield (
                 f"{highest} of {label} is not determined by the record to 10 %: its standard deviation is"
-                f" {100 * known.relative:.2g} % of its root mean square"
+                f" {100 * known.relative:.2g} % of its root mean square; record it with less noise, or slower"
             )
-        if part.smooth and lines:
-            yield f"{value} of {label} has a vibration at {lines} Hz, which is taken for noise"
+
+
+def _vibration(known: Smoothing) -> str:
+    lines = known.lines.others
+    listed = ", ".join(f"{frequency:.4g}" for frequency in lines[:LISTED_LINES])
+    if known.follows_lines:
+        return f"{listed} Hz beyond a smooth motion; if it is none of it, set bandwidth: {min(lines) / 2:.2g}"
+    return f"{listed} Hz, which is taken for noise; if it is motion, set bandwidth: {2 * max(lines):.2g}"
 
 
 def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:

@@ -7,6 +7,7 @@ the sum of both Gram matrices would lose the data; a QR decomposition of the row
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -151,4 +152,12 @@ class Posterior:
 
 
 def _triangle(rows: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.qr(rows, mode="r"))
+    """The triangular factor of rows, (..., rows, columns), as mode "r" gives it in twice the time."""
+    reflected, _ = np.linalg.qr(rows, mode="raw")
+    height, width = min(rows.shape[-2:]), rows.shape[-1]
+    return np.asarray(np.swapaxes(reflected, -1, -2)[..., :height, :] * _upper(height, width))
+
+
+@cache
+def _upper(height: int, width: int) -> FloatArray:
+    return np.triu(np.ones((height, width)))

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 CORRELATIONS = np.array([-0.5, -0.25, 0.0, 0.2, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.98])
 """Of the noise of neighbouring means, tried at first."""
 
+SMALL_CORRELATIONS = np.array([0.01, 0.03, 0.1])
+"""Tried, too, if the noise of samples is known: that of means then depends on them."""
+
 FINER_CORRELATIONS = np.array([-0.3, -0.1, 0.0, 0.1, 0.3])
 """Added to the inverse hyperbolic tangent of the best, twice."""
 
@@ -85,8 +88,9 @@ class Model:
 
     @cached_property
     def noise_variance(self) -> float:
-        """Of a whitened mean."""
-        return float(self._factor.rest[0]) / _freedom(self.bins)
+        """Of a whitened mean: as it is known of the record, or else what maximises the likelihood."""
+        known = self.whitened.variance
+        return float(self._factor.rest[0]) / _freedom(self.bins) if known is None else known
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -122,6 +126,22 @@ class Model:
         penalties = np.clip(self.penalties * np.exp(change[segment]), LEAST_PENALTY, LARGEST_PENALTY)
         return Model(self.bins, self.correlation, penalties, self.segments)
 
+    @cached_property
+    def cautious(self) -> Posterior:
+        """Of the coefficients, where the ends of segments are uncertain by a segment.
+
+        Each difference has the smallest penalty of its own and the neighbouring segments. Most of the error
+        comes from ends of pauses that lie within a segment.
+        """
+        if self.segments == 1:
+            return self.posterior
+        segment = _segment(len(self.penalties), self.segments)
+        each = np.full(self.segments + 2, np.inf)
+        each[1 + segment] = self.penalties
+        least = np.minimum(np.minimum(each[:-2], each[1:-1]), each[2:])
+        factor = _factors(self.bins, self.whitened, least[segment][None])
+        return Posterior(factor.diagonal[0], factor.upper[0])
+
     def deviations(self, order: int) -> FloatArray:
         """Standard deviation of a derivative in the middle of both bins of each span, (2 spans,)."""
         bins = self.bins
@@ -129,7 +149,7 @@ class Model:
         rows = _derivative_rows(places, bins.degree, order) / bins.span**order
         first = np.repeat(np.arange(bins.spans), len(places))
         ordered = sort_rows(first, np.tile(rows, (bins.spans, 1)), bins.coefficients)
-        variances = self.posterior.variances(ordered.blocks)[ordered.block, ordered.place]
+        variances = self.cautious.variances(ordered.blocks)[ordered.block, ordered.place]
         return np.asarray(np.sqrt(variances * self.noise_variance))
 
     @property
@@ -163,13 +183,14 @@ def most_likely(bins: Bins, coarser: Model | None) -> Model:
 def _best_of_grid(bins: Bins, coarser: Model | None) -> Model:
     """One penalty throughout."""
     count = bins.coefficients - bins.degree
-    grids = [(CORRELATIONS, FIRST_DECADES)]
+    tried = CORRELATIONS if bins.noise is None else np.append(CORRELATIONS, SMALL_CORRELATIONS)
+    grids = [(tried, FIRST_DECADES)]
     if coarser is not None:
         # differences of order n of a given function shrink by 2^n, noise of a mean by 2^(-1/2)
         centre = np.mean(np.log10(coarser.penalties)) + (2 * bins.degree - 1) * np.log10(2)
-        near = np.abs(np.arctanh(CORRELATIONS) - np.arctanh(coarser.correlation)) <= NEAR_CORRELATION
+        near = np.abs(np.arctanh(tried) - np.arctanh(coarser.correlation)) <= NEAR_CORRELATION
         # what passed for noise on coarser bins, as a sweep does, may be resolved now: look everywhere too
-        grids = [(CORRELATIONS[near], centre + NEAR_DECADES), (CORRELATIONS[::3], FIRST_DECADES[::3])]
+        grids = [(tried[near], centre + NEAR_DECADES), (CORRELATIONS[::3], FIRST_DECADES[::3])]
     best = np.inf, 0.0, np.ones(count)
     for correlations, decades in grids:
         penalties = np.repeat(10.0 ** decades[:, None], count, axis=1)
@@ -233,8 +254,11 @@ def _deviances(
 ) -> FloatArray:
     """Minus twice the logarithms of the restricted likelihoods, (candidates,)."""
     factor = factor or _factors(bins, whitened, penalties)
-    freedom = _freedom(bins)
-    size = freedom * np.log(np.maximum(factor.rest, np.finfo(float).tiny) / freedom)
+    freedom, known = _freedom(bins), whitened.variance
+    if known is None:
+        size = freedom * np.log(np.maximum(factor.rest, np.finfo(float).tiny) / freedom)
+    else:
+        size = freedom * (np.log(known) - 1) + factor.rest / known
     volume = factor.log_determinants - np.sum(np.log(penalties), axis=1) - whitened.log_scale
     return np.asarray(size + volume)
 

@@ -17,6 +17,7 @@ from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.robot.commanded_joints import CommandedJoints, takers
+from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout
 from vsacli.trajectory.recorded.health import health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, time_problems, value_problems
@@ -24,7 +25,7 @@ from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
-DEFAULT_FITS: Mapping[Signal, str | None] = dict.fromkeys((POSITION, *COMMANDED.values()))
+DEFAULT_FITS = dict.fromkeys((POSITION, *COMMANDED.values()), FitChoice())
 """All signals of joints, each fitted as its noise asks for."""
 
 
@@ -69,7 +70,7 @@ class Recording:
 def read_recording(
     path: str | os.PathLike[str],
     joints: CommandedJoints,
-    wanted: Mapping[Signal, str | None] = DEFAULT_FITS,
+    wanted: Mapping[Signal, FitChoice] = DEFAULT_FITS,
     *,
     resampled: bool = False,
     unwrap: bool = False,
@@ -79,7 +80,7 @@ def read_recording(
     Args:
         path: a file with the columns `time` and those of `column_layout`.
         joints: those that are commanded.
-        wanted: the signals to read, each with the method of its fit as in `fit_samples`.
+        wanted: the signals to read, each with what is said of its spline.
         resampled: whether the steps will be other times than the recorded ones.
         unwrap: whether to take jumps by 2 pi out of the positions of revolute joints.
 
@@ -102,10 +103,13 @@ def read_recording(
     notes = tuple(f"{file}: {clause}" for clause in (*turns, *_unused(layout, signals)))
     source, lines = table.source, table.lines
     del table  # as large as the records, which may be fitted now
-    profiles = tuple(
-        SampledProfile.of(record, wanted[record.signal], resampled=resampled) for record in records
-    )
+    profiles = tuple(_profile(record, wanted[record.signal], resampled=resampled) for record in records)
     return Recording(RecordedTimes(time), profiles, warnings, notes, source, lines)
+
+
+def _profile(record: Samples, chosen: FitChoice, *, resampled: bool) -> SampledProfile:
+    noise, bandwidth = chosen.deviations, chosen.bandwidth
+    return SampledProfile.of(record, chosen.method, noise=noise, bandwidth=bandwidth, resampled=resampled)
 
 
 def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:

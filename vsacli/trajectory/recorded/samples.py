@@ -112,19 +112,37 @@ class SampledProfile:
     warnings: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, record: Samples, method: str | None = None, *, resampled: bool = False) -> SampledProfile:
+    def of(
+        cls,
+        record: Samples,
+        method: str | None = None,
+        *,
+        noise: FloatArray | None = None,
+        bandwidth: float | None = None,
+        resampled: bool = False,
+    ) -> SampledProfile:
         """Fit samples that have no problems.
 
         Args:
             record: the samples.
             method: "lsq", "interpolate", "smooth", or None to decide by their noise; see `fit_samples`.
+            noise: standard deviation of the samples of each component, if it is known, likewise.
+            bandwidth: above which there is no motion, Hz, likewise.
             resampled: whether the steps are not the recorded times.
         """
         signal = record.signal
         with np.errstate(
             over="ignore", invalid="ignore"
         ):  # a range of 1e100 in 1e-30 s is judged by the robot
-            fit = fit_samples(record.time, record.values, signal.spline_degree, signal.orders - 1, method)
+            fit = fit_samples(
+                record.time,
+                record.values,
+                signal.spline_degree,
+                signal.orders - 1,
+                method,
+                noise=noise,
+                bandwidth=bandwidth,
+            )
             warnings = tuple(record.warnings(fit, resampled=resampled))
         return cls(record=record, fit=fit, resampled=resampled, warnings=warnings)
 

@@ -1,4 +1,4 @@
-"""What residuals of fits say about noise: whether a fit follows it, and the frequencies that stand out."""
+"""Frequencies that stand out of the residual of a fit: mains hum, or a vibration."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.trajectory.fits.least_squares import fit_spline
 
 LINE_RATIO = 30.0
 """Of the power at a frequency to the median near it, from which on it is a line. White noise reaches 30 once
@@ -34,34 +33,6 @@ MAINS_RTOL = 0.005
 
 UNEVEN = 0.2
 """Share of a step by which stamps may be uneven for a periodogram."""
-
-SPANS_RATIO = 2**0.5
-"""Of successive numbers of spans of `slowest_fall`."""
-
-STAGNATION = 2.4
-"""Least factor by which `SPANS_RATIO` times as many spans reduce the residual of a motion: 2^(5/4) if its
-acceleration jumps, 4.5 and more from rest to rest, 16 if it is smooth. White noise gives 1, noise that was
-filtered 1.1 to 1.7 until the knots are beyond the filter's band."""
-
-FLAT = 1.3
-"""Such a factor below which the record is noisy for sure: a clean motion with steps of velocity, smoothed
-over 50 ms, has 1.4."""
-
-RESOLVED = 30.0
-"""Factor by which a residual must be below the record's own size to count as one of noise."""
-
-WHITE = 1.5
-"""Factor between that residual and the noise that a fit leaves, beyond which the fit follows noise. It is 1
-if noise is white."""
-
-ROUNDING = 1000 * np.finfo(float).eps
-"""Of the largest value; residuals below are what arithmetic leaves."""
-
-WINDOW, MOST_WINDOWS = 16384, 3
-"""Samples that are looked at together, and how many such parts of a long record: noise is everywhere."""
-
-COARSEST_SPANS = 16
-"""Of `slowest_fall`."""
 
 
 class Lines(NamedTuple):
@@ -127,39 +98,3 @@ def _mains(frequencies: FloatArray) -> BoolArray:
         harmonic = mains * np.round(frequencies / mains)
         near |= (harmonic > 0) & (np.abs(frequencies - harmonic) < MAINS_RTOL * frequencies)
     return near
-
-
-def slowest_fall(time: FloatArray, row: FloatArray, degree: int, noise: float) -> float:
-    """The least factor by which residuals of coarse splines fall with more knots, while above a fit's noise.
-
-    With more knots the residual of a motion that is resolved falls by a power of their number, that of noise
-    hardly. White noise stays so until there are as many knots as samples. Filtered noise is followed by a
-    spline whose knots are as close as the filter's band asks for, which then takes little for noise.
-
-    Args:
-        time: (samples,), s.
-        row: (samples,).
-        degree: of the splines.
-        noise: standard deviation that the fit in question takes for noise.
-
-    Returns:
-        With `SPANS_RATIO` times as many spans; `STAGNATION` or more of records without noise, or with white.
-    """
-    starts = np.linspace(0, max(0, len(time) - WINDOW), min(MOST_WINDOWS, -(-len(time) // WINDOW)))
-    windows = [slice(start, start + WINDOW) for start in starts.astype(int).tolist()]
-    return min(_slowest_fall(time[window], row[window], degree, noise) for window in windows)
-
-
-def _slowest_fall(time: FloatArray, row: FloatArray, degree: int, noise: float) -> float:
-    """Of one window."""
-    size, last, spans = float(np.std(row)), np.inf, float(COARSEST_SPANS)
-    least, slowest = max(WHITE * noise, ROUNDING * float(np.abs(row).max())), np.inf
-    while 4 * spans <= len(time):
-        residual = row - fit_spline(time, row[None], round(spans), degree)(time)[:, 0]
-        rms = float(np.sqrt(np.mean(residual**2)))
-        if rms < least:
-            break
-        if rms < size / RESOLVED:
-            slowest = min(slowest, last / rms)
-        last, spans = rms, SPANS_RATIO * spans
-    return slowest

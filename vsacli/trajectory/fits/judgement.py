@@ -1,0 +1,147 @@
+"""Splines through samples, or near them by least squares, judged by a smoothing spline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.trajectory.fits.fit import Fit, Part
+from vsacli.trajectory.fits.least_squares import fit_spline
+from vsacli.trajectory.fits.resolution import KnownNoise
+from vsacli.trajectory.fits.smoothing import smoothing_spline
+
+SUSPECT = 0.01
+"""Share of the highest derivative of the interpolating spline that noise may make up without being judged."""
+
+DISAGREEMENT, DISAGREEING_DEVIATIONS = 0.1, 3.0
+"""Share of the highest derivative that an interpolating spline may be off by, and deviations of a smoothing
+one that it may differ from it by."""
+
+PROBES = 4000
+"""Samples, about, at which they are compared; between samples far apart neither is known."""
+
+VIBRATION = 0.5
+"""Share of the power of a residual in lines from which on it is a vibration rather than noise. The
+faint line at 358 Hz that an encoder's steps left beside filtered noise must not count."""
+
+PASSING = 2.0
+"""Factor between the frequency of a vibration and the bandwidth with which a spline follows it."""
+
+
+class Record(NamedTuple):
+    """What was fitted.
+
+    Attributes:
+        time: (samples,), s.
+        values: (components, samples).
+        spoilt: share of the highest derivative of an interpolating spline that white noise makes up,
+            (components,).
+        filtered: whether there is noise that was filtered, (components,).
+        order: of the highest derivative that is needed.
+        known: what the user says of the noise of each component.
+    """
+
+    time: FloatArray
+    values: FloatArray
+    spoilt: FloatArray
+    filtered: BoolArray
+    order: int
+    known: Sequence[KnownNoise]
+
+
+def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | None = None) -> Part:
+    """A smoothing spline of one component; a polynomial by least squares if there can be none."""
+    row, members = record.values[member], np.array([member])
+    found = smoothing_spline(record.time, row, degree, record.order, known or record.known[member])
+    if found is None:
+        return Part(members, fit_spline(record.time, row[None], 1, degree), exact=False)
+    spline, smoothing = found
+    return Part(members, spline, exact=False, smoothing=smoothing, smooth=True)
+
+
+def judged(record: Record, fit: Fit, *, chosen: bool) -> Iterator[Part]:
+    """For components whose fit may follow noise: the same with what is known of it, or what stands instead.
+
+    Suspect are least squares, whose number of knots has a bias, and splines through noisy samples. A
+    smoothing spline is the judge: the difference from it counts as a deviation.
+
+    Args:
+        record: what was fitted.
+        fit: by least squares, or through the samples.
+        chosen: whether the user chose it, so that it stays.
+    """
+    for part in fit.parts:
+        for column, member in enumerate(part.members.tolist()):
+            wanted = not chosen and record.known[member].bandwidth is not None
+            suspect = record.spoilt[member] > SUSPECT or record.filtered[member]
+            if part.exact and not suspect and not wanted:
+                continue
+            judge = _judge(record, member, fit.degree)
+            if judge.smoothing is None:
+                continue
+            difference = _difference(part, column, judge, record)
+            if wanted or (not chosen and _better(judge, difference, record)):
+                yield judge
+            elif judge.smoothing.resolved or record.spoilt[member] > DISAGREEMENT or not part.exact:
+                single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], fit.degree)
+                relative = float(np.hypot(judge.smoothing.relative, difference))
+                known = replace(judge.smoothing, relative=relative, follows_lines=True)
+                yield Part(judge.members, single, part.exact, known)
+
+
+def _judge(record: Record, member: int, degree: int) -> Part:
+    """The smoothing spline of a component; one that follows a vibration, which may be motion."""
+    judge = smooth_part(record, member, degree)
+    known, lines = record.known[member], judge.smoothing and judge.smoothing.lines
+    if not lines or lines.share < VIBRATION or known.bandwidth is not None:
+        return judge
+    follower = smooth_part(record, member, degree, known._replace(bandwidth=PASSING * max(lines.others)))
+    if follower.smoothing is None:
+        return judge
+    return replace(follower, smoothing=replace(follower.smoothing, lines=lines, follows_lines=True))
+
+
+def _better(judge: Part, difference: float, record: Record) -> bool:
+    """Whether a smoothing spline is to stand for a component instead of one through its samples.
+
+    If no resolution is accepted, noise must spoil the latter. If noise was filtered, it must differ by more
+    than the smoothing spline's own deviation explains.
+    """
+    known, member = judge.smoothing, judge.members[0]
+    if known is None:
+        return False
+    if record.spoilt[member] > (SUSPECT if known.resolved else DISAGREEMENT):
+        return True
+    return (
+        bool(record.filtered[member]) and difference > DISAGREEMENT + DISAGREEING_DEVIATIONS * known.relative
+    )
+
+
+def _difference(part: Part, column: int, smooth: Part, record: Record) -> float:
+    """Between the highest derivatives of a fit and a smoothing spline, relative, away from the ends."""
+    time, order = record.time, record.order
+    start, end = smooth.doubtful
+    inside = time[(time >= time[0] + start) & (time <= time[-1] - end)]
+    probes = inside[:: 1 + len(inside) // PROBES]
+    expected = smooth.spline(probes, nu=order)[:, 0]
+    error = part.spline(probes, nu=order)[:, column] - expected
+    power = float(np.sum(expected**2))
+    return float(np.sqrt(np.sum(error**2) / power)) if power > 0 else 0.0
+
+
+def replaced(parts: Sequence[Part], instead: Sequence[Part]) -> list[Part]:
+    """All parts, some components taken out of them and put in again by themselves."""
+    taken = np.concatenate([part.members for part in instead])
+    kept: list[Part] = []
+    for part in parts:
+        left = ~np.isin(part.members, taken)
+        if left.all():
+            kept.append(part)
+        elif left.any():
+            spline = type(part.spline)(part.spline.t, part.spline.c[:, left], part.spline.k)
+            kept.append(Part(part.members[left], spline, part.exact))
+    return [*kept, *instead]

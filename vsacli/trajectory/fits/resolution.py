@@ -1,0 +1,174 @@
+"""Which resolution a record asks for: coarse to fine, until the next one confirms it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins
+from vsacli.trajectory.fits.penalised import Model, most_likely
+
+FIRST_SPANS, FIRST_SPANS_SHORT = 32, 4
+"""Of the coarsest resolution; that of records of fewer than `SHORT` samples is coarser."""
+
+SHORT = 256
+
+FEWEST_SAMPLES, ALWAYS_SPANS, MOST_SPANS = 3, 128, 32768
+"""Samples of a span; spans that there may be also with fewer, and never more of. Noise of fewer samples in a
+row has spoilt what a finer resolution would show, and time grows with the spans."""
+
+SEGMENTED_FACTOR = 2.0
+"""By which the deviation of a spline with several penalties is multiplied. On 36 records from rest to rest
+with pauses the error was 1.4 to 2.2 times the posterior deviation, which takes the penalties for known."""
+
+NEGLIGIBLE = 0.02
+"""Relative change of the highest derivative from one resolution to the next that asks for no finer one. If
+noise does not explain it, the next is taken. With a fifth of this, filtered noise was followed in a sweep."""
+
+CONFIRMED = 1.0
+"""Deviations by which that derivative may change then. With more, half the knots were accepted of motions
+from rest to rest, and the true error was beyond two deviations in up to 30 % of the samples."""
+
+ACCEPTED = 0.25
+"""Largest relative deviation of the highest derivative with which a resolution is accepted. Motions whose
+fast parts pass for noise had 0.3 and more."""
+
+CLOSE = 100.0
+"""Factor above the least residual of all resolutions, up to which one is considered if none is accepted. A
+coarse one may state the least deviation of a derivative that it does not see."""
+
+SPANS_PER_PERIOD = 4.0
+"""Of the highest frequency of a motion whose bandwidth is known: of a sine of that frequency the spline of
+degree 7 misses less than 1 % of the fourth derivative."""
+
+
+class KnownNoise(NamedTuple):
+    """What the user says of a component.
+
+    Attributes:
+        deviation: standard deviation of a sample's noise; None: it is estimated.
+        bandwidth: above which there is no motion, Hz; None: the record tells.
+    """
+
+    deviation: float | None = None
+    bandwidth: float | None = None
+
+
+class Resolution(NamedTuple):
+    """A resolution, compared with the next.
+
+    Attributes:
+        model: the coarser of both, or the finer if noise does not explain the change.
+        deviation: of the highest derivative by noise, relative.
+        change: of that derivative from one to the other, relative.
+        residual: root mean square.
+        given: whether it follows from a bandwidth.
+    """
+
+    model: Model
+    deviation: float
+    change: float
+    residual: float
+    given: bool = False
+
+    @property
+    def stated(self) -> float:
+        """Both together, as what is unresolved is an error like any other."""
+        return float(np.hypot(self.deviation, self.change))
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the next resolution changes no more than noise does, and both are small."""
+        confirmed = self.change < max(CONFIRMED * self.deviation, NEGLIGIBLE)
+        return self.given or (confirmed and self.stated < ACCEPTED)
+
+
+def find_resolution(
+    time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
+) -> Resolution | None:
+    """The first resolution that the next one confirms, or that of a given bandwidth.
+
+    Coarse to fine, since it is the band that counts: above the frequency at which the motion falls below the
+    noise, whatever colour this has does not matter, and only a resolution beyond it would have to know it.
+
+    Args:
+        time: (samples,), s.
+        row: (samples,), of mean 0 and deviation 1.
+        degree: of the spline.
+        order: of the highest derivative that is needed.
+        known: what need not be estimated, the deviation in units of the row.
+
+    Returns:
+        If none is confirmed, that with the least deviation among those close to the samples; None if there is
+        none.
+    """
+    if known.bandwidth is not None:
+        return _given(time, row, degree, order, known)
+    tried = []
+    for coarse, fine in pairwise(_models(time, row, degree, _spans(len(time)), known)):
+        tried.append(_compared(time, row, coarse, fine, order))
+        if tried[-1].accepted:
+            return tried[-1]
+    least = min((each.residual for each in tried), default=0.0)
+    close = [each for each in tried if each.residual <= CLOSE * least]
+    return min(close, key=lambda each: each.stated, default=None)
+
+
+def _given(
+    time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
+) -> Resolution | None:
+    assert known.bandwidth is not None
+    spans = SPANS_PER_PERIOD * known.bandwidth * float(time[-1] - time[0])
+    finest = int(np.clip(np.ceil(spans), 1, max(1, len(time) // BINS_PER_SPAN - degree)))
+    halvings = range(int(np.log2(max(1, finest / FIRST_SPANS))), -1, -1)
+    models = list(_models(time, row, degree, [-(-finest // 2**halving) for halving in halvings], known))
+    if not models:
+        return None
+    return _compared(time, row, models[-1], models[-1], order)._replace(given=True)
+
+
+def _spans(samples: int) -> list[int]:
+    """Of the resolutions that are tried."""
+    first = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
+    most = max(samples // FEWEST_SAMPLES, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
+    return [first * 2**k for k in range(30) if first * 2**k <= min(most, MOST_SPANS)]
+
+
+def _models(
+    time: FloatArray, row: FloatArray, degree: int, spans: list[int], known: KnownNoise
+) -> Iterator[Model]:
+    model: Model | None = None
+    for count in spans:
+        bins = Bins.of(time, row, count, degree, known.deviation)
+        if len(bins.means) > degree + 1:
+            model = most_likely(bins, model)
+            yield model
+
+
+def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, order: int) -> Resolution:
+    expected = fine.spline(fine.probes, nu=order)[fine.inside, 0]
+    found = coarse.spline(fine.probes, nu=order)[fine.inside, 0]
+    size = max(_rms(expected), np.finfo(float).tiny)
+    change, deviation = _rms(found - expected), rms_deviation(coarse, order)
+    explained = change < CONFIRMED * deviation
+    model = fine if not explained and change < NEGLIGIBLE * size else coarse
+    deviation = deviation if model is coarse else rms_deviation(fine, order)
+    return Resolution(model, deviation / size, change / size, _rms(row - model.spline(time)[:, 0]))
+
+
+def rms_deviation(model: Model, order: int) -> float:
+    """Of a derivative, away from the ends."""
+    return deviation_factor(model) * _rms(model.deviations(order)[model.inside])
+
+
+def deviation_factor(model: Model) -> float:
+    """By which the posterior deviation is too small."""
+    return SEGMENTED_FACTOR if model.segments > 1 else 1.0
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
