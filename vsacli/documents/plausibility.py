@@ -201,9 +201,7 @@ Moved: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
 class Written:
     """What a YAML file says, and on which line, at the path to a number."""
 
-    def __init__(
-        self, source: Source, moved: Callable[[tree.Node, NumberPath], NumberPath] | None = None
-    ) -> None:
+    def __init__(self, source: Source, moved: Moved | None = None) -> None:
         """The file, and where it has what stands elsewhere in the record made of it."""
         self._source = source
         self._moved = moved
@@ -240,10 +238,12 @@ class Written:
             return None
         return measured._replace(path=measured.path[: len(measured.path) - len(left)], value=value)
 
-    def in_angles(self, path: NumberPath) -> bool:
-        """Whether a number is written with `deg` or `pi`."""
-        node, _ = self.at(path)
-        return isinstance(node, tree.Scalar) and bool(_EXPRESSION_OF_ANGLE.search(node.text))
+    def in_angles(self, measured: Measured) -> bool:
+        """Whether it says this number with `deg` or `pi`."""
+        node, _ = self.at(measured.path)
+        if not isinstance(node, tree.Scalar) or self.said(measured) is None:
+            return False
+        return bool(_EXPRESSION_OF_ANGLE.search(node.text))
 
 
 def _inside(node: tree.Node, step: str | Entry) -> tree.Node | None:
@@ -264,13 +264,17 @@ def _value(text: str, unit: str) -> float:
 
 
 def strange(
-    rules: Sequence[Rule[_Subject]], subject: _Subject, known: Collection[str] = ()
+    rules: Sequence[Rule[_Subject]],
+    subject: _Subject,
+    written: Written | None = None,
+    known: Collection[str] = (),
 ) -> dict[str, list[Measured]]:
     """The numbers that rules find, by name of the rule; of rules that find nothing there is no entry.
 
     Args:
         rules: a rule comes after those that explain what it finds.
         subject: what they measure.
+        written: the file it is from, if there is one.
         known: names of rules that found something elsewhere.
     """
     found: dict[str, list[Measured]] = {}
@@ -278,6 +282,8 @@ def strange(
         for rule in rules:
             if {*found, *known}.isdisjoint(rule.explained_by):
                 outside = [measured for measured in rule.measure(subject) if not rule.admits(measured.size)]
+                if rule.in_angles and written is not None:
+                    outside = [measured for measured in outside if not written.in_angles(measured)]
                 found |= {rule.name: outside} if outside else {}
     return found
 
@@ -288,19 +294,17 @@ def findings(
     written: Written | None = None,
     known: Collection[str] = (),
 ) -> tuple[Problem, ...]:
-    """What rules find; with file and line if the file is given and still says it. The rest as `strange`."""
+    """What rules find, as `strange`; with file and line if the file is given and still says it."""
     named = {rule.name: rule for rule in rules}
-    found = strange(rules, subject, known)
+    found = strange(rules, subject, written, known)
     problems = (_problem(named[name], each, written) for name, several in found.items() for each in several)
-    return tuple(dict.fromkeys(problem for problem in problems if problem is not None))
+    return tuple(dict.fromkeys(problems))
 
 
-def _problem(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem | None:
-    """The warning about a number; None if its writer knew the unit."""
+def _problem(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem:
+    """The warning about a number."""
     slip = rule.slip(measured)
     said = written.said(measured) if written is not None else None
     if written is None or said is None:
         return Problem("", 0, rule.sentence(measured, slip))
-    if rule.in_angles and written.in_angles(measured.path):
-        return None
     return written.problem(_of_slip(measured.path, slip), rule.sentence(said, slip))

@@ -18,12 +18,16 @@ ROBOT_RULES = (*BODY_RULES, *MOTOR_RULES, *SPRING_RULES)
 
 def implausible(facts: Facts, sources: Sequence[Source]) -> tuple[Problem, ...]:
     """What the rules find, with lines of the robot file: the first of the sources, if there is one."""
-    return findings(ROBOT_RULES, facts, Written(sources[0], _as_written) if sources else None)
+    return findings(ROBOT_RULES, facts, _written(sources))
 
 
-def strange_of_robot(facts: Facts) -> frozenset[str]:
+def strange_of_robot(facts: Facts, sources: Sequence[Source]) -> frozenset[str]:
     """Names of the rules that find something."""
-    return frozenset(strange(ROBOT_RULES, facts))
+    return frozenset(strange(ROBOT_RULES, facts, _written(sources)))
+
+
+def _written(sources: Sequence[Source]) -> Written | None:
+    return Written(sources[0], _as_written) if sources else None
 
 
 def _as_written(root: tree.Node, path: NumberPath) -> NumberPath:

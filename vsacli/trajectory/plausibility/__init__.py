@@ -15,5 +15,5 @@ TRAJECTORY_RULES = (*MOTION_RULES, *EFFORT_RULES)
 
 def implausible(facts: Facts, source: Source) -> tuple[Problem, ...]:
     """What the rules find, with the lines of the trajectory file."""
-    known = strange_of_robot(facts.robot.facts)
+    known = strange_of_robot(facts.robot.facts, facts.robot.sources)
     return findings(TRAJECTORY_RULES, facts, Written(source), known)
