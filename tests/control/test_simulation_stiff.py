@@ -174,3 +174,10 @@ def test_a_jacobian_is_finite_also_where_a_difference_steps_over_an_end():
     at_the_end = jacobian(function, 0.0, np.array([1.0, -0.7]))
     assert np.isfinite(at_the_end).all()
     assert at_the_end[:, 1] == pytest.approx(matrix[:, 1], abs=0.1)
+
+
+def test_a_run_with_the_full_state_that_ends_early_is_told():
+    trajectory = short_motion(3, rate=100, duration=0.3)
+    report = simulate(vsa_3r(), trajectory, gains=GAINS, measured="positions", budget=300).report
+    assert report.verdict == "incomplete"
+    assert report.warnings[-1].startswith("the same run with the full state: the budget of 300 evaluations")

@@ -13,7 +13,7 @@ LEAST_DEFAULT = 200_000
 """Evaluations: half a minute for an arm of three joints. Runs of the shipped files take 20,000 at most."""
 
 DEFAULT_PER_STEP = 100
-"""Evaluations for each step of a trajectory, where that is more: sampled control takes some 30."""
+"""Evaluations for each step of a trajectory, where that is more: sampled control takes 17."""
 
 TRIAL = 0.05
 """Share of the budget after which the pace so far is taken for that of the whole run: a start with fast

@@ -20,7 +20,7 @@ from vsacli.control.simulation.controllers import Feedforward, LinearizingFeedba
 from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.history import History, history
 from vsacli.control.simulation.integrator import Integrator, Tolerances
-from vsacli.control.simulation.joint_tracking import Deviation, joint_trackings, stiffness_warnings
+from vsacli.control.simulation.joint_tracking import joint_trackings, stiffness_warnings
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.rounding import check_rounding
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
@@ -138,7 +138,8 @@ def simulate(
     Raises:
         InputError: a trajectory that is not for the robot, a start that cannot be had, measured positions
             without gains, gains that do not fit, feedback linearization of a robot that mixes rigid joints
-            with others, a mass matrix that is not positive definite.
+            with others, a mass matrix that is not positive definite, springs so stiff or poles so fast that
+            double precision does not resolve them, a budget below 1.
         TypeError: robot or trajectory is none.
     """
     check_fit(robot, trajectory)
@@ -148,11 +149,10 @@ def simulate(
     integrated = _integrate(robot, loop, trajectory, start, measured, tolerances, budget, progress)
     past = history(robot, loop, integrated)
     joints = joint_trackings(robot, past, goal_tolerance)
-    ideal: tuple[Deviation, ...] = ()
+    full: SimulationReport | None = None
     if measured == "positions":
         conditions: Any = {"gains": gains, "model": model, "initial_error": initial_error}
-        full = simulate(robot, trajectory, **conditions, tolerances=tolerances, budget=budget)
-        ideal = tuple(joint.q for joint in full.report.joints)
+        full = simulate(robot, trajectory, **conditions, tolerances=tolerances, budget=budget).report
     verdict = verdict_on(past, joints, integrated.ending)
     exact = gains is None and (model is None or model is robot) and initial_error.is_zero
     report = SimulationReport(
@@ -168,12 +168,13 @@ def simulate(
         methods=integrated.effort.methods,
         warnings=(
             *(*robot.warnings, *trajectory.warnings),
-            *(stiffness_warnings(robot, past) if integrated.ending is None else ()),
             *([_AMPLIFIED] if exact and verdict == "strayed" else []),
+            *(stiffness_warnings(robot, past) if integrated.ending is None else []),
+            *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
         ),
         notes=trajectory.notes,
         joints=joints,
-        with_full_state=ideal,
+        with_full_state=tuple(joint.q for joint in full.joints) if full else (),
     )
     return Simulation(past, report)
 

@@ -161,4 +161,4 @@ class SimulationReport(Stored):
         if self.methods:
             first, *others = self.methods
             changes = "".join(f", from t = {method.start:.6g} s on {method.name}" for method in others)
-            yield f"integrated by {first.name}{changes}: {self.evaluations} evaluations of {self.budget}"
+            yield f"integrated by {first.name}{changes}: {self.evaluations} evaluations, budget {self.budget}"
