@@ -18,10 +18,13 @@ from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
+from vsacli.base.units import time_text
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, Tolerances, perturbed, simulate
 from vsacli.control.simulation.state_trajectory import RateFilter
 from vsacli.control.simulation.state_vector import Phase
+from vsacli.trajectory.times import RecordedTimes
+from vsacli.trajectory.trajectory import Trajectory
 
 GAINS = Gains.from_poles([-20] * 4, [-20] * 2)
 
@@ -54,6 +57,23 @@ def test_motors_saturate():
     assert f"base: joint-side torque of motor {worst.motor} is {worst.value:.6g}" in str(simulation.report)
 
 
+def test_stamps_since_1970_do_as_well_as_those_from_zero():
+    """An integrator that counted so would step by 2.4e-7 s at the least, and see its times rounded so."""
+    original = short_motion(3)
+    stamps = original.times.block(0, original.samples)
+    zero, late = (
+        simulate(
+            vsa_3r(),
+            Trajectory(RecordedTimes(start + stamps), original.position, original.commanded, name="test"),
+            initial_error=InitialError(0.001),
+        )
+        for start in (0.0, 1.7e9)
+    )
+    np.testing.assert_array_equal(late.history.time, 1.7e9 + stamps)
+    # the steps themselves are rounded by 1.2e-7 s, at speeds below 3 rad/s
+    np.testing.assert_allclose(late.history.q_actual, zero.history.q_actual, rtol=0, atol=4e-7)
+
+
 def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
     """The stiffness is driven to 805, below what the loaded joints can have."""
     trajectory = motion((850.0,) * 3, (805.0,) * 3)
@@ -63,7 +83,7 @@ def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
     assert not report.complete
     assert past.time[-1] < trajectory.duration
     assert report.ending == (
-        f"shoulder: its decoupling matrix became singular; ended at t = {past.time[-1]:.6g} s"
+        f"shoulder: its decoupling matrix became singular; ended at t = {time_text(float(past.time[-1]))}"
     )
     assert past.flags[-1].tolist() == [0, Flag.SINGULAR, 0]
     assert not past.flags[:-1].any()

@@ -94,7 +94,7 @@ def linearized_run(
     budget = Budget(None, times)
     integrator = Integrator(list(boundaries(loop, start)), Tolerances(), budget, lambda _: None)
     integrated = continuous(loop, integrator, times, start)
-    past = history(robot, loop, integrated)
+    past = history(robot, loop, integrated, 0.0)
     return past, State(past.q_actual, past.dq_actual, past.theta_actual, past.dtheta_actual)
 
 

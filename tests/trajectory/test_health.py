@@ -135,6 +135,13 @@ def test_a_sensor_that_freezes_until_the_end_or_from_the_start():
     assert message.startswith("q[0, 0] is frozen 2 times, first at t = 0.000 s, for up to 300 ms (at t = ")
 
 
+@pytest.mark.parametrize("rows", [2, 3, 5])
+def test_values_that_stand_in_several_rows_each(rows: int):
+    (message,) = messages(TIME, noisy()[np.arange(len(TIME)) // rows * rows])
+    stands = f"has each value in {rows} rows: its sensor is slower than the stamps"
+    assert message == f"q[0, 0] {stands}; keep one row in {rows}"
+
+
 def test_true_pauses_are_not_frozen():
     s = np.clip((TIME - 1) / 2, 0, 1)
     q = s**4 * (35 - 84 * s + 70 * s**2 - 20 * s**3)  # rest to rest in the middle

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vsacli.base.flags import Flag
+from vsacli.base.units import time_text
 
 DIVERGED = "diverged"
 INCOMPLETE = "incomplete"
@@ -29,7 +30,7 @@ class Ending:
     joint: int | None = None
     verdict: str = DIVERGED
 
-    def described(self, joint_names: Sequence[str]) -> str:
-        """The end as a sentence."""
+    def described(self, joint_names: Sequence[str], first: float = 0.0) -> str:
+        """The end as a sentence; `first` is the stamp of time zero, s."""
         place = "" if self.joint is None else f"{joint_names[self.joint]}: "
-        return f"{place}{self.reason}; ended at t = {self.time:.6g} s"
+        return f"{place}{self.reason}; ended at t = {time_text(first + self.time)}"

@@ -23,8 +23,8 @@ class History(Block):
     declared = SIMULATION_VARIABLES
 
 
-def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory) -> History:
-    """Evaluate every variable along a state trajectory."""
+def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory, first: float) -> History:
+    """Evaluate every variable along a state trajectory; `first` is the stamp of its time zero, s."""
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in TRACKED}
     found = _actual(loop, integrated)
@@ -33,7 +33,7 @@ def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory) -> Hist
         commanded[name] = np.where(chosen, commanded[name], found[name])
     demand = loop.plant.drivetrain.of_joints(integrated.demand)
     return History(
-        time=integrated.time,
+        time=first + integrated.time,
         **commanded,
         tau_motor=demand,
         **{actual(name): values for name, values in found.items()},

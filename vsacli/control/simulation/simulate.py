@@ -144,10 +144,15 @@ def simulate(
     """
     check_fit(robot, trajectory)
     check_measured(measured, gains)
-    loop = _closed_loop(robot, trajectory, model or robot, gains)
-    start = start_state(robot, trajectory, initial_error)
-    integrated = _integrate(robot, loop, trajectory, start, measured, tolerances, budget, progress)
-    past = history(robot, loop, integrated)
+    first, elapsed = trajectory.start, trajectory.from_zero()
+    loop = _closed_loop(robot, elapsed, model or robot, gains)
+    start = start_state(robot, elapsed, initial_error)
+
+    def passed(time: float) -> None:
+        progress(first + time)
+
+    integrated = _integrate(robot, loop, elapsed, start, measured, tolerances, budget, passed)
+    past = history(robot, loop, integrated, first)
     joints = joint_trackings(robot, past, goal_tolerance)
     full: SimulationReport | None = None
     if measured == "positions":
@@ -162,7 +167,7 @@ def simulate(
         samples=len(past.time),
         duration=trajectory.duration,
         verdict=verdict,
-        ending=None if integrated.ending is None else integrated.ending.described(robot.joint_names),
+        ending=None if integrated.ending is None else integrated.ending.described(robot.joint_names, first),
         evaluations=integrated.effort.evaluations,
         budget=integrated.effort.budget,
         methods=integrated.effort.methods,

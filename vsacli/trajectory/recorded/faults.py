@@ -19,6 +19,9 @@ from vsacli.trajectory.recorded.thresholds import (
     FIT_DEVIATIONS,
     FROZEN_AT_END_STEPS,
     FROZEN_STEPS,
+    HELD_CHANGES,
+    HELD_ROWS,
+    HELD_SHARE,
     JUMP_SHARE,
     LEAST_SHARE,
     MARGIN,
@@ -49,6 +52,11 @@ class Faults:
     first: IndexArray
     last: IndexArray
     sizes: FloatArray
+
+    @property
+    def at(self) -> int:
+        """Index of the first of all."""
+        return int(self.first[0])
 
     @property
     def count(self) -> int:
@@ -139,6 +147,18 @@ def _misfit(powers: FloatArray, values: FloatArray, kept: BoolArray) -> tuple[Fl
     """Values minus the polynomial through those kept, and the leverage of each: its variance per noise."""
     inverse = np.linalg.pinv(powers[kept])
     return values - powers @ (inverse @ values[kept]), np.sum((powers @ inverse) ** 2, axis=1)
+
+
+def held(values: FloatArray, grain: Grain) -> int:
+    """In how many rows each value stands; 1 if it is not always the same number."""
+    changes = np.flatnonzero(values[1:] != values[:-1])
+    rows = np.diff(changes)
+    if len(rows) < HELD_CHANGES:
+        return 1
+    usual = int(np.median(rows))
+    alike = np.count_nonzero(rows == usual) >= HELD_SHARE * len(rows)
+    jump = float(np.median(np.abs(values[changes + 1] - values[changes])))
+    return usual if alike and usual <= HELD_ROWS and jump >= QUANTA * grain.quantum else 1
 
 
 def frozen(time: FloatArray, values: FloatArray, grain: Grain) -> Faults | None:

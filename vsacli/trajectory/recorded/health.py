@@ -12,7 +12,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
 from vsacli.base.units import time_text
-from vsacli.trajectory.recorded.faults import Faults, frozen, outliers, saturated, wraps
+from vsacli.trajectory.recorded.faults import Faults, frozen, held, outliers, saturated, wraps
 from vsacli.trajectory.recorded.grain import ORDER, Grain
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.samples import Samples
@@ -32,8 +32,8 @@ def health(stamps: FloatArray, records: Sequence[Samples]) -> Iterator[SamplePro
     yield from stamp_faults(stamps)
     for record in records:
         for component in np.flatnonzero(record.given).tolist():
-            for faults, sentence in _of_column(stamps, record, component):
-                yield SampleProblem(record.signal.names[0], sentence, component, int(faults.first[0]))
+            for first, sentence in _of_column(stamps, record, component):
+                yield SampleProblem(record.signal.names[0], sentence, component, first)
 
 
 def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterator[SampleProblem]:
@@ -53,33 +53,40 @@ def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterato
                 yield SampleProblem(name, f"goes to {largest:.4g} m; are these mm? {_write('mm')}", index)
 
 
-def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[tuple[Faults, str]]:
+def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[tuple[int, str]]:
+    """Of each kind of fault the first sample, and a sentence."""
     time, values = record.time, record.values[component]
     if np.ptp(values) == 0:
         return
     grain = Grain.of(time, values)
+    if (rows := held(values, grain)) > 1:
+        yield (
+            0,
+            f"has each value in {rows} rows: its sensor is slower than the stamps; keep one row in {rows}",
+        )
+        return
     if off := outliers(time, values, grain):
         extent = _extent(off, stamps, [f"{size:.3g}" for size in off.sizes.tolist()])
         yield (
-            off,
+            off.at,
             f"is off {_occasions(off, stamps)}, by {extent} from a smooth curve, amid samples that are on it:"
             f" derivatives follow such outliers; delete {'the row' if off.count == 1 else 'these rows'}",
         )
     if stuck := frozen(time, values, grain):
         yield (
-            stuck,
+            stuck.at,
             f"is frozen {_occasions(stuck, stamps)}, for {_lasting(stuck, stamps)}, while the motion goes on:"
             " these samples were lost; delete the rows, or record again",
         )
     if cut := saturated(time, values, grain):
         yield (
-            cut,
+            cut.at,
             f"is cut off at {values[cut.first[0]]:.4g} {_occasions(cut, stamps)}, for {_lasting(cut, stamps)}"
             " while the motion goes on: the sensor or the log file has no larger range; record again",
         )
     if record.signal is POSITION and (wrapped := wraps(values)):
         yield (
-            wrapped,
+            wrapped.at,
             f"jumps by 2 pi {_occasions(wrapped, stamps)}: an angle that was wrapped? Set unwrap: true under"
             " position in a trajectory file",
         )

@@ -74,6 +74,16 @@ JUMP_SHARE = (0.4, 2.5)
 ABRUPT_SHARE = 0.7
 """Last step before a stop, in mean steps before it, that is no braking: a smooth motion has 0.2 or less."""
 
+HELD_ROWS = 20
+"""Rows at most over which a logger that is faster than its sensor repeats each value."""
+
+HELD_SHARE = 0.9
+"""Of the changes, what share must come after just so many rows. Those of an encoder at a steady speed do, but
+they are single steps of it."""
+
+HELD_CHANGES = 50
+"""Changes below which the rows between them may agree by chance."""
+
 SATURATED_STEPS = 3
 """Steps at the very largest or smallest value, entered and left as if the motion went on."""
 
