@@ -148,6 +148,15 @@ def test_every_axis_has_a_unit(figure: str, labels: list[str]) -> None:
     assert panels(drawn)[0].get_xlabel() == "time [s]"
 
 
+def test_times_since_1970_are_counted_from_the_second_in_which_they_begin() -> None:
+    result = rest_to_rest()
+    result.time = 1.7e9 + 0.25 + result.time
+    axes = panels(plot_stored(result)["motor-torque"])[-1]
+    axes.figure.draw_without_rendering()
+    assert axes.get_xlabel() == "time after 1700000000 s [s]"
+    assert [label.get_text() for label in axes.get_xticklabels()[1:-1]] == ["1", "2", "3", "4"]
+
+
 def test_title_and_legend_name_robot_trajectory_and_joints() -> None:
     result = rest_to_rest()
     result.read("flags")[7, 0] = 1

@@ -32,6 +32,9 @@ from vsacli.results.store.reader import StoredResult
 PANEL_WIDTH = 3.0
 """Inches: with fonts of 10 pt, two panels side by side stay readable in one column of a paper."""
 
+LATE = 1e5
+"""First time, s, from which on ticks count from it: their digits would not fit side by side."""
+
 JOINTS_PER_PANEL = 7
 TITLE_LENGTH = 70
 
@@ -94,6 +97,10 @@ def _share_time(column: Sequence[Axes], time: FloatArray) -> None:
         axes.sharex(column[-1])
         axes.tick_params(labelbottom=False)
     column[-1].set_xlabel(f"time [{TIME}]")
+    if time[0] >= LATE:
+        whole = math.floor(time[0])
+        column[-1].set_xlabel(f"time after {whole} {TIME} [{TIME}]")
+        column[-1].xaxis.set_major_formatter(lambda tick, _: f"{tick - whole:g}")
     if time[-1] > time[0]:
         column[-1].set_xlim(time[0], time[-1])
 
