@@ -30,7 +30,7 @@ class Ending:
     joint: int | None = None
     verdict: str = DIVERGED
 
-    def described(self, joint_names: Sequence[str], first: float = 0.0) -> str:
+    def described(self, joint_names: Sequence[str], first: float) -> str:
         """The end as a sentence; `first` is the stamp of time zero, s."""
         place = "" if self.joint is None else f"{joint_names[self.joint]}: "
         return f"{place}{self.reason}; ended at t = {time_text(first + self.time)}"
