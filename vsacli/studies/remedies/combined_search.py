@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
+from vsacli.actuators.actuator import Actuator
 from vsacli.base.arrays import FloatArray, evenly
 from vsacli.dynamics.inverse import command_of, elastic_torques
 from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import ImpossibleError, path_reason
 from vsacli.studies.remedies.admissible_stiffness import Load
 from vsacli.studies.remedies.combination import Combination, Form, constant_change
@@ -30,23 +30,32 @@ STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 MOST_ROUNDS = 20
 """Rounds of adding steps that refuse what the watched ones accept; two or three are usual."""
 
+SAME_CORRIDOR = 1e-6
+"""Relative difference of two corridors that may be rounding."""
+
 PRELOAD_GAIN = 0.9
 """Share to which the other preload must bring down the change of a joint, so that it is worth its while."""
 
 
-@dataclass(frozen=True)
 class CombinedSearch:
     """A search for the combination of changes that mends a motion.
 
-    Attributes:
+    Args:
         task: what is to be mended, by which rule, and at which cost.
         form: of the changes of stiffness.
         preloads: whether joints may take the other preload.
     """
 
-    task: Task
-    form: Form = constant_change
-    preloads: bool = False
+    def __init__(self, task: Task, form: Form = constant_change, *, preloads: bool = False) -> None:
+        self.task, self.form = task, form
+        watched = evenly_chosen(task.trajectory, WATCHED_STEPS)
+        self.choices = _choices(task.acceptance.robot, watched if preloads else None)
+        self._looking = WatchedSearch(self, watched)
+
+    @property
+    def exchangeable(self) -> bool:
+        """Whether the other preload of some joint may be worth trying."""
+        return any(len(choices) > 1 for choices in self.choices)
 
     def smallest(self) -> Combination | None:
         """The combination of least cost; confirmed on all steps if its changes are constants."""
@@ -57,13 +66,12 @@ class CombinedSearch:
         return self._confirmed(WatchedSearch.fastest)
 
     def _confirmed(self, choose: Callable[[WatchedSearch], Combination | None]) -> Combination | None:
-        watched = evenly_chosen(self.task.trajectory, WATCHED_STEPS)
         for _ in range(MOST_ROUNDS):
-            found = choose(WatchedSearch(self, watched))
+            found = choose(self._looking)
             refused = None if found is None or self.form is not constant_change else self._refused(found)
             if refused is None:
                 return found
-            watched = joined([watched, refused])
+            self._looking = WatchedSearch(self, joined([self._looking.watched, refused]))
         return None
 
     def _refused(self, found: Combination) -> Motion | None:
@@ -77,24 +85,42 @@ class CombinedSearch:
                 return slowed(select(motion, steps[evenly(len(steps), WATCHED_STEPS)]), 1 / found.factor)
         return None
 
-    @cached_property
-    def choices(self) -> list[dict[str, Joint]]:
-        """What each joint may be by the word for its preload, which is empty if it stays as it is."""
-        robot = self.task.acceptance.robot
-        choices = [{"": joint} for joint in robot.joints]
-        for index, joint in enumerate(robot.joints):
-            opposite = joint.actuator.opposite_preload
-            if self.preloads and opposite is not None:
-                exchanged = robot.replace(f"joints.{index}.actuator.preload", opposite)
-                choices[index][opposite] = exchanged.joints[index]
+
+def _choices(robot: Robot, watched: Motion | None) -> list[dict[str, Joint]]:
+    """What each joint may be by the word for its preload, which is empty if it stays as it is.
+
+    Args:
+        robot: the robot.
+        watched: some steps; the other preload is a choice if it makes a difference there. None if it is none.
+    """
+    choices = [{"": joint} for joint in robot.joints]
+    if watched is None:
         return choices
+    torques = elastic_torques(robot, watched)["tau_e"]
+    for index, joint in enumerate(robot.joints):
+        preload = joint.actuator.opposite_preload
+        if preload is not None:
+            exchanged = robot.replace(f"joints.{index}.actuator.preload", preload).joints[index]
+            load = torques[:, index], watched.commanded["stiffness"][:, index]
+            if not _alike(joint.actuator, exchanged.actuator, *load):
+                choices[index][preload] = exchanged
+    return choices
+
+
+def _alike(one: Actuator, other: Actuator, tau_e: FloatArray, stiffness: FloatArray) -> bool:
+    """Whether two preloads of an actuator are mirror images, as those of like springs are."""
+    if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
+        return False
+    first, second = one.solve(tau_e, stiffness), other.solve(tau_e, stiffness)
+    pairs = (first.lower, second.lower), (first.upper, second.upper)
+    return all(np.allclose(here, there, rtol=SAME_CORRIDOR, equal_nan=True) for here, there in pairs)
 
 
 class WatchedSearch:
     """A combined search that looks at some steps of the motion, and keeps what it finds at each factor."""
 
     def __init__(self, search: CombinedSearch, watched: Motion) -> None:
-        self._search, self._watched = search, watched
+        self._search, self.watched = search, watched
         self._found: dict[int, Combination | None] = {}
 
     def fastest(self) -> Combination | None:
@@ -151,7 +177,7 @@ class WatchedSearch:
         Raises:
             ImpossibleError: some joint is refused whatever its stiffness.
         """
-        motion, search = slowed(self._watched, factor), self._search
+        motion, search = slowed(self.watched, factor), self._search
         commanded = {**motion.variables(), **elastic_torques(search.task.acceptance.robot, motion)}
         loads = [Load(motion.time, command_of(index, commanded)) for index in range(len(search.choices))]
         for choices, load in zip(search.choices, loads, strict=True):

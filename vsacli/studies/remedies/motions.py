@@ -9,6 +9,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
+from vsacli.dynamics.inverse import usual_block
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -26,7 +27,13 @@ def stiffened(motion: Motion, change: FloatArray) -> Motion:
 
 def evenly_chosen(trajectory: Trajectory, steps: int) -> Motion:
     """At most so many steps of a trajectory, both ends included."""
-    return joined(trajectory.block(step, step + 1) for step in evenly(trajectory.samples, steps).tolist())
+    chosen = evenly(trajectory.samples, steps)
+    samples = usual_block(trajectory.joints)
+    return joined(
+        select(trajectory.block(start, start + samples), inside - start)
+        for start in range(0, trajectory.samples, samples)
+        if (inside := chosen[(start <= chosen) & (chosen < start + samples)]).size
+    )
 
 
 def select(motion: Motion, steps: IndexArray) -> Motion:

@@ -10,7 +10,7 @@ from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
 from vsacli.dynamics.inverse import check_fit
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.remedies.combination import Combination, constant_change, least_change
+from vsacli.studies.remedies.combination import Combination, least_change
 from vsacli.studies.remedies.combined_search import CombinedSearch
 from vsacli.studies.remedies.slow_down import smallest_slow_down
 from vsacli.studies.remedies.suggestions import NotPossible, Remedy, Suggestions
@@ -82,18 +82,15 @@ def _part(found: Remedy | NotPossible, name: str) -> Any:
 
 def _combined(task: Task) -> Iterator[Remedy]:
     """Remedies that may take several kinds of change."""
-    constant, least, exchanged = (
-        CombinedSearch(task, form, preloads)
-        for form, preloads in ((constant_change, False), (least_change, False), (constant_change, True))
-    )
+    constant, least = CombinedSearch(task), CombinedSearch(task, least_change)
     smallest = constant.smallest()
     yield from (task.with_constants(found) for found in (smallest, constant.fastest()) if found is not None)
     profiles = list(_with_profiles(task, least.smallest(), least.fastest()))
     yield from profiles or _with_profiles(task, smallest)
-    if any(len(choices) > 1 for choices in exchanged.choices):
-        found = exchanged.smallest()
-        if found is not None and found.preloads:
-            yield task.with_constants(found)
+    exchanged = CombinedSearch(task, preloads=True)
+    found = exchanged.smallest() if exchanged.exchangeable else None
+    if found is not None and found.preloads:
+        yield task.with_constants(found)
 
 
 def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Remedy]:

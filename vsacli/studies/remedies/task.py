@@ -33,6 +33,9 @@ from vsacli.trajectory.trajectory import Trajectory
 
 _Found = TypeVar("_Found")
 
+REFUSED = ("infeasible", "singular", "over_limit")
+"""Verdicts that no remedy may have; what a record does not determine no remedy changes."""
+
 STEPS = slice(None, None, 2)
 """The instants of a load that are steps."""
 
@@ -126,8 +129,9 @@ class Task:
         for _ in run:
             pass
         report = run.report()
-        return report.verdict == "ok" and not any(
-            joint.margin < self.acceptance.near_singular for joint in report.joints
+        return report.self_check.passed and not any(
+            joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
+            for joint in report.joints
         )
 
 
