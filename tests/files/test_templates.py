@@ -70,6 +70,29 @@ def test_a_new_trajectory_is_not_rounded_beyond_limits(
     assert report_of(robot, trajectory_template(robot), tmp_path).verdict == "ok"
 
 
+def test_a_robot_too_weak_for_the_usual_time_gets_more_of_it(tmp_path: Path) -> None:
+    robot = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")
+    weak = robot.replace({"joints.*.actuator.motor.*.max_velocity": 0.1})
+    text = trajectory_template(weak)
+    report = report_of(weak, text, tmp_path)
+    assert report.verdict == "ok"
+    assert 4.0 < report.duration <= 20.0
+    said = " ".join(line.removeprefix("# ") for line in text.splitlines()[:8])
+    assert "It does not take 4 s, since then the joint-side velocity of motor 1 of base, " in said
+    faster = text.replace(f"duration: {report.duration:g}", f"duration: {0.95 * report.duration:g}")
+    assert report_of(weak, faster, tmp_path).verdict == "over_limit"
+
+
+def test_a_robot_that_cannot_hold_itself_is_told_so(tmp_path: Path) -> None:
+    robot = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml").replace(
+        "joints.1.actuator.motor.*.max_torque", 1
+    )
+    text = trajectory_template(robot)
+    said = " ".join(line.removeprefix("# ") for line in text.splitlines()[:8])
+    assert "This robot cannot execute it, nor more slowly: even at rest, under gravity alone, " in said
+    assert report_of(robot, text, tmp_path).verdict == "over_limit"
+
+
 def torque_steps(robot: Robot, text: str, folder: Path) -> list[float]:
     """The jump of each motor torque at the start."""
     return [abs(step) for joint in report_of(robot, text, folder).joints for step in joint.torque_step]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from typing import Any
 
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.errors import InputError
-from vsacli.documents.commented import commented_document
+from vsacli.documents.commented import WIDTH, commented_document
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
 from vsacli.robot import file as robot_file
 from vsacli.robot.commanded_joints import CommandedJoints
@@ -102,7 +103,8 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
 
     Args:
         robot: the robot that is to execute it, whose limits and springs decide on the numbers; without one
-            they are those of `robot_template` with revolute joints.
+            they are those of `robot_template` with revolute joints. If it cannot do it in the usual time, the
+            motion is slower, and a comment says why.
         name: of the trajectory.
     """
     if robot is None:
@@ -120,7 +122,17 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
         values["stiffness"] = {"type": "polynomial", "degree": STIFFNESS_DEGREE, **stiffness}
     further = [] if robot is None else sorted(CommandedJoints.of(robot).taken - {"stiffness"})
     values |= {key: {"type": "constant", "value": 1} for key in further}
-    return commented_document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, values, TRAJECTORY_HEAD)
+    if robot is None:
+        return _trajectory_document(values)
+    from vsacli.files.starter import possible_duration
+
+    duration, remark = possible_duration(robot, _trajectory_document(values), DURATION)
+    return _trajectory_document({**values, "duration": duration}, remark)
+
+
+def _trajectory_document(values: Values, remark: str = "") -> str:
+    head = (*TRAJECTORY_HEAD, *textwrap.wrap(remark, WIDTH - 2))
+    return commented_document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, values, head)
 
 
 def _position(robot: Robot) -> Values:
