@@ -115,6 +115,27 @@ def test_nothing_is_written_if_nothing_helps(vsacli, tmp_path, too_soft):
     assert contents(tmp_path).keys() == {"robot.yaml", "soft.yaml"}
 
 
+def test_another_remedy_is_written_by_its_number(vsacli, tmp_path, too_soft):
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml", "--remedy", 2)
+    assert (done.code, done.err) == (3, "wrote fixed.yaml: suggestion 2\n")
+    assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml"}
+    again = vsacli("check-feasibility", ROBOT, "fixed.yaml")
+    assert again.code == 0
+    assert "motors move" not in again.out
+
+
+def test_number_of_no_remedy(vsacli, tmp_path, too_soft):
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml", "--remedy", 9)
+    assert (done.code, done.err) == (3, "fixed.yaml is not written: there is no suggestion 9\n")
+    assert contents(tmp_path).keys() == {"soft.yaml"}
+
+
+def test_number_of_a_remedy_needs_a_file(vsacli, too_soft):
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--remedy", 2)
+    assert (done.code, done.out) == (2, "")
+    assert "--remedy says which suggestion to write; give --write-fixed FILE, too" in done.err
+
+
 def test_files_that_exist_are_kept(vsacli, tmp_path, too_soft):
     (tmp_path / "fixed.csv").write_text("mine")
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml")

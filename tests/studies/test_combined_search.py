@@ -1,0 +1,135 @@
+"""Slow-down, stiffness and preload together, at whatever cost."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from samples.remedies import BASE, accepted, changed, rest_to_rest
+from samples.robots import vsa_3r
+
+from vsacli import suggest
+from vsacli.analysis.run import Run
+from vsacli.robot.joint import Limits
+from vsacli.studies.remedies.acceptance import Acceptance
+from vsacli.studies.remedies.combination import RELATIVE_CHANGE, least_change
+from vsacli.studies.remedies.combined_search import CombinedSearch
+from vsacli.studies.remedies.slow_down import smallest_slow_down
+from vsacli.studies.remedies.task import Task
+
+FAST = rest_to_rest(0.3, rate=1000)
+
+
+class Weighted:
+    """The usual cost with other weights."""
+
+    def __init__(self, factor, stiffness):
+        self._weights = factor, stiffness
+
+    def of_factor(self, factor):
+        return self._weights[0] * RELATIVE_CHANGE.of_factor(factor)
+
+    def of_stiffness(self, asked, change):
+        return self._weights[1] * RELATIVE_CHANGE.of_stiffness(asked, change)
+
+
+def search(robot=None, trajectory=FAST, **options):
+    cost = options.pop("cost", RELATIVE_CHANGE)
+    return CombinedSearch(Task(Acceptance(robot or vsa_3r(), 0.01), trajectory, cost), **options)
+
+
+def test_smallest_combination_is_that_of_a_dense_scan():
+    """At each factor the closed bound says what each joint needs."""
+    found = search().smallest()
+    sizes = []
+    for factor in np.arange(1.0, 1.5, 0.005).tolist():
+        (block,) = Run(vsa_3r(), FAST.stretched(factor), block_samples=10_000)
+        needed = np.max(block.stiffness_lower, axis=0) / 0.99 - 850.0
+        sizes.append(math.hypot(factor - 1, *np.maximum(needed, 0.0) / 850.0))
+    assert found.size == pytest.approx(min(sizes), rel=2e-3)  # flat at its minimum; strides of 0.5 %
+    assert found.size < min(sizes[0], smallest_slow_down_of(FAST) - 1)
+
+
+def smallest_slow_down_of(trajectory):
+    return smallest_slow_down(Acceptance(vsa_3r(), 0.01), trajectory)
+
+
+def test_cost_decides_what_is_changed():
+    patient = search(cost=Weighted(1e-6, 1.0)).smallest()
+    assert not patient.changes
+    assert patient.factor == pytest.approx(smallest_slow_down_of(FAST), abs=1.01e-4)
+    hasty = search(cost=Weighted(1e3, 1.0)).smallest()
+    assert hasty.factor == 1.0
+    assert hasty.changes.keys() == {0, 1}
+
+
+def test_pointwise_change_is_smaller_than_a_constant():
+    assert search(form=least_change).smallest().size < search().smallest().size
+
+
+def test_fastest_is_as_fast_as_a_limit_of_the_motion_lets_it():
+    robot = changed(BASE, limits=Limits(velocity=(-2.0, 2.0)))
+    trajectory = rest_to_rest(1.0, 810.0)
+    peak = math.pi / 2 * math.factorial(7) / math.factorial(3) ** 2 / 4**3  # of the degree 7, in 1 s
+    found = search(robot, trajectory).fastest()
+    assert found.factor == pytest.approx(peak / 2.0, abs=1.01e-4)
+    assert found.changes.keys() == {1}
+
+
+def test_too_fast_and_slightly_too_soft_takes_both():
+    robot = changed(BASE, limits=Limits(velocity=(-2.0, 2.0)))
+    found = suggest(robot, rest_to_rest(1.0, 810.0))
+    assert not any(
+        each.possible for each in (found.slow_down, found.stiffness_offset, found.stiffness_profile)
+    )
+    (remedy,) = found.remedies
+    assert remedy.sentence == (
+        "slow down by a factor 1.7181 (1 s -> 1.7181 s), and raise the stiffness of shoulder by 19.56 N m/rad"
+    )
+    assert accepted(remedy.robot, remedy.trajectory)
+    content = remedy.as_json()
+    assert content["slow_down"]["factor"] == 1.7181
+    assert content["stiffness_offset"]["offsets"] == {"base": 0.0, "shoulder": 19.56, "elbow": 0.0}
+    assert "preload" not in content
+    assert content["text"] == remedy.sentence
+
+
+def test_simpler_remedies_come_with_less_than_the_combined_ones():
+    remedies = suggest(vsa_3r(), FAST).remedies
+    assert [remedy.size for remedy in remedies] == sorted(remedy.size for remedy in remedies)
+    alone = [remedy for remedy in remedies if len(remedy.kinds) == 1]
+    assert {kind for remedy in alone for kind in remedy.kinds} == {"slow_down", "stiffness_offset"}
+    for remedy in remedies:
+        assert accepted(remedy.robot, remedy.trajectory)
+
+
+def test_springs_that_are_alike_leave_no_choice_of_preload():
+    assert not search(preloads=True).exchangeable
+
+
+def unlike():
+    """Soft springs, a little different, at the elbow."""
+    springs = [{"type": "cubic", "k": 4, "k_c": 20}, {"type": "cubic", "k": 4.4, "k_c": 20}]
+    robot = vsa_3r().replace("joints.elbow.actuator.spring", springs)
+    lowest = {
+        preload: max(
+            float(block.stiffness_lower[:, 2].max())
+            for block in Run(robot.replace("joints.elbow.actuator.preload", preload), rest_to_rest(4.0))
+        )
+        for preload in ("positive", "negative")
+    }
+    worse = max(lowest, key=lowest.get)
+    trajectory = rest_to_rest(4.0, (850.0, 850.0, sum(lowest.values()) / 2))
+    return robot.replace("joints.elbow.actuator.preload", worse), trajectory
+
+
+def test_other_preload_comes_last_although_it_is_enough():
+    robot, trajectory = unlike()
+    remedies = suggest(robot, trajectory, 1e-4).remedies
+    *others, last = remedies
+    assert all(remedy.preload is None for remedy in others)
+    assert last.kinds == {"preload"}
+    assert last.sentence == f"change the preload of elbow to {robot.joints[2].actuator.opposite_preload}"
+    assert last.size == 0.0
+    assert accepted(last.robot, last.trajectory, 1e-4)

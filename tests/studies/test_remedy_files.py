@@ -1,0 +1,107 @@
+"""The files of remedies: slower formulas and recordings, robots with another preload."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samples.command_line import REPOSITORY
+
+from vsacli import Trajectory, load_robot, load_trajectory
+from vsacli.base.errors import InputError
+from vsacli.studies.remedies import Remedy, write_fixed
+from vsacli.studies.remedies.changed_stiffness import with_raised_stiffness
+from vsacli.studies.remedies.suggestions import OtherPreload
+
+FACTOR = 1.4142
+ROBOT = REPOSITORY / "robots" / "vsa_3r.yaml"
+FORMULAS = ("rest_to_rest", "vsa_3r_via", "vsa_3r_pick_and_place", "vsa_3r_excitation")
+
+
+def shipped(name: str) -> Trajectory:
+    return load_trajectory(REPOSITORY / "trajectories" / f"{name}.yaml", load_robot(ROBOT))
+
+
+def same(one: Trajectory, other: Trajectory, bound: float) -> None:
+    """Equal at every step, within a share of the peak of each variable."""
+    assert one.samples == other.samples
+    before, after = (each.block(0, each.samples).variables() for each in (one, other))
+    assert before.keys() == after.keys()
+    for name, expected in before.items():
+        np.testing.assert_allclose(after[name], expected, rtol=0, atol=bound * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_slower_and_stiffer_formulas_stay_formulas(tmp_path: Path, name: str) -> None:
+    robot, trajectory = load_robot(ROBOT), shipped(name)
+    fixed = with_raised_stiffness(trajectory.stretched(FACTOR), {1: 12.5})
+    written = write_fixed(Remedy(0.0, robot, fixed), tmp_path / "fixed.yaml")
+    assert written == (tmp_path / "fixed.yaml",)
+    # shares of the duration and times are rounded differently; up to four derivatives are taken
+    same(fixed, load_trajectory(written[0], robot), 1e-10)
+    stiffness = fixed.block(0, 1).commanded["stiffness"] - trajectory.block(0, 1).commanded["stiffness"]
+    np.testing.assert_array_equal(stiffness, [[0.0, 12.5, 0.0]])
+
+
+def test_slower_recordings_have_scaled_derivatives_and_wrench(tmp_path: Path) -> None:
+    robot, declared = load_robot(ROBOT), shipped("vsa_3r_pick_and_place")
+    motion = declared.block(0, declared.samples)
+    assert motion.wrench is not None
+    recorded = Trajectory.from_samples(
+        motion.time + 2.0,
+        motion.q,
+        motion.commanded["stiffness"],
+        wrench=motion.wrench.wrench,
+        wrench_frame="base",
+        **{name: motion.of_joints[name] for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")},
+    )
+    written = write_fixed(Remedy(0.0, robot, recorded.stretched(FACTOR)), tmp_path / "fixed.yaml")
+    assert written == (tmp_path / "fixed.yaml", tmp_path / "fixed.csv")
+    again = load_trajectory(written[0], robot)
+    slower = again.block(0, again.samples)
+    assert (slower.time[0], slower.time[-1]) == (2.0, pytest.approx(2.0 + FACTOR * 8.5))
+    for order, name in enumerate(("q", "dq", "ddq", "d3q", "d4q")):
+        expected = motion.of_joints[name] / FACTOR**order
+        np.testing.assert_allclose(slower.of_joints[name], expected, rtol=1e-12)
+    assert slower.wrench is not None
+    np.testing.assert_array_equal(slower.wrench.wrench, recorded.block(0, recorded.samples).wrench.wrench)
+    peak = np.abs(motion.wrench.dwrench).max() / FACTOR
+    # the spline through the samples stands in for the derivatives that were not given
+    np.testing.assert_allclose(slower.wrench.dwrench, motion.wrench.dwrench / FACTOR, atol=1e-3 * peak)
+
+
+def remedy_with(robot_path: Path, joint: str, preload: str) -> Remedy:
+    robot = load_robot(robot_path)
+    changed = robot.replace(f"joints.{joint}.actuator.preload", preload)
+    trajectory = load_trajectory(REPOSITORY / "trajectories" / f"{robot_path.stem}.yaml", robot)
+    return Remedy(0.0, changed, trajectory, preload=OtherPreload({joint: preload}))
+
+
+def test_robot_with_another_preload_keeps_its_comments(tmp_path: Path) -> None:
+    source = REPOSITORY / "robots" / "lwr_7r_vsa.yaml"
+    trajectory = load_trajectory(REPOSITORY / "trajectories" / "lwr_7r.yaml", load_robot(source))
+    robot = load_robot(source).replace("joints.elbow.actuator.preload", "negative")
+    remedy = Remedy(0.0, robot, trajectory, preload=OtherPreload({"elbow": "negative"}))
+    written = write_fixed(remedy, tmp_path / "fixed.yaml")
+    assert written[-1] == tmp_path / "fixed-robot.yaml"
+    again = load_robot(written[-1])
+    assert [joint.actuator for joint in again.joints] == [joint.actuator for joint in robot.joints]
+    before, after = (path.read_text().splitlines() for path in (source, written[-1]))
+    assert [line for line in after if line not in before] == ["      preload: negative"]
+    assert [line for line in before if line not in after] == []
+
+
+def test_files_that_the_robot_names_are_found_from_elsewhere(tmp_path: Path) -> None:
+    remedy = remedy_with(REPOSITORY / "robots" / "measured_1r.yaml", "elbow", "negative")
+    *_, path = write_fixed(remedy, tmp_path / "fixed.yaml")
+    assert load_robot(path).joints[0].actuator.preload == "negative"
+
+
+def test_robot_that_has_no_file_cannot_be_written(tmp_path: Path) -> None:
+    remedy = remedy_with(REPOSITORY / "robots" / "measured_1r.yaml", "elbow", "negative")
+    remedy = dataclasses.replace(remedy, robot=dataclasses.replace(remedy.robot, sources=()))
+    with pytest.raises(InputError, match="measured-1r: was not read from a file that could be changed"):
+        write_fixed(remedy, tmp_path / "fixed.yaml")
+    assert not list(tmp_path.iterdir())
