@@ -117,7 +117,7 @@ def test_nothing_is_written_if_nothing_helps(vsacli, tmp_path, too_soft):
 
 def test_another_remedy_is_written_by_its_number(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fixed", "fixed.yaml", "--remedy", 2)
-    assert (done.code, done.err) == (3, "wrote fixed.yaml: suggestion 2\n")
+    assert (done.code, done.err) == (3, "suggestion 2 goes to fixed.yaml\nwrote fixed.yaml\n")
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml"}
     again = vsacli("check-feasibility", ROBOT, "fixed.yaml")
     assert again.code == 0

@@ -23,9 +23,14 @@ SPRINGS: list[Any] = [
     None,
     [{"type": "cubic", "k": 400, "k_c": 2000}, {"type": "cubic", "k": 380, "k_c": 2600}],  # iterated
     [{"type": "sinh", "k": 80, "a": 5}, {"type": "cubic", "k": 400, "k_c": 2000}],
-    [{"type": "cubic", "k": 500, "k_c": 4000}, {"type": "cubic", "k": 280, "k_c": 900}],
+    [{"type": "cubic", "k": 500, "k_c": 9000}, {"type": "cubic", "k": 280, "k_c": 300}],
+    [{"type": "four_bar", "k": 900, "ratio": 2.2}, {"type": "cubic", "k": 400, "k_c": 2000}],
 ]
 """Springs of the 3R arm: its own, or unlike ones on both sides, for which (14) has to be iterated."""
+
+
+_SLOPES = {"sinh": 5.0, "four_bar": 0.36}
+"""Stiffness at the least load, relative to k."""
 
 
 def random_task(rng: np.random.Generator, folder: Path) -> tuple[Path, Path]:
@@ -100,7 +105,7 @@ def _stiffness(robot: Values, joint: Values) -> float | None:
         return by_robot[robot["name"]]
     spring = joint["actuator"]["spring"]
     sides = spring if isinstance(spring, list) else [spring, spring]
-    return sum(float(side["k"]) * (side["a"] if side["type"] == "sinh" else 1) for side in sides) * 1.05
+    return 1.05 * sum(float(side["k"]) * _SLOPES.get(side["type"], 1.0) for side in sides)
 
 
 def _written(path: Path, content: Values) -> Path:

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 from samples.infeasible_tasks import random_task
 from samples.marks import slow
-from samples.remedies import accepted
+from samples.remedies import accepted, written
 
 from vsacli import load_robot, load_trajectory, suggest
 from vsacli.base.flags import Flag
 from vsacli.dynamics.inverse import compute_block
-from vsacli.studies.remedies import write_fixed
 from vsacli.trajectory.motion import Motion
 
 FACTORS = (1.0, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 8.0)
@@ -66,8 +65,7 @@ def scanned(robots, motion):
 
 def check_written(path, robot_path, remedy, vsacli):
     """The files of a remedy run clean, from rest to rest."""
-    written = write_fixed(remedy, path)
-    robots = [each for each in written if each.name.endswith("-robot.yaml")]
+    robots = [each for each in written(remedy, path) if each.name.endswith("-robot.yaml")]
     assert bool(robots) == (remedy.preload is not None)
     (robot,) = robots or [robot_path]
     done = vsacli("check-feasibility", robot, path, "--suggest")

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
+from samples.remedies import written
 
 from vsacli import Trajectory, load_robot, load_trajectory
 from vsacli.base.errors import InputError
-from vsacli.studies.remedies import Remedy, write_fixed
+from vsacli.studies.remedies import Remedy
 from vsacli.studies.remedies.changed_stiffness import with_raised_stiffness
 from vsacli.studies.remedies.suggestions import OtherPreload
 
@@ -37,10 +38,10 @@ def same(one: Trajectory, other: Trajectory, bound: float) -> None:
 def test_slower_and_stiffer_formulas_stay_formulas(tmp_path: Path, name: str) -> None:
     robot, trajectory = load_robot(ROBOT), shipped(name)
     fixed = with_raised_stiffness(trajectory.stretched(FACTOR), {1: 12.5})
-    written = write_fixed(Remedy(0.0, robot, fixed), tmp_path / "fixed.yaml")
-    assert written == (tmp_path / "fixed.yaml",)
+    paths = written(Remedy(0.0, robot, fixed), tmp_path / "fixed.yaml")
+    assert paths == (tmp_path / "fixed.yaml",)
     # shares of the duration and times are rounded differently; up to four derivatives are taken
-    same(fixed, load_trajectory(written[0], robot), 1e-10)
+    same(fixed, load_trajectory(paths[0], robot), 1e-10)
     stiffness = fixed.block(0, 1).commanded["stiffness"] - trajectory.block(0, 1).commanded["stiffness"]
     np.testing.assert_array_equal(stiffness, [[0.0, 12.5, 0.0]])
 
@@ -57,9 +58,9 @@ def test_slower_recordings_have_scaled_derivatives_and_wrench(tmp_path: Path) ->
         wrench_frame="base",
         **{name: motion.of_joints[name] for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")},
     )
-    written = write_fixed(Remedy(0.0, robot, recorded.stretched(FACTOR)), tmp_path / "fixed.yaml")
-    assert written == (tmp_path / "fixed.yaml", tmp_path / "fixed.csv")
-    again = load_trajectory(written[0], robot)
+    paths = written(Remedy(0.0, robot, recorded.stretched(FACTOR)), tmp_path / "fixed.yaml")
+    assert paths == (tmp_path / "fixed.yaml", tmp_path / "fixed.csv")
+    again = load_trajectory(paths[0], robot)
     slower = again.block(0, again.samples)
     assert (slower.time[0], slower.time[-1]) == (2.0, pytest.approx(2.0 + FACTOR * 8.5))
     for order, name in enumerate(("q", "dq", "ddq", "d3q", "d4q")):
@@ -84,18 +85,18 @@ def test_robot_with_another_preload_keeps_its_comments(tmp_path: Path) -> None:
     trajectory = load_trajectory(REPOSITORY / "trajectories" / "lwr_7r.yaml", load_robot(source))
     robot = load_robot(source).replace("joints.elbow.actuator.preload", "negative")
     remedy = Remedy(0.0, robot, trajectory, preload=OtherPreload({"elbow": "negative"}))
-    written = write_fixed(remedy, tmp_path / "fixed.yaml")
-    assert written[-1] == tmp_path / "fixed-robot.yaml"
-    again = load_robot(written[-1])
+    paths = written(remedy, tmp_path / "fixed.yaml")
+    assert paths[-1] == tmp_path / "fixed-robot.yaml"
+    again = load_robot(paths[-1])
     assert [joint.actuator for joint in again.joints] == [joint.actuator for joint in robot.joints]
-    before, after = (path.read_text().splitlines() for path in (source, written[-1]))
+    before, after = (path.read_text().splitlines() for path in (source, paths[-1]))
     assert [line for line in after if line not in before] == ["      preload: negative"]
     assert [line for line in before if line not in after] == []
 
 
 def test_files_that_the_robot_names_are_found_from_elsewhere(tmp_path: Path) -> None:
     remedy = remedy_with(REPOSITORY / "robots" / "measured_1r.yaml", "elbow", "negative")
-    *_, path = write_fixed(remedy, tmp_path / "fixed.yaml")
+    *_, path = written(remedy, tmp_path / "fixed.yaml")
     assert load_robot(path).joints[0].actuator.preload == "negative"
 
 
@@ -103,5 +104,5 @@ def test_robot_that_has_no_file_cannot_be_written(tmp_path: Path) -> None:
     remedy = remedy_with(REPOSITORY / "robots" / "measured_1r.yaml", "elbow", "negative")
     remedy = dataclasses.replace(remedy, robot=dataclasses.replace(remedy.robot, sources=()))
     with pytest.raises(InputError, match="measured-1r: was not read from a file that could be changed"):
-        write_fixed(remedy, tmp_path / "fixed.yaml")
+        written(remedy, tmp_path / "fixed.yaml")
     assert not list(tmp_path.iterdir())
