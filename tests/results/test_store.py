@@ -48,7 +48,9 @@ def block():
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory, block):
-    return write_result(tmp_path_factory.mktemp("store") / "run.h5", block, command_line="vsacli invdyn é")
+    return write_result(
+        tmp_path_factory.mktemp("store") / "run.h5", block, provenance={"command_line": "vsacli invdyn é"}
+    )
 
 
 def datasets(file):
@@ -81,7 +83,7 @@ def test_root_attributes(path):
     assert attributes["format"] == "vsacli-result/1"
     assert attributes["generated_by"].startswith("vsacli ")
     assert attributes["command_line"] == "vsacli invdyn é"
-    assert set(json.loads(attributes["versions"])) == {"vsacli", "python", "numpy", "h5py"}
+    assert set(json.loads(attributes["versions"])) == {"vsacli", "python", "numpy", "scipy", "h5py"}
     assert (attributes["robot_name"], attributes["trajectory_name"]) == ("two", "swing")
     assert (attributes["verdict"], attributes["complete"]) == ("ok", 1)
     assert attributes["Conventions"] == "CF-1.11"
@@ -274,7 +276,7 @@ def test_files_that_were_read_are_stored_once_each(tmp_path, block):
 
 
 def test_text_that_hdf5_cannot_hold_is_escaped(tmp_path, block):
-    path = write_result(tmp_path / "r.h5", block, command_line="vsacli a\udcff\0b")
+    path = write_result(tmp_path / "r.h5", block, provenance={"command_line": "vsacli a\udcff\0b"})
     with StoredResult.open(path) as result:
         assert result.attributes["command_line"] == r"vsacli a\udcff\0b"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING
 
@@ -112,6 +113,16 @@ class Run:
         for drift in self._drifts:
             drift.add(block)
         return Block(**block.arrays(), motor_energy=self._energy.add(block))
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """What to remember of how it computes, to repeat it: engine and options."""
+        options = {
+            "stop_on_infeasible": self._stop_on_infeasible,
+            "near_singular": self._near_singular,
+            "deflections": "root" if self._deflections is None else "integrate",
+        }
+        return {**self.choice.provenance, "options": json.dumps(options)}
 
     def report(self) -> Report:
         """The verdict on the blocks so far, with the self-check of the whole."""

@@ -1,9 +1,12 @@
-"""`-` on a command line: standard input or output in place of a file."""
+"""What stands in for a file: `-` on a command line for a standard stream, a copy for an input of long ago."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from typing import IO
 
@@ -11,14 +14,32 @@ STANDARD = "-"
 """Stands for the stream; a file of that name is `./-`."""
 
 
+_copies: ContextVar[Mapping[str, str]] = ContextVar("copies", default={})  # noqa: B039 - never changed
+
+
 def place_of(path: str | os.PathLike[str]) -> str:
-    """Where to find what a file holds: at its path, or in a copy of standard input, which is read once.
+    """Where to find what a file holds: at its path, or in a copy.
+
+    Standard input has one, since it can be read only once, and whatever `reading_copies` says.
 
     Raises:
         OSError: standard input is closed, or there is no room for the copy.
     """
     name = os.fspath(path)
+    copies = _copies.get()
+    if name in copies:
+        return copies[name]
     return _standard_input().name if name == STANDARD else name
+
+
+@contextmanager
+def reading_copies(copies: Mapping[str, str]) -> Iterator[None]:
+    """Within this context, files of these paths are read elsewhere."""
+    token = _copies.set(copies)
+    try:
+        yield
+    finally:
+        _copies.reset(token)
 
 
 @cache

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import click
 
 from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import example
+from vsacli.cli.console import Talk, talk_options
 
 
 @click.command(
@@ -25,12 +27,24 @@ from vsacli.cli.command_parts import example
     help="Print one value of the JSON, e.g. reach.found; entries of lists by number, from 0, by name, "
     "or all by *.",
 )
-def info(file: str, robot: str | None, as_json: bool, field: str | None) -> None:
+@click.option(
+    "--extract",
+    "folder",
+    metavar="FOLDER",
+    help="Write the files that a result was computed from there instead.",
+)
+@talk_options
+def info(
+    file: str, robot: str | None, as_json: bool, field: str | None, folder: str | None, talk: Talk
+) -> None:
     """Show what a FILE holds: a robot, a trajectory, a result or a simulation.
 
     Of a robot, Denavit-Hartenberg rows, links, actuators, reach, static load and reachable stiffness; of a
     trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report.
     """
+    if folder is not None:
+        _extract(file, folder, talk)
+        return
     from vsacli.base.json_records import json_value
     from vsacli.files.info import describe_file, render
 
@@ -39,6 +53,18 @@ def info(file: str, robot: str | None, as_json: bool, field: str | None) -> None
         click.echo(_found(description, field))
     else:
         click.echo(json.dumps(json_value(description), indent=1) if as_json else render(description))
+
+
+def _extract(file: str, folder: str, talk: Talk) -> None:
+    from vsacli.base.outputs import Outputs
+    from vsacli.files.repetition import extract
+
+    with Outputs(inputs=[file]) as outputs:
+        for place, content in extract(file).items():
+            target = Path(folder) / place
+            outputs.folder(target.parent)
+            outputs.file(target).write_bytes(content)
+    talk.wrote(outputs)
 
 
 def _found(description: dict[str, Any], field: str) -> str:

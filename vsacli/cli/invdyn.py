@@ -85,8 +85,6 @@ def invdyn(
 
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
-        command_line = shlex.join(["vsacli", *sys.argv[1:]])
-        writer = ResultWriter(file, *inputs, variables, command_line=command_line)
         figures = None if plot_folder is None else _figures(plot_folder, path.stem, variables, outputs)
         run = Run(
             *inputs,
@@ -97,7 +95,8 @@ def invdyn(
             asked=(JUDGED,) if variables is None else variables,
             tell=talk.note,
         )
-        report = compute(run, talk, writer)
+        provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]]), **run.provenance}
+        report = compute(run, talk, ResultWriter(file, *inputs, variables, provenance=provenance))
         if figures is not None:
             draw_staged(file, figures, talk)
     code = show_report(report, as_json)

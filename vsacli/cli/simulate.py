@@ -154,8 +154,8 @@ def simulate(
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
         figures = None if plot_folder is None else _figures(inputs.robot, plot_folder, path.stem, outputs)
-        command_line = shlex.join(["vsacli", *sys.argv[1:]])
-        writer = SimulationWriter(file, *inputs, command_line=command_line)
+        provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]])}
+        writer = SimulationWriter(file, *inputs, provenance=provenance)
         report = _run(simulation, inputs.trajectory, writer, talk)
         if figures is not None:
             draw_staged(file, figures, talk)

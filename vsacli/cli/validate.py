@@ -23,8 +23,13 @@ if TYPE_CHECKING:
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True)
 @click.option("--json", "as_json", is_flag=True, help="Print what is found as a JSON list.")
+@click.option(
+    "--recompute",
+    is_flag=True,
+    help="Also compute results again from the inputs they hold; exit code 3 if one is not equal.",
+)
 @talk_options
-def validate(files: tuple[str, ...], as_json: bool, talk: Talk) -> int:
+def validate(files: tuple[str, ...], as_json: bool, recompute: bool, talk: Talk) -> int:
     """Report everything that is wrong with each FILE.
 
     Robots, trajectories, poles, CSV tables, URDFs and results are told apart by what they hold. A trajectory,
@@ -33,6 +38,8 @@ def validate(files: tuple[str, ...], as_json: bool, talk: Talk) -> int:
     """
     from vsacli.files.validation import check_files
 
+    if recompute and as_json:
+        raise click.UsageError("--recompute has no JSON form")
     checked = check_files(list(dict.fromkeys(files)))
     if as_json:
         messages = [message.as_json() for file in checked for message in file.messages]
@@ -40,7 +47,22 @@ def validate(files: tuple[str, ...], as_json: bool, talk: Talk) -> int:
     else:
         for line in _lines(checked, talk):
             click.echo(line)
-    return Exit.OK if all(file.passed for file in checked) else Exit.USAGE
+    if not all(file.passed for file in checked):
+        return Exit.USAGE
+    equal = [_recomputed(file.path, talk) for file in checked if recompute and file.path.endswith(".h5")]
+    return Exit.OK if all(equal) else Exit.VERDICT
+
+
+def _recomputed(path: str, talk: Talk) -> bool:
+    """Compute a result again and say how it compares."""
+    from vsacli.files.repetition import repeat
+
+    differences = repeat(path, talk.note)
+    if not differences:
+        click.echo(f"{path}: computed again, equal bit for bit")
+    for difference in differences:
+        click.echo(f"{path}: computed again, {difference}")
+    return not differences
 
 
 def _lines(checked: Sequence[Checked], talk: Talk) -> Iterator[str]:

@@ -30,10 +30,20 @@ class Choice(NamedTuple):
     Attributes:
         engine: the engine chosen.
         reason: what computes, and why; a clause.
+        compiler: what compiled the code, empty if none did.
+        threads: of compiled code.
     """
 
     engine: Engine
     reason: str
+    compiler: str = ""
+    threads: int = 1
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """What to remember of it: `engine` as it may be asked for, `compiler`, `threads`."""
+        name = "c" if self.compiler else "numpy"
+        return {"engine": name, "compiler": self.compiler, "threads": str(self.threads)}
 
 
 def choose(
@@ -63,7 +73,8 @@ def choose(
 
     threads = threads or _processors()
     try:
-        engine = CompiledEngine(system_compiler(), threads, tell)
+        compiler = system_compiler()
+        engine = CompiledEngine(compiler, threads, tell)
         loaded = engine.prepare(kernel, lambda operations: name == "c" or _repays(operations, samples))
     except CompilerError as error:
         if name == "c":
@@ -76,7 +87,8 @@ def choose(
     if loaded is None:
         return Choice(_numpy(samples), f"NumPy computes: {samples} samples would not repay compiling")
     when = "now" if loaded.compiled else "before"
-    return Choice(engine, f"C code computes, compiled {when}, in {_counted(threads)}")
+    reason = f"C code computes, compiled {when}, in {_counted(threads)}"
+    return Choice(engine, reason, compiler.name, threads)
 
 
 def _repays(operations: int, samples: int) -> bool:

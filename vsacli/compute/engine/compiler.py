@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import platform
+import re
 import shlex
 import subprocess
 from collections.abc import Sequence
@@ -54,6 +55,12 @@ class Compiler:
 
     command: tuple[str, ...]
     identity: str
+
+    @property
+    def name(self) -> str:
+        """Command and version, for the record."""
+        found = re.search(r'^#define __VERSION__ "(.*)"$', self.identity, re.MULTILINE)
+        return " ".join([*self.command, *([found[1]] if found else [])])
 
     def build(self, source: Path, library: Path) -> None:
         """Compile a source file to a shared library.

@@ -109,6 +109,9 @@ def _result(result: Description) -> Iterator[str]:
     versions = ", ".join(f"{name} {version}" for name, version in source["versions"].items())
     yield f"created {source['created']} by {source['generated_by']} ({versions})"
     yield f"command line: {source['command_line']}"
+    if "engine" in source:
+        compiled = f", compiled by {source['compiler']}, threads: {source['threads']}"
+        yield f"engine: {source['engine']}{compiled if source['compiler'] else ''}"
     yield from (f"input {each['path']}, SHA-256 {each['sha256']}" for each in source["inputs"])
     rows = [("joint", "type", "actuator")]
     rows += [(joint["name"], joint["type"], joint["actuator"]) for joint in result["joints"]]

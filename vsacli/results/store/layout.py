@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 import math
 import platform
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -19,7 +22,7 @@ from vsacli.base.version import __version__
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import declared
 from vsacli.documents.resolved_fields import ResolvedField
-from vsacli.documents.source import Source
+from vsacli.results.store.inputs import write_sources
 from vsacli.results.store.schema import (
     TEXT,
     chunk_rows,
@@ -49,14 +52,22 @@ def create_layout(
     robot: Robot,
     trajectory: Trajectory,
     variables: tuple[Variable, ...],
-    command_line: str,
+    provenance: Mapping[str, str],
 ) -> dict[str, h5py.Dataset]:
     """Write everything that is known before the first sample; the time axis has its planned length.
+
+    Args:
+        file: without content.
+        format_name: of the attribute `format`.
+        robot: the robot.
+        trajectory: the trajectory.
+        variables: those that are stored.
+        provenance: what else is known of how they are computed; root attributes.
 
     Returns:
         The datasets that take samples, by the names of their variables, `time` first.
     """
-    file.attrs.update({"format": format_name, **_root_attributes(robot, trajectory, command_line)})
+    file.attrs.update({"format": format_name, **_root_attributes(robot, trajectory, provenance)})
     scales = _create_coordinates(file, robot, trajectory.samples)
     if trajectory.wrench is not None and any("wrench_axis" in variable.dims for variable in variables):
         scales["wrench_axis"] = _create_wrench_axis(file, trajectory.wrench.frame)
@@ -65,27 +76,36 @@ def create_layout(
         dataset = stored[variable.name] = _create_variable(file, variable, robot, trajectory.samples)
         _attach_scales(dataset, [scales[dim] for dim in ("time", *variable.dims)])
     inputs = file.create_group("inputs", track_order=True)
-    _write_sources(inputs, robot.sources + trajectory.sources)
+    write_sources(inputs, {"robot": robot.sources, "trajectory": trajectory.sources})
     _write_robot(inputs, robot, scales)
     return stored
 
 
-def _root_attributes(robot: Robot, trajectory: Trajectory, command_line: str) -> dict[str, str]:
+def _root_attributes(robot: Robot, trajectory: Trajectory, provenance: Mapping[str, str]) -> dict[str, str]:
     versions = {
         "vsacli": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
+        "scipy": _scipy_version(),
         "h5py": h5py.__version__,
     }
     return {
         "generated_by": f"vsacli {__version__}",
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command_line": storable(command_line),
+        **{name: storable(text) for name, text in provenance.items()},
         "versions": json.dumps(versions),
         "robot_name": storable(robot.name),
         "trajectory_name": storable(trajectory.name),
         "Conventions": "CF-1.11",
     }
+
+
+def _scipy_version() -> str:
+    """As its file says; to import it, or the package that finds versions, takes longer than a short run."""
+    spec = find_spec("scipy")
+    text = Path(spec.origin or "").with_name("version.py").read_text(encoding="utf-8") if spec else ""
+    found = re.search(r'^version\s*=\s*"([^"]+)"', text, re.MULTILINE)
+    return found[1] if found else "unknown"
 
 
 def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str, h5py.Dataset]:
@@ -129,15 +149,6 @@ def _create_variable(file: h5py.File, variable: Variable, robot: Robot, samples:
     )
     dataset.attrs.update(variable_attributes(variable, robot.joint_types))
     return dataset
-
-
-def _write_sources(inputs: h5py.Group, sources: tuple[Source, ...]) -> None:
-    """A subgroup `file_1`, `file_2`, ... for each file that was read, once even if it served twice."""
-    for number, source in enumerate(dict.fromkeys(sources), start=1):
-        group = inputs.create_group(f"file_{number}", track_order=True)
-        group.attrs.update({"path": storable(source.path), "sha256": source.sha256})
-        if source.text is not None:
-            group.create_dataset("text", data=storable(source.text), dtype=TEXT)
 
 
 def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5py.Dataset]) -> None:

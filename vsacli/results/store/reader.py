@@ -17,9 +17,14 @@ from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line, shown
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import bounded, open_checked, own_dataset, reporting_damage
+from vsacli.results.store.inputs import StoredInput, read_sources
 from vsacli.results.store.schema import FORMAT, row_shape, storage_type
 
 GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
+
+
+COMPUTED_BY = ("engine", "compiler", "threads")
+"""Attributes that older files have not."""
 
 
 class StoredResult:
@@ -129,13 +134,23 @@ class StoredResult:
             InputError: the file is damaged.
         """
         with reporting_damage(self.path):
-            groups = [group for name, group in self._file["inputs"].items() if name.startswith("file_")]
             provenance = {
                 **{name: str(self.attributes[name]) for name in ("created", "generated_by", "command_line")},
+                **{name: str(self.attributes[name]) for name in COMPUTED_BY if name in self.attributes},
                 "versions": json.loads(self.attributes["versions"]),
-                "inputs": [{name: str(group.attrs[name]) for name in ("path", "sha256")} for group in groups],
+                "options": json.loads(self.attributes.get("options", "{}")),
+                "inputs": [{"path": path, "sha256": sha} for path, sha, _, _ in self.inputs()],
             }
         return cast("dict[str, Any]", shown(provenance))
+
+    def inputs(self) -> list[StoredInput]:
+        """The files that were read, with what they held, as far as it was stored.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        with reporting_damage(self.path):
+            return list(read_sources(self._file))
 
     def close(self) -> None:
         """Close the file."""

@@ -7,7 +7,7 @@ import io
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any, Protocol, Self
 
 import h5py
@@ -49,7 +49,7 @@ class ResultWriter:
         robot: the robot of the run, stored as resolved arrays.
         trajectory: gives the name, the number of samples, and the files that were read.
         variables: names of the variables to store, all there are by default; the coordinates always are.
-        command_line: what the user typed, for the record.
+        provenance: how it is computed, for the record: attributes of the file, such as `command_line`.
 
     Raises:
         InputError: a name in `variables` is none, or of a wrench the trajectory does not have.
@@ -64,13 +64,13 @@ class ResultWriter:
         trajectory: Trajectory,
         variables: Iterable[str] | None = None,
         *,
-        command_line: str = "",
+        provenance: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self._staged = file
         self._robot = robot
         self._trajectory = trajectory
         self._variables = self._selected(variables, trajectory)
-        self._command_line = command_line
+        self._provenance = {"command_line": "", **provenance}
         self._written = 0
 
     def __enter__(self) -> Self:
@@ -151,7 +151,7 @@ class ResultWriter:
             )
             self._file = self._cleanup.enter_context(file)
             self._stored = create_layout(
-                file, self._format, self._robot, self._trajectory, self._variables, self._command_line
+                file, self._format, self._robot, self._trajectory, self._variables, self._provenance
             )
 
     def _append(self, block: Samples) -> None:

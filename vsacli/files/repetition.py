@@ -1,0 +1,148 @@
+"""A result computed once more from what it holds, and compared with what it says."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vsacli.analysis.run import Run
+from vsacli.base.arrays import AnyArray
+from vsacli.base.errors import InputError
+from vsacli.base.streams import reading_copies
+from vsacli.base.variables import Block
+from vsacli.compute.engine import Tell, unheard
+from vsacli.results.store.inputs import StoredInput
+from vsacli.results.store.reader import StoredResult
+from vsacli.robot.file import load_robot
+from vsacli.trajectory.file import load_trajectory
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far a variable of a result is from what is computed now.
+
+    Attributes:
+        variable: its name.
+        values: how many differ.
+        largest: largest difference over the variable's peak; NaN if one of two values is none.
+    """
+
+    variable: str
+    values: int
+    largest: float
+
+    def __str__(self) -> str:
+        share = f"by at most {self.largest:.2g} of its peak"
+        if np.isnan(self.largest):
+            share = "where only one of both is a number"
+        return f"{self.variable} differs in {self.values} values, {share}"
+
+
+def repeat(path: str | Path, tell: Tell = unheard) -> list[Difference]:
+    """Compute a result again, with its own inputs and options, and compare all its variables.
+
+    Args:
+        path: the result.
+        tell: as of `Run`.
+
+    Returns:
+        The variables that are not equal bit for bit.
+
+    Raises:
+        InputError: the result does not hold its inputs, they cannot be used, or its engine is not to be had.
+    """
+    with StoredResult.open(path) as result, _reading(result.inputs(), path) as (robot_path, trajectory_path):
+        robot = load_robot(robot_path)
+        options: dict[str, Any] = result.provenance()["options"]
+        engine = str(result.attributes.get("engine", "numpy"))
+        run = Run(robot, load_trajectory(trajectory_path, robot), engine=engine, tell=tell, **options)
+        comparisons = [_Comparison(result, name) for name in result.variables]
+        for block in run:
+            for comparison in comparisons:
+                comparison.add(block)
+        return [comparison.difference for comparison in comparisons if comparison.values]
+
+
+@contextmanager
+def _reading(inputs: Sequence[StoredInput], path: str | Path) -> Iterator[tuple[str, str]]:
+    """Read files as they were then; the paths of robot and trajectory."""
+    roles = {each.role: each.path for each in inputs}
+    if not {"robot", "trajectory"} <= roles.keys():
+        raise InputError.one("does not say from which files it was computed, so it cannot be repeated", path)
+    with ExitStack() as stack:
+        place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="vsacli-")))
+        copies = {}
+        for number, each in enumerate(inputs):
+            if each.content is None:
+                raise InputError.one(f"does not hold {each.path}, so it cannot be repeated", path)
+            copies[each.path] = str(place / str(number))
+            Path(copies[each.path]).write_bytes(each.content)
+        stack.enter_context(reading_copies(copies))
+        yield roles["robot"], roles["trajectory"]
+
+
+class _Comparison:
+    """Of a stored variable with the blocks of a run, in order."""
+
+    def __init__(self, result: StoredResult, variable: str) -> None:
+        self._result, self._variable = result, variable
+        self._at = 0
+        self._peak, self._largest = 0.0, 0.0
+        self.values = 0
+
+    def add(self, block: Block) -> None:
+        """Compare the next steps."""
+        computed = np.asarray(getattr(block, self._variable))
+        stored = self._result.read(self._variable, self._at, self._at + len(computed))
+        self._at += len(computed)
+        if stored.shape != computed.shape:
+            raise InputError.one(f"holds {self._variable} for other steps", self._result.path)
+        differing = ~_equal(stored, computed)
+        self.values += int(np.count_nonzero(differing))
+        self._peak = float(np.fmax(self._peak, np.fmax.reduce(np.abs(stored), axis=None, initial=0.0)))
+        distances = np.abs(stored[differing].astype(float) - computed[differing])
+        self._largest = float(np.maximum(self._largest, np.max(distances, initial=0.0)))
+
+    @property
+    def difference(self) -> Difference:
+        """What there is between them."""
+        return Difference(self._variable, self.values, self._largest / (self._peak or 1.0))
+
+
+def _equal(a: AnyArray, b: AnyArray) -> AnyArray:
+    both: AnyArray = (a == b) | ((a != a) & (b != b))  # NaN is what both have where nothing is defined
+    return both
+
+
+def extract(path: str | Path) -> dict[Path, bytes]:
+    """The inputs of a result by where they stood, relative to what they have in common.
+
+    Raises:
+        InputError: it is no result, or does not hold one of them.
+    """
+    with StoredResult.open(path) as result:
+        inputs = result.inputs()
+    missing = [each.path for each in inputs if each.content is None]
+    if missing or not inputs:
+        what = ", ".join(missing) if missing else "any input"
+        raise InputError.one(f"does not hold {what}", path)
+    places = _places([each.path for each in inputs])
+    return {
+        place: each.content for place, each in zip(places, inputs, strict=True) if each.content is not None
+    }
+
+
+def _places(paths: Sequence[str]) -> list[Path]:
+    """Files as they stand to each other, wherever the run was; none is above the folder they go to."""
+    named = ["stdin" if path == "-" else path for path in paths]
+    deep = "/" + "d/" * sum(path.count("..") for path in named)
+    whole = [os.path.normpath(os.path.join(deep, path)) for path in named]
+    common = os.path.commonpath([os.path.dirname(path) for path in whole])
+    return [Path(os.path.relpath(path, common)) for path in whole]

@@ -1,0 +1,108 @@
+"""The files that a run has read, whole inside its result: so it can be repeated, and they be had back."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import h5py
+import numpy as np
+
+from vsacli.base.streams import place_of
+from vsacli.documents.source import Source
+from vsacli.results.store.damage import own_dataset
+from vsacli.results.store.schema import TEXT, storable
+
+LARGEST_STORED = 256 * 2**20
+"""Bytes up to which a file is stored; a recording of a million rows and fifteen columns has 200 MB."""
+
+CHUNK = 2**20
+COMPRESSION = 1
+"""Of gzip, the quickest."""
+
+
+class StoredInput(NamedTuple):
+    """A file that a run has read.
+
+    Attributes:
+        path: as the command was given it.
+        sha256: of its content, in hex.
+        role: "robot" or "trajectory" of the file that describes one, else empty.
+        content: what it held; None if it was too large to be stored.
+    """
+
+    path: str
+    sha256: str
+    role: str
+    content: bytes | None
+
+
+def write_sources(inputs: h5py.Group, sources: Mapping[str, tuple[Source, ...]]) -> None:
+    """A subgroup `file_1`, `file_2`, ... for each file that was read, once even if it served twice.
+
+    Args:
+        inputs: the group.
+        sources: by what they describe; the first file of each leads to the others.
+    """
+    roles = {files[0]: role for role, files in sources.items() if files}
+    every = dict.fromkeys(source for files in sources.values() for source in files)
+    for number, source in enumerate(every, start=1):
+        group = inputs.create_group(f"file_{number}", track_order=True)
+        group.attrs.update({"path": storable(source.path), "sha256": source.sha256})
+        if source in roles:
+            group.attrs["role"] = roles[source]
+        if source.text is not None:
+            group.create_dataset("text", data=storable(source.text), dtype=TEXT)
+        else:
+            _write_content(group, source)
+
+
+def _write_content(group: h5py.Group, source: Source) -> None:
+    """The bytes of a large file, unless it is another by now."""
+    try:
+        with open(place_of(source.path), "rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > LARGEST_STORED or hashlib.file_digest(file, "sha256").hexdigest() != source.sha256:
+                return
+            file.seek(0)
+            stored = group.create_dataset(
+                "content",
+                (size,),
+                np.uint8,
+                chunks=(CHUNK,),
+                compression="gzip",
+                compression_opts=COMPRESSION,
+            )
+            for start in range(0, size, CHUNK):
+                piece = np.frombuffer(file.read(CHUNK), np.uint8)
+                stored[start : start + len(piece)] = piece
+    except OSError:
+        return  # it has gone, and the run with what was read of it goes on
+
+
+def read_sources(file: h5py.File) -> Iterator[StoredInput]:
+    """The files, in the order in which they were written."""
+    number = 1
+    while (name := f"inputs/file_{number}") in file:
+        attributes = {key: str(value) for key, value in file[name].attrs.items()}
+        yield StoredInput(
+            path=attributes["path"],
+            sha256=attributes["sha256"],
+            role=attributes.get("role", ""),
+            content=_content(file, name),
+        )
+        number += 1
+
+
+def _content(file: h5py.File, name: str) -> bytes | None:
+    if f"{name}/text" in file:
+        text: str = own_dataset(file, f"{name}/text").asstr()[()]
+        return text.encode()
+    if f"{name}/content" in file:
+        stored = own_dataset(file, f"{name}/content")
+        if stored.nbytes > LARGEST_STORED:
+            raise ValueError(f"{name} claims {stored.nbytes:,} bytes, of at most {LARGEST_STORED:,}")
+        return bytes(stored[...])
+    return None
