@@ -9,7 +9,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
-from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, Fit, fit_samples
+from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, Fit, fit_samples
 
 FREQUENCIES = np.array([0.3, 0.7, 1.1, 1.9])[:, None]
 AMPLITUDES = np.array([0.8, 0.4, 0.2, 0.1])
@@ -68,25 +68,45 @@ def percent(share: float) -> str:
 
 
 def draw(path: Path) -> None:
-    """The fourth derivative of the noisy record at 1 kHz, fitted and interpolated, and their errors."""
+    """The fourth derivative of a record with filtered noise: truth, interpolation, fit and band."""
     from matplotlib.figure import Figure
 
-    smooth, exact = fit(1000, 1e-5, LEAST_SQUARES), fit(1000, 1e-5, INTERPOLATE)
-    time = np.linspace(*SHOWN_SPAN, 3001)
-    true = motion(time, 4)
+    time, values = filtered_record()
+    smooth, exact = (
+        fit_samples(time, values, POSITION.spline_degree, 4, each) for each in (SMOOTH, INTERPOLATE)
+    )
+    shown = np.linspace(*SHOWN_SPAN, 3001)
+    true, found = motion(shown, 4), smooth.at(shown, 5)[4, 0]
+    deviation = np.sqrt(smooth.covariance(shown)[0, 4, 4])
     size = np.sqrt(np.mean(true**2))
     figure = Figure(figsize=(7.5, 5.2), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)
-    above.plot(time, true, color="0.75", linewidth=5, label="truth")
-    above.plot(time, smooth.at(time, 5)[4, 0], color=BLUE, linewidth=1.4, label="least squares")
+    above.plot(shown, true, color="0.75", linewidth=5, label="truth")
+    above.plot(
+        shown,
+        exact.at(shown, 5)[4, 0],
+        color=ORANGE,
+        linewidth=0.4,
+        alpha=0.35,
+        zorder=1,
+        label="interpolation",
+    )
+    above.plot(shown, found, color=BLUE, linewidth=1.4, label="smoothing spline")
     above.set(ylabel="d4q in rad/s$^4$", ylim=(1.6 * true.min(), 2.1 * true.max()))
-    above.legend(frameon=False, ncols=2, loc="upper right")
-    for spline, colour, label in ((exact, ORANGE, "interpolation"), (smooth, BLUE, "least squares")):
-        off = np.abs(spline.at(time, 5)[4, 0] - true) / size
-        below.semilogy(time, off, color=colour, linewidth=0.8, label=label)
-    below.axhline(0.02, color="0.3", linewidth=0.8, linestyle="--")
-    below.annotate("2 %", (SHOWN_SPAN[1], 0.02), xytext=(-4, 3), textcoords="offset points", ha="right")
-    below.set(xlabel="time in s", ylabel="error of d4q over its rms", ylim=(1e-6, 1e9), xlim=SHOWN_SPAN)
+    above.legend(framealpha=1, ncols=3, loc="upper right")
+    below.fill_between(
+        shown,
+        -200 * deviation / size,
+        200 * deviation / size,
+        color=BLUE,
+        alpha=0.2,
+        linewidth=0,
+        label="two deviations",
+    )
+    below.plot(
+        shown, 100 * (found - true) / size, color=BLUE, linewidth=1.2, label="error of the smoothing spline"
+    )
+    below.set(xlabel="time in s", ylabel="error of d4q in % of its rms", ylim=(-25, 25), xlim=SHOWN_SPAN)
     below.legend(frameon=False, ncols=2, loc="upper right")
     for axes in (above, below):
         axes.axvspan(0, smooth.doubtful[0], color="0.93", zorder=0)
@@ -94,3 +114,12 @@ def draw(path: Path) -> None:
     corner = {"xycoords": ("data", "axes fraction"), "xytext": (4, -12), "textcoords": "offset points"}
     above.annotate("doubtful", (0, 1), **corner)
     figure.savefig(path, dpi=150)
+
+
+def filtered_record() -> tuple[FloatArray, FloatArray]:
+    """Times and values (1, samples) of the motion from a 12-bit encoder, low-pass filtered at 50 Hz."""
+    from scipy.signal import butter, filtfilt
+
+    time = np.arange(round(DURATION * 1000) + 1) / 1000
+    step = 2 * np.pi / 2**12
+    return time, filtfilt(*butter(2, 2 * 50 / 1000), step * np.round(motion(time, 0) / step))[None]
