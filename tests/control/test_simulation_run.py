@@ -21,6 +21,11 @@ from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.units import time_text
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, Tolerances, perturbed, simulate
+from vsacli.control.simulation.boundaries import Singularity
+from vsacli.control.simulation.closed_loop import ClosedLoop
+from vsacli.control.simulation.controllers import Feedforward
+from vsacli.control.simulation.reference import Reference
+from vsacli.control.simulation.simulate import start_state
 from vsacli.control.simulation.state_trajectory import RateFilter
 from vsacli.control.simulation.state_vector import Phase
 from vsacli.trajectory.times import RecordedTimes
@@ -89,6 +94,17 @@ def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
     assert not past.flags[:-1].any()
     # at 1e-4 of the first determinant, to what the event's root finder leaves
     assert past.det_A_actual[-1, 1] / past.det_A_actual[0, 1] == pytest.approx(1e-4, rel=1e-3)
+
+
+def test_a_boundary_lies_where_its_distance_is_no_number_any_more():
+    """The root finder of an event needs numbers; a law may have none beyond its end."""
+    trajectory, robot = short_motion(3), vsa_3r()
+    reference = Reference(trajectory)
+    loop = ClosedLoop(robot, Feedforward(robot, trajectory), reference)
+    start = loop.packing.pack(*loop.plant.unpacked(start_state(robot, trajectory, InitialError())))
+    boundary = Singularity(loop, start)
+    assert boundary(0.0, start) == pytest.approx(1 - 1e-4, rel=1e-12)
+    assert boundary(0.0, np.where(np.arange(len(start)) == 7, np.nan, start)) == -1
 
 
 def test_feedforward_ends_where_there_are_no_torques():

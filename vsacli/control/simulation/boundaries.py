@@ -36,8 +36,8 @@ class Boundary(ABC):
         """What must stay positive, one number for each of `joints`, at positions of joints and motors."""
 
     def __call__(self, _time: float, vector: FloatArray) -> float:
-        """The smallest distance."""
-        return float(np.min(self._distances(vector), initial=1.0))
+        """The smallest distance; one that is not defined any more lies beyond."""
+        return float(np.min(np.nan_to_num(self._distances(vector), nan=-1.0), initial=1.0))
 
     def ending(self, time: float, vector: FloatArray) -> Ending:
         """The end of a run here."""

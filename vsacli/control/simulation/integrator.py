@@ -28,6 +28,9 @@ it took a tenth of their evaluations, since these are not stable for oscillation
 SMALLEST_RTOL = 1e-13
 """Below, rounding alone exceeds the bound."""
 
+LARGEST_TOLERANCE = 1e-3
+"""With it, the example of the paper ends 4e-4 rad off; with 0.1 it was off by 0.3 rad on its way."""
+
 
 @dataclass(frozen=True)
 class Tolerances:
@@ -37,10 +40,11 @@ class Tolerances:
     atol: float = 1e-10
 
     def __post_init__(self) -> None:
-        if not (SMALLEST_RTOL <= self.rtol < 1 and 0 < self.atol < 1):
+        if not (SMALLEST_RTOL <= self.rtol <= LARGEST_TOLERANCE and 0 < self.atol <= LARGEST_TOLERANCE):
             raise InputError.one(
-                f"the tolerances must be positive and below 1, the relative one at least {SMALLEST_RTOL:g}, "
-                f"not {self.rtol:g} (relative) and {self.atol:g} (absolute)"
+                f"the tolerances of the integration must be positive and at most {LARGEST_TOLERANCE:g}, the "
+                f"relative one at least {SMALLEST_RTOL:g}, not {self.rtol:g} (relative) and {self.atol:g} "
+                "(absolute)"
             )
 
 
