@@ -21,6 +21,8 @@ from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, simulate
 from vsacli.control.simulation.budget import Budget
 from vsacli.control.simulation.stiff import jacobian
+from vsacli.trajectory.times import RecordedTimes
+from vsacli.trajectory.trajectory import Trajectory
 
 MOTOR_INERTIA = 2.0
 GAINS = Gains.from_poles([-20] * 4, [-20] * 2)
@@ -127,7 +129,7 @@ def test_what_was_integrated_when_the_budget_is_used_up_is_kept():
     assert not report.complete
     assert report.ending == (
         "the budget of 300 evaluations of the equations of motion is used up; "
-        f"ended at t = {cut.history.time[-1]:.6g} s"
+        f"ended at t = {cut.history.time[-1]:.6f} s"
     )
     assert 300 <= report.evaluations < 600  # a step of either method, with a Jacobian of 25 columns
     kept = len(cut.history.time) - 1
@@ -174,6 +176,17 @@ def test_a_jacobian_is_finite_also_where_a_difference_steps_over_an_end():
     at_the_end = jacobian(function, 0.0, np.array([1.0, -0.7]))
     assert np.isfinite(at_the_end).all()
     assert at_the_end[:, 1] == pytest.approx(matrix[:, 1], abs=0.1)
+
+
+def test_the_time_from_which_a_method_was_used_is_a_stamp(monkeypatch):
+    quick = short_motion(3, duration=0.3)
+    stamps = RecordedTimes(1e6 + quick.times.block(0, quick.samples))
+    go_on_implicitly(monkeypatch, 0.1)
+    explicit, implicit = simulate(
+        vsa_3r(), Trajectory(stamps, quick.position, quick.commanded, name="late")
+    ).report.methods
+    assert explicit.start == 1e6
+    assert 1e6 + 0.1 < implicit.start < 1e6 + 0.2
 
 
 def test_a_run_with_the_full_state_that_ends_early_is_told():

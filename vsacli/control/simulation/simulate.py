@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -170,7 +170,7 @@ def simulate(
         ending=None if integrated.ending is None else integrated.ending.described(robot.joint_names, first),
         evaluations=integrated.effort.evaluations,
         budget=integrated.effort.budget,
-        methods=integrated.effort.methods,
+        methods=tuple(replace(method, start=first + method.start) for method in integrated.effort.methods),
         warnings=(
             *(*robot.warnings, *trajectory.warnings),
             *([_AMPLIFIED] if exact and verdict == "strayed" else []),

@@ -14,7 +14,7 @@ from vsacli.analysis.report_text import WIDTH, energy_lines, warnings_and_notes
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import aligned
-from vsacli.base.units import POSITION
+from vsacli.base.units import POSITION, time_text
 from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
 from vsacli.control.simulation.history import History
 from vsacli.control.simulation.integrator import Method
@@ -143,7 +143,8 @@ class SimulationReport(Stored):
     def _headline(self) -> str:
         left = f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"
         if (error := self.largest_error) is not None:
-            left += f", q off by up to {error.value:.2g} {error.unit} ({error.joint}, t = {error.time:.3f} s)"
+            where = f"{error.joint}, t = {time_text(error.time)}"
+            left += f", q off by up to {error.value:.2g} {error.unit} ({where})"
         verdict = self.verdict.upper().replace("_", " ")
         return f"{left:<{WIDTH - len(verdict) - 1}} {verdict}"
 
@@ -160,5 +161,5 @@ class SimulationReport(Stored):
         """How it was integrated."""
         if self.methods:
             first, *others = self.methods
-            changes = "".join(f", from t = {method.start:.6g} s on {method.name}" for method in others)
+            changes = "".join(f", from t = {time_text(method.start)} on {method.name}" for method in others)
             yield f"integrated by {first.name}{changes}: {self.evaluations} evaluations, budget {self.budget}"
