@@ -39,6 +39,7 @@ def search(robot=None, trajectory=FAST, **options):
     return CombinedSearch(Task(Acceptance(robot or vsa_3r(), 0.01), trajectory, cost), **options)
 
 
+@pytest.mark.slow
 def test_smallest_combination_is_that_of_a_dense_scan():
     """At each factor the closed bound says what each joint needs."""
     found = search().smallest()
@@ -95,6 +96,7 @@ def test_too_fast_and_slightly_too_soft_takes_both():
     assert content["text"] == remedy.sentence
 
 
+@pytest.mark.slow
 def test_simpler_remedies_come_with_less_than_the_combined_ones():
     remedies = suggest(vsa_3r(), FAST).remedies
     assert [remedy.size for remedy in remedies] == sorted(remedy.size for remedy in remedies)

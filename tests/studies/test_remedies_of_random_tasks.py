@@ -24,7 +24,9 @@ MARGIN = 0.01
 SUPERFLUOUS = 1.06
 """A remedy that is not listed is less than 5 % smaller than one that is; 1 % is a stride of the search."""
 
-SEEDS = (2, 6, 13, 27)
+QUICK = (0, 9, 41, 50)
+SLOW = (5, 11, 22, 25, 29, 30, 33, 34, 37, 38, 49, 57, 60, 62)
+"""Of a hundred tasks two thirds are infeasible; these have every robot, kind of limit and outcome among them."""
 
 
 def fine_joints(robot, motion):
@@ -74,7 +76,7 @@ def check_written(path, robot_path, remedy, vsacli):
     assert "motors move" not in done.out
 
 
-@pytest.mark.parametrize("seed", [*SEEDS, *map(slow, (0, 9, 11, 14, 15, 19, 23, 24, 29, 30, 31))])
+@pytest.mark.parametrize("seed", [*QUICK, *map(slow, SLOW)])
 def test_every_remedy_works_and_none_is_missed(tmp_path, vsacli, seed):
     robot_path, task_path = random_task(np.random.default_rng(seed), tmp_path)
     robot = load_robot(robot_path)

@@ -83,7 +83,7 @@ class Combination:
 
     @property
     def constants(self) -> dict[int, float]:
-        """The changes of stiffness that are constant, by index of the joint."""
+        """The changes of stiffness by index of the joint, if they are constant."""
         return {index: float(change[0]) for index, change in self.changes.items()}
 
     def robot(self, robot: Robot) -> Robot:
