@@ -26,7 +26,7 @@ SUPERFLUOUS = 1.06
 
 QUICK = (0, 9, 41, 50)
 SLOW = (5, 11, 22, 25, 29, 30, 33, 34, 37, 38, 49, 57, 60, 62)
-"""Of a hundred tasks two thirds are infeasible; these have every robot, kind of limit and outcome among them."""
+"""Two thirds of the tasks are infeasible; these have every robot, kind of limit and outcome among them."""
 
 
 def fine_joints(robot, motion):
