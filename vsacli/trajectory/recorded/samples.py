@@ -12,8 +12,8 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import Fit, fit_samples, mismatches
+from vsacli.trajectory.fits.bounds import Unresolved, unresolved, vibrations
 from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences
-from vsacli.trajectory.fits.unresolved import Unresolved, unresolved
 from vsacli.trajectory.times import stretch
 
 
@@ -216,13 +216,14 @@ class SampledProfile:
     def covariance(self, time: FloatArray) -> FloatArray:
         """Of value and derivatives at any times of the span, (components, orders, orders, samples).
 
-        Zero for what is given; NaN for components of which nothing can be said, as those with a vibration
-        that may be motion. Of those that are not `stated` it is a bound by experience.
+        Zero for what is given; NaN for components of which nothing can be said, as where the spline follows a
+        vibration that may be noise. Of those that are not `stated` it is no more than a bound.
         """
         found = self.fit.covariance(time)
         for each in self._unresolved:
             found[each.members] = each.covariance(time)
-        found[self._vibrating] = np.nan
+        for member, covariance in vibrations(self.fit, self.signal.orders):
+            found[member] += covariance[..., None]
         given = [name not in self.estimated for name in self.signal.names]
         found[:, given] = 0
         found[:, :, given] = 0
@@ -236,12 +237,6 @@ class SampledProfile:
             known = part.smoothing
             stated[part.members] = known is None or (known.resolved and not known.lines.others)
         return stated
-
-    @property
-    def _vibrating(self) -> list[int]:
-        """Components with lines in the spectrum that may be noise or motion."""
-        parts = [part for part in self.fit.parts if part.smoothing and part.smoothing.lines.others]
-        return [member for part in parts for member in part.members.tolist()]
 
     @cached_property
     def _unresolved(self) -> list[Unresolved]:

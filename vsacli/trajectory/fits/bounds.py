@@ -1,4 +1,4 @@
-"""Components of which no two resolutions agree: how far they may be off, with no deviation stated."""
+"""How far components of a fit may be off of which the record does not determine a standard deviation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PROBES = 500
 
 
 class Unresolved:
-    """The components of a part of a fit that is not resolved.
+    """The components of a part of a fit of which no two resolutions agree.
 
     Attributes:
         members: their indices.
@@ -39,9 +39,7 @@ class Unresolved:
         """
         self.members, self._orders = part.members, orders
         self._knots, self._degree, self._posterior = part.spline.t, fit.degree, posterior
-        first, last = part.knots[[0, -1]]
-        start, end = np.minimum(part.doubtful, (last - first) / 4)
-        probes = np.linspace(first + start, last - end, PROBES)
+        probes = np.linspace(*part.inside, PROBES)
         found = np.sqrt(np.mean(self._of_posterior(probes)[-1, -1]))
         size = np.sqrt(np.mean(part.spline(probes, nu=orders - 1) ** 2, axis=0))
         self._units: FloatArray = CAUTION * relative * size / found
@@ -56,10 +54,10 @@ class Unresolved:
 
 
 def unresolved(fit: Fit, orders: int) -> Iterator[Unresolved]:
-    """Those of a fit; without components that have a vibration, of which nothing at all can be said."""
+    """Those of a fit."""
     for part in fit.parts:
         known = part.smoothing
-        if known is not None and not known.resolved and not known.lines.others:
+        if known is not None and not known.resolved:
             posterior = known.posterior if part.smooth else _of_least_squares(fit, part)
             if posterior is not None:
                 yield Unresolved(fit, part, posterior, known.relative, orders)
@@ -70,3 +68,21 @@ def _of_least_squares(fit: Fit, part: Part) -> Posterior | None:
         return of_least_squares(fit.time, part.spline.t, fit.degree)
     except np.linalg.LinAlgError:  # of very uneven times
         return None
+
+
+def vibrations(fit: Fit, orders: int) -> Iterator[tuple[int, FloatArray]]:
+    """Components with lines in their spectrum that nobody knows to be motion or noise.
+
+    Yields:
+        The index of each, and the covariance of value and derivatives, (orders, orders), of lines that were
+        taken for noise, all their power at the highest frequency; NaN if the spline follows the lines.
+    """
+    for part in fit.parts:
+        known = part.smoothing
+        if known is not None and known.lines.others:
+            rate = 2 * np.pi * max(known.lines.others) * np.exp(0.5j * np.pi)
+            line = rate ** np.arange(orders)  # derivatives of a turning phasor
+            covariance = np.real(line[:, None] * line.conj())
+            for member in part.members.tolist():
+                power = np.nan if known.follows_lines else known.lines.share * fit.residual[member] ** 2
+                yield member, power * covariance
