@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 from samples.command_line import ROBOT, contents, installed
+
+from vsacli import Flag, open_result
 
 
 def test_installed_command_says_yes(tmp_path, motion):
@@ -37,3 +40,39 @@ def test_verbose_describes_the_inputs_and_what_computes(vsacli, motion):
     inputs, engine = vsacli("check-feasibility", ROBOT, motion, "--verbose").err.splitlines()
     assert inputs == "vsa-3r: 3 joints; rest-to-rest: 401 steps over 4 s"
     assert engine == "NumPy computes: 401 samples are few"
+
+
+COARSE = """\
+format: vsacli-trajectory/1
+name: coarse
+duration: 4
+rate: 4
+position:
+  type: sinusoids
+  frequency: 1
+  offset: [0, 30 deg, 0]
+  sine: [[0, 9 deg, 0]]
+  cosine: [[0, 9 deg, 0]]
+stiffness: {type: constant, value: 830}
+"""
+
+
+def test_what_lies_between_the_steps_counts(vsacli, tmp_path):
+    """The shoulder sways, and its load is largest between two steps."""
+    (tmp_path / "coarse.yaml").write_text(COARSE)
+    task, path = (ROBOT, "coarse.yaml"), tmp_path / "run.h5"
+    done = vsacli("invdyn", *task, "-o", path, "--json")
+    report = json.loads(done.out)
+    assert (done.code, report["verdict"]) == (3, "infeasible")
+    shoulder = report["joints"][1]
+    assert shoulder["between"]["margin"] == shoulder["worst"]["infeasible"]
+    with open_result(path) as result:
+        infeasible = result.flags[:, 1] & Flag.INFEASIBLE != 0
+        assert result.report.as_json() == report
+        assert np.isfinite(result.tau_motor).all(), "every step by itself can be done"
+    assert shoulder["steps"]["infeasible"] == np.count_nonzero(infeasible) > 0
+    assert "load allows, raise it" in (text := vsacli("check-feasibility", *task).out)
+    assert "between the steps" in text
+    stopped = json.loads(vsacli("check-feasibility", *task, "--json", "--stop-on-infeasible").out)
+    assert stopped["samples"] == int(infeasible.argmax()) + 1
+    assert stopped["verdict"] == "infeasible"

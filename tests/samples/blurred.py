@@ -38,6 +38,10 @@ class Blurred:
         return self.exact.components
 
     @property
+    def known_between(self) -> bool:
+        return True
+
+    @property
     def breakpoints(self) -> FloatArray:
         return self.exact.breakpoints
 

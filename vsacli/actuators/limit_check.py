@@ -81,9 +81,10 @@ class LimitCheck(NamedTuple):
         of_motor = deviations if self.motor is None else deviations[self.motor - 1]
         return np.minimum(ALLOWED_DEVIATIONS * np.nan_to_num(of_motor), most)
 
-    @property
-    def _largest(self) -> float:
-        return max(abs(bound) for bound in self.range if np.isfinite(bound))
+    def clearance(self, of_joint: OfJoint) -> FloatArray:
+        """How far within the range values are, relative to its larger end; negative outside, NaN for NaN."""
+        clearance: FloatArray = self._outside(self.values(of_joint)) / -(self._largest or 1.0)
+        return clearance
 
     def worst(self, of_joint: OfJoint, flags: FlagArray) -> Excess | None:
         """The worst of the steps that have the bit among these flags, (samples,); None if there is none."""
@@ -95,6 +96,11 @@ class LimitCheck(NamedTuple):
         step = int(np.where(hit, outside, -np.inf).argmax())
         value, (lower, upper) = float(values[step]), self.range
         return Excess(int(hit.argmax()), step, value, lower if value < lower else upper, float(outside[step]))
+
+    @property
+    def _largest(self) -> float:
+        """The larger finite bound in size."""
+        return max(abs(bound) for bound in self.range if np.isfinite(bound))
 
     def _outside(self, values: FloatArray) -> FloatArray:
         """How far values lie outside the range; zero or negative inside, NaN for NaN."""

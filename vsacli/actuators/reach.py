@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from functools import reduce
 from typing import NamedTuple
@@ -16,6 +17,11 @@ from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN, Flag, marke
 def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
     """Relative distance of the stiffness to the nearer end of its corridor; negative outside, NaN if none."""
     return np.minimum(stiffness - lower, upper - stiffness) / stiffness
+
+
+def nearer_end(stiffness: float, lower: float, upper: float) -> float:
+    """The end of the corridor that a stiffness is nearer to; NaN if there is none."""
+    return lower if stiffness - lower <= upper - stiffness or math.isnan(lower) else upper
 
 
 class Reach(NamedTuple):

@@ -136,6 +136,8 @@ class JointReport(Stored):
         end_dtheta: motor velocities there.
         peak_dtheta: largest |dtheta| of motors 1 and 2, over the steps where it exists.
         uncertainty: what recorded signals leave uncertain; None if nothing comes from fits of records.
+        between: what comes nearer to its bound between the steps than at any step: "margin" is the stiffness
+            in its corridor, others are called as the flags of their limits.
     """
 
     name: str
@@ -160,6 +162,7 @@ class JointReport(Stored):
     end_dtheta: tuple[float, float] = UNKNOWN
     peak_dtheta: tuple[float, float] = UNKNOWN
     uncertainty: JointUncertainty | None = None
+    between: dict[str, Worst] = field(default_factory=dict)
 
     shape: ClassVar = {
         **named("name", "type", "actuator", "steps", "first_time", "worst"),
@@ -170,6 +173,7 @@ class JointReport(Stored):
         "end": {"theta": "end_theta", "dtheta": "end_dtheta"},
         **named("other_preload", "energy"),
         "uncertainty?": "uncertainty",
+        "between?": "between",
     }
 
     def shows(self, verdict: str) -> bool:

@@ -38,8 +38,10 @@ def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterato
 
 def sentences(joint: JointReport) -> Iterator[str]:
     """One sentence for each kind of trouble of a joint, naming it."""
+    between = {worst.time for worst in joint.between.values()}
     for kind, worst in joint.worst.items():
-        yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, worst)}"
+        where = ", between the steps" if worst.time in between else ""
+        yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, worst)}{where}"
 
 
 def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:

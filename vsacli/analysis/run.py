@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vsacli.analysis.between import Between, Minima
 from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
@@ -21,6 +22,7 @@ from vsacli.compute.engine import Engine, Tell, choose, unheard
 from vsacli.dynamics.energy import RunEnergy
 from vsacli.dynamics.inverse import InverseDynamics, check_fit, compute_block, usual_block
 from vsacli.robot.model import Robot
+from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -39,7 +41,8 @@ class Run:
     Args:
         robot: the robot.
         trajectory: what it is asked to do.
-        stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does.
+        stop_on_infeasible: end with the first infeasible step, as the paper's algorithm does; one that is
+            nearest to something infeasible between the steps counts.
         near_singular: margin below which a step is near-singular.
         deflections: "root" of (14) at each step; "integrate" follows that of the first step by (19); or those
             that were integrated before.
@@ -87,26 +90,48 @@ class Run:
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
         self._energy = RunEnergy(robot)
         self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
+        self._between = Between(robot, trajectory, near_singular, self._compute, self._judged)
         self._spring_residual = 0.0
         self._samples = 0
 
     def __iter__(self) -> Iterator[Block]:
-        for start in range(0, self.trajectory.samples, self._block_samples):
-            stop = min(start + self._block_samples, self.trajectory.samples)
-            motion = self.trajectory.block(start, stop)
-            integrated = None if self._deflections is None else self._deflections.at(motion.time)
-            block = compute_block(self.robot, motion, self._near_singular, integrated, self.choice.engine)
+        for block, minima in self._between.marked(self._steps()):
             infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
             if self._stop_on_infeasible and infeasible.any():
-                yield self._added(_shortened(block, int(infeasible.argmax()) + 1))
+                last = int(infeasible.argmax())
+                yield self._added(
+                    _shortened(block, last + 1), [each.where(each.step <= last) for each in minima]
+                )
                 return
-            yield self._added(block)
+            yield self._added(block, minima)
 
-    def _added(self, block: Block) -> Block:
-        """The block with deviations and the energy that the motors have spent, merged into the report."""
+    def _steps(self) -> Iterator[Block]:
+        """All steps, in blocks, with what holds at them."""
+        for start in range(0, self.trajectory.samples, self._block_samples):
+            yield self._compute(self.trajectory.block(start, start + self._block_samples))
+
+    def _compute(self, motion: Motion) -> Block:
+        integrated = None if self._deflections is None else self._deflections.at(motion.time)
+        return compute_block(self.robot, motion, self._near_singular, integrated, self.choice.engine)
+
+    def _judged(self, block: Block) -> Block:
+        """With the limits that are exceeded beyond what recorded signals leave uncertain."""
+        return block if self._uncertainty is None else self._uncertainty.judged(block)
+
+    def _added(self, block: Block, between: Sequence[Minima]) -> Block:
+        """The block with deviations and the energy that the motors have spent, merged into the report.
+
+        Args:
+            block: the next steps.
+            between: minima that are nearest to them.
+        """
         if self._uncertainty is not None:
             block = self._uncertainty.add(block)
         self._samples += len(block.time)
+        for minima in between:
+            self._between.add(minima)
+            for index, summary in enumerate(self._summaries):
+                summary.add_between(minima.of_joint(index))
         self._spring_residual = float(np.maximum(self._spring_residual, spring_residual(self.robot, block)))
         for summary in self._summaries:
             summary.add(block)
@@ -127,7 +152,7 @@ class Run:
     def report(self) -> Report:
         """The verdict on the blocks so far, with the self-check of the whole."""
         complete = self._samples == self.trajectory.samples
-        joints = zip(self._summaries, self._energy.report(), self._uncertainties(), strict=True)
+        found = zip(self._energy.report(), self._between.reports(), self._uncertainties(), strict=True)
         return Report(
             robot=self.robot.name,
             trajectory=self.trajectory.name,
@@ -135,11 +160,11 @@ class Run:
             duration=self.trajectory.duration,
             complete=complete,
             warnings=(*self.robot.warnings, *self.trajectory.warnings),
-            notes=self.trajectory.notes,
+            notes=(*self.trajectory.notes, *self._between.notes),
             self_check=self._self_check(),
             joints=tuple(
-                summary.report(energy, uncertainty, complete=complete)
-                for summary, energy, uncertainty in joints
+                summary.report(*of_joint, complete=complete)
+                for summary, of_joint in zip(self._summaries, found, strict=True)
             ),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,

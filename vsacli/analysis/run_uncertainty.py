@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ from vsacli.actuators.limit_check import ALLOWED_DEVIATIONS
 from vsacli.actuators.reach import margin
 from vsacli.analysis.joint_report import JUDGED, JointUncertainty, Spread, Worst
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray
-from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.flags import Flag, has
 from vsacli.base.variables import UNCERTAIN, VARIABLES, Block, deviation
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.limits import limit_checks
@@ -87,7 +87,17 @@ class RunUncertainty:
             if name in self._shown:
                 powers = self._powers.setdefault(name, _Powers(unstated))
                 powers.add(values[inside], array[inside])
-            array[:, unstated] = np.nan
+        return self._with(deviations, block)
+
+    def judged(self, block: Block) -> Block:
+        """A block of other times than steps with its deviations, and without limits that may be kept."""
+        deviations = self._deviations.at(block.time)
+        del deviations[MARGIN]
+        return self._with(deviations, block)
+
+    def _with(self, deviations: Mapping[str, FloatArray], block: Block) -> Block:
+        for name, array in deviations.items():
+            array[:, self._deviations.unstated[name]] = np.nan
         stored = {deviation(name): array for name, array in deviations.items()}
         block = Block(**{**block.arrays(), **stored, "flags": block.flags.copy()})
         for index in range(len(self._robot.joints)):
@@ -105,16 +115,17 @@ class RunUncertainty:
     def _judge_limits(self, block: Block, index: int) -> None:
         """Take the bits of limits away where the excess is within the uncertainty."""
         joint, values = self._robot.joints[index], block.of_joint(index)
-        exceeded = np.zeros_like(block.flags[:, index])
+        seen, exceeded = np.zeros((2, len(block.time)), dtype=np.uint16)
         for check in limit_checks(joint):
             seeming, known = check.flags(values), check.flags(values, check.allowance(values))
+            seen |= seeming
             exceeded |= known
             excess = check.worst(values, seeming & ~known)
             kept, label = self._limits[index], check.flag.label
             if excess is not None and (label not in kept or excess.size > kept[label][0]):
                 time, unit = float(block.time[excess.step]), check.unit(joint.type)
                 kept[label] = excess.size, Worst(label, time, excess.value, excess.bound, unit, check.motor)
-        block.flags[:, index] = (block.flags[:, index] & ~np.uint16(LIMITS)) | exceeded
+        block.flags[:, index] &= ~(seen & ~exceeded)  # others are of what lies between the steps
 
     def report(self) -> list[JointUncertainty]:
         """What was found so far, of each joint."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vsacli.actuators.reach import margin
+from vsacli.actuators.reach import margin, nearer_end
 from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, JointUncertainty, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
@@ -47,14 +47,24 @@ class JointSummary:
             self._start = np.stack((*_motors_at(block, 0, index), self._torque_step(block)))
         self._end = np.stack(_motors_at(block, -1, index))
         self._count(flags, block.time)
-        if "stiffness" in self._joint.actuator.commanded:
-            self._add_reach(flags, block)
         self._record_not_finite(flags, block.time)
-        self._record_limits(flags, block)
+        self._add_bounded(block)
         least, most = self._stiffness
         self._stiffness = np.fmin(least, stiffness.min()), np.fmax(most, stiffness.max())
         rows = block.tau_e[:, index], *block.tau_motor[:, index].T, *block.dtheta[:, index].T
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(np.abs(row)) for row in rows])
+
+    def add_between(self, block: Block) -> None:
+        """Merge minima between the steps: whose flags have steps of their own, which count."""
+        if block.time.size:
+            self._add_bounded(block)
+
+    def _add_bounded(self, block: Block) -> None:
+        """Merge what is worst."""
+        flags = block.flags[:, self._index]
+        if "stiffness" in self._joint.actuator.commanded:
+            self._add_reach(flags, block)
+        self._record_limits(flags, block)
 
     def _add_reach(self, flags: FlagArray, block: Block) -> None:
         """Merge what there is to say about the corridor."""
@@ -71,12 +81,18 @@ class JointSummary:
             self._other_preload = bool(self._joint.actuator.other_preload(*demand).all())
 
     def report(
-        self, energy: JointEnergy, uncertainty: JointUncertainty | None = None, *, complete: bool
+        self,
+        energy: JointEnergy,
+        between: dict[str, Worst],
+        uncertainty: JointUncertainty | None,
+        *,
+        complete: bool,
     ) -> JointReport:
         """What was found so far, besides what is given; at least one block must have been added.
 
         Args:
             energy: of the joint.
+            between: what is worse between the steps than at them.
             uncertainty: of the joint; None if no signal was recorded.
             complete: whether the last step that was added is that of the trajectory.
         """
@@ -102,6 +118,7 @@ class JointSummary:
             torque_step=torque_step,
             other_preload="infeasible" in self._worst and self._other_preload,
             energy=energy,
+            between=between,
             start_dtheta=start_dtheta,
             end_theta=end_theta,
             end_dtheta=end_dtheta,
@@ -137,7 +154,7 @@ class JointSummary:
                     float(getattr(block, name)[step, self._index])
                     for name in ("stiffness", "stiffness_lower", "stiffness_upper")
                 )
-                bound = lower if value - lower <= upper - value or math.isnan(lower) else upper
+                bound = nearer_end(value, lower, upper)
                 unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
                 self._keep(-gap[step], Worst(kind, float(block.time[step]), value, bound, unit))
 

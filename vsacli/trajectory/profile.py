@@ -32,6 +32,10 @@ class Profile(Protocol):
     def breakpoints(self) -> FloatArray:
         """Ascending times between which the function is analytic; the first and last are its span."""
 
+    @property
+    def known_between(self) -> bool:
+        """Whether `at` has the values at the steps, too; where these are given they are known there alone."""
+
     def at(self, time: FloatArray) -> FloatArray:
         """Value and derivatives at any times of the span, shape (orders, components, samples)."""
 

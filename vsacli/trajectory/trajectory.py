@@ -267,6 +267,11 @@ class Trajectory:
         return same
 
     @property
+    def known_between(self) -> bool:
+        """Whether `at` continues the steps; it does not where derivatives are given at the samples."""
+        return all(profile.known_between for _, profile in self._profiles())
+
+    @property
     def breakpoints(self) -> FloatArray:
         """Ascending times between which all its functions are analytic; the first and last are its span."""
         times = np.sort(np.concatenate([profile.breakpoints for _, profile in self._profiles()]))

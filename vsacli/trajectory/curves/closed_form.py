@@ -57,6 +57,11 @@ class ClosedForm(ABC):
         """The ends of the span."""
         return np.array(self.span)
 
+    @property
+    def known_between(self) -> bool:
+        """True: steps are nothing special."""
+        return True
+
     @abstractmethod
     def at(self, time: FloatArray) -> FloatArray:
         """Value and derivatives at any times of the span, shape (orders, components, samples)."""

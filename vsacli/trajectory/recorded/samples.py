@@ -186,6 +186,11 @@ class SampledProfile:
         """Ascending times between which the fit is analytic; the first and last are its span."""
         return self.fit.breakpoints if self.fit.parts else self.record.time[[0, -1]]
 
+    @property
+    def known_between(self) -> bool:
+        """Whether all derivatives at the samples are the fit's, and none is given."""
+        return self.resampled or all(given is None for given in self.record.derivatives)
+
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
         """Value and derivatives at the samples start..stop-1: what was given, and for the rest the fit."""
         record = self.record

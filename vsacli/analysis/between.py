@@ -1,0 +1,262 @@
+"""What happens between the steps of a run: where margins and distances to limits are least.
+
+A run computes a trajectory at its steps, but that is a function of time. Around each local minimum of a
+clearance that may come near its bound, the run is computed at further times, until the minimum is known. The
+step that is nearest to it gets the flags that hold there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.analysis.clearances import bounded_quantities, clearances
+from vsacli.analysis.joint_report import Worst
+from vsacli.analysis.minima import KNOWN, ROUNDING, Brackets, Known, brackets, narrowed
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.variables import Block
+from vsacli.dynamics.inverse import compute_block, usual_block
+from vsacli.robot.model import Robot
+from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Trajectory
+
+NEAR = 0.1
+"""Relative clearance up to which a minimum is looked for."""
+
+MOST = 1000
+"""Minima of one quantity that are looked for, the worst of a run at least."""
+
+SCANNED = 500
+"""Times at which a run of fewer steps is looked at, a third of those of its self-check: its steps may be so
+coarse that a minimum shows at none of them."""
+
+SAMPLES_ONLY = "derivatives are given at the samples, so that what lies between the samples is not known"
+
+
+class Minima(NamedTuple):
+    """Minima between the steps of a block.
+
+    Attributes:
+        block: everything at their times; a row each.
+        quantity: what is least there, by number of `Between.quantities`.
+        joint: whose it is, by index.
+        clearance: how little.
+        step: the nearest step, by its place in the block.
+        crossed: whether more is flagged there than at the steps around.
+    """
+
+    block: Block
+    quantity: IndexArray
+    joint: IndexArray
+    clearance: FloatArray
+    step: IndexArray
+    crossed: BoolArray
+
+    def where(self, chosen: BoolArray) -> Minima:
+        """Some of them."""
+        rows = {name: array[chosen] for name, array in self.block.arrays().items()}
+        return Minima(
+            Block(**rows),
+            self.quantity[chosen],
+            self.joint[chosen],
+            self.clearance[chosen],
+            self.step[chosen],
+            self.crossed[chosen],
+        )
+
+    def of_joint(self, index: int) -> Block:
+        """Everything at those of one joint."""
+        return self.where(self.joint == index).block
+
+
+class Between:
+    """Looks between the steps of a run while its blocks pass.
+
+    Args:
+        robot: the robot.
+        trajectory: along which it is computed.
+        near_singular: margin that is flagged.
+        compute: what computes its blocks.
+        judged: what corrects their flags, if anything does.
+
+    Attributes:
+        quantities: everything that has bounds.
+        notes: what keeps it from looking, if anything does: a sentence.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        trajectory: Trajectory,
+        near_singular: float,
+        compute: Callable[[Motion], Block],
+        judged: Callable[[Block], Block] = lambda block: block,
+    ) -> None:
+        self.quantities = bounded_quantities(robot)
+        self.notes = () if trajectory.known_between else (SAMPLES_ONLY,)
+        self._trajectory, self._compute, self._judged = trajectory, compute, judged
+        self._joints = len(robot.joints)
+        self._joint = np.array([quantity.number for quantity in self.quantities], dtype=np.intp)
+        self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=np.uint16)
+        self._flagged = np.array([0.0 if quantity.limit else near_singular for quantity in self.quantities])
+        self._lowest = [np.empty(0)] * len(self.quantities)
+        self._least_at_steps = np.full(len(self.quantities), np.inf)
+        self._least_between: dict[int, tuple[float, Worst]] = {}
+        self._found: list[Minima] = []
+        self._passed = 0
+
+    def marked(self, blocks: Iterable[Block]) -> Iterator[tuple[Block, list[Minima]]]:
+        """The blocks of the run with flags that hold between the steps as well, and the minima they are of.
+
+        A block passes when two steps after it are known, since a minimum around the first of these may be
+        nearest to its last step.
+        """
+        if self.notes or not self.quantities:
+            yield from ((block, []) for block in blocks)
+        elif self._trajectory.samples < SCANNED:
+            self._scan()
+            yield from map(self._passing, blocks)
+        else:
+            yield from self._looked(blocks)
+
+    def add(self, minima: Minima) -> None:
+        """Take minima into the report, which have passed and are part of the run."""
+        for number in set(minima.quantity.tolist()):
+            own = np.flatnonzero(minima.quantity == number)
+            least = own[minima.clearance[own].argmin()]
+            clearance = float(minima.clearance[least])
+            if clearance < self._least_between.get(number, (math.inf,))[0]:
+                self._least_between[number] = clearance, self.quantities[number].at(minima.block, least)
+
+    def reports(self) -> list[dict[str, Worst]]:
+        """For each joint what comes nearer to its bound between the steps than at any step, by its kind."""
+        reports: list[dict[str, Worst]] = [{} for _ in range(self._joints)]
+        nearest_last = sorted(self._least_between.items(), reverse=True, key=lambda entry: entry[1][0])
+        for number, (clearance, worst) in nearest_last:  # of two motors the last one stays
+            if clearance < self._least_at_steps[number]:
+                reports[self._joint[number]][worst.kind] = worst
+        return reports
+
+    def _looked(self, blocks: Iterable[Block]) -> Iterator[tuple[Block, list[Minima]]]:
+        """Look around each step when the next one is known."""
+        held: deque[Block] = deque()
+        known = None
+        for block in blocks:
+            held.append(block)
+            steps = block.time, clearances(self.quantities, block)
+            known = Known(0, *steps).opened() if known is None else known.last(2).followed_by(*steps)
+            ended = known.stop == self._trajectory.samples
+            self._search(known.closed() if ended else known, known)
+            while held and (ended or self._passed + len(held[0].time) < known.stop - 1):
+                yield self._passing(held.popleft())
+
+    def _scan(self) -> None:
+        """Look at all of a run of few steps, at evenly many times from each step to the next."""
+        steps = self._trajectory.times.block(0, self._trajectory.samples)
+        each = -(-SCANNED // (len(steps) - 1))
+        time = np.append(steps[:-1, None] + np.diff(steps)[:, None] * np.arange(each) / each, steps[-1])
+        known = Known(0, time, np.hstack([values for _, values in self._computed(time)]))
+        self._search(known.opened().closed(), Known(0, steps, known.value[:, ::each]))
+
+    def _search(self, known: Known, steps: Known) -> None:
+        """Find the minima where clearances are known, and keep those lower than the steps around them."""
+        self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
+        given = brackets(known)
+        found = narrowed(self._chosen(given, steps.time), self._evaluated)
+        time, clearance = found.time[:, 1], found.value[:, 1]
+        after = np.clip(np.searchsorted(steps.time, time), 1, len(steps.time) - 1)
+        at_steps = np.minimum(*(steps.value[found.function, place] for place in (after - 1, after)))
+        noise = np.where(np.isfinite(clearance), KNOWN * np.abs(clearance) + ROUNDING, 0.0)
+        lower = (clearance < at_steps - noise) & (clearance <= NEAR)
+        if lower.any():
+            nearest = after - (time - steps.time[after - 1] < steps.time[after] - time)
+            crossed = clearance < self._flagged_below(found.function, at_steps)
+            self._keep(found.where(lower), steps.first + nearest[lower], crossed[lower])
+
+    def _chosen(self, given: Brackets, steps: FloatArray) -> Brackets:
+        """The worst of each quantity in a run so far, of those whose minimum is not at a step and counts.
+
+        A minimum counts if more may be flagged there than in the middle, or if it may be the least.
+        """
+        middle = given.time[:, 1]
+        at_step = steps[np.clip(np.searchsorted(steps, middle), 0, len(steps) - 1)] == middle
+        flagged = self._flagged_below(given.function, given.value[:, 1])
+        counts = np.minimum(NEAR, np.maximum(flagged, self._least_at_steps[given.function]))
+        with np.errstate(invalid="ignore"):  # beside a clearance that is infinite
+            expected = given.value[:, 1] - given.fall
+        given = given.where((given.unknown | ~at_step) & ~(expected > counts))
+        chosen = np.zeros(len(given.function), dtype=bool)
+        for number in set(given.function.tolist()):
+            own = given.function == number
+            lowest = given.value[own, 1]
+            self._lowest[number] = np.sort(np.append(self._lowest[number], lowest))[:MOST]
+            chosen[own] = lowest <= self._lowest[number][-1]
+        return given.where(chosen)
+
+    def _flagged_below(self, quantity: IndexArray, clearance: FloatArray) -> FloatArray:
+        """The clearance next below others at which quantities get a further flag; -inf if they have all."""
+        first = self._flagged[quantity]
+        return np.where(clearance >= first, first, np.where(clearance >= 0, 0.0, -np.inf))
+
+    def _keep(self, found: Brackets, steps: IndexArray, crossed: BoolArray) -> None:
+        """Everything at minima, with the flags of what is least there, for the block of the nearest step."""
+        block = self._judged(self._compute(self._trajectory.at(found.time[:, 1])))
+        own = Block(**{**block.arrays(), "flags": block.flags & self._bits[found.function, None]})
+        joint = self._joint[found.function]
+        self._found.append(Minima(own, found.function, joint, found.value[:, 1], steps, crossed))
+
+    def _evaluated(self, quantity: IndexArray, times: FloatArray) -> FloatArray:
+        """The clearances of quantities (n,) at times of their own, (n, times)."""
+        wanted = np.repeat(quantity, times.shape[1])
+        parts = [
+            values[wanted[part], np.arange(values.shape[1])] for part, values in self._computed(times.ravel())
+        ]
+        return np.concatenate(parts).reshape(times.shape)
+
+    def _computed(self, time: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
+        """The clearances of all quantities at any times, in blocks."""
+        count = usual_block(self._joints)
+        for start in range(0, len(time), count):
+            part = slice(start, start + count)
+            block = self._compute(self._trajectory.at(time[part]))
+            yield part, clearances(self.quantities, block)
+
+    def _passing(self, block: Block) -> tuple[Block, list[Minima]]:
+        """A block with its flags, and the minima that are nearest to its steps."""
+        stop, own, later = self._passed + len(block.time), [], []
+        for found in self._found:
+            inside = found.step < stop
+            if inside.any():
+                own.append(found.where(inside)._replace(step=found.step[inside] - self._passed))
+            if not inside.all():
+                later.append(found.where(~inside))
+        for found in own:
+            bits = np.where(found.crossed, found.block.flags[np.arange(len(found.joint)), found.joint], 0)
+            np.bitwise_or.at(block.flags, (found.step, found.joint), bits)
+        self._found, self._passed = later, stop
+        return block, own
+
+
+def times_between(
+    robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN
+) -> FloatArray:
+    """Times between the steps at which something comes nearer to its bound than at the steps around.
+
+    Whoever judges a trajectory by its steps judges it at these times, too; `trajectory.at` gives the motion.
+    None where derivatives are given at the samples, and nothing is known between them.
+    """
+
+    def compute(motion: Motion) -> Block:
+        return compute_block(robot, motion, near_singular)
+
+    between, count = Between(robot, trajectory, near_singular, compute), usual_block(len(robot.joints))
+    blocks = (
+        compute(trajectory.block(start, start + count)) for start in range(0, trajectory.samples, count)
+    )
+    times = [minima.block.time for _, found in between.marked(blocks) for minima in found]
+    return np.sort(np.concatenate([np.empty(0), *times]))
