@@ -75,6 +75,10 @@ class Dip:
         return self.at(time)
 
     @property
+    def known_between(self) -> bool:
+        return True
+
+    @property
     def estimate(self) -> None:
         return None
 
