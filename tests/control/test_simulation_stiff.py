@@ -150,7 +150,7 @@ def test_a_run_that_ends_within_its_budget_does_not_depend_on_it():
 
 @pytest.mark.parametrize("stiffness", [1e14, 9e17])
 def test_springs_that_double_precision_cannot_resolve_are_refused(stiffness):
-    with pytest.raises(InputError, match=r"axis: its springs are too stiff .* or make it rigid"):
+    with pytest.raises(InputError, match=r"axis: its springs are too stiff .* or make the joint rigid"):
         simulate(elastic_joint(stiffness), step_of(1.0))
 
 

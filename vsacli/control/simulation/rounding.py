@@ -43,7 +43,7 @@ def check_rounding(robot: Robot, loop: ClosedLoop, start: FloatArray, time: floa
             of_springs,
             drivetrain.spring_joint,
             "springs are too stiff",
-            "soften it, or make it rigid",
+            "soften them or make the joint rigid",
         ),
         (loop.demand, drivetrain.joint, "poles are too fast", "choose slower ones"),
     ):
