@@ -11,6 +11,7 @@ from samples.clean_records import MOTIONS, SENSORS, clean_records
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
+from vsacli.trajectory.recorded.even_stamps import elapsed_times, resolution, rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.samples import Samples
@@ -206,6 +207,28 @@ def test_a_gap_is_named():
 def test_stamps_in_another_unit(factor: float, text: str):
     (problem,) = found(factor * TIME, noisy())
     assert problem.message.startswith(text)
+
+
+@pytest.mark.parametrize(
+    ("start", "digits", "rate"), [(1.7e9, 6, 1000), (1.7e9, 6, 300), (0, 4, 300), (5, 3, 60)]
+)
+@pytest.mark.parametrize("lost", [0, 3])
+def test_rounded_stamps_of_even_samples_are_even(start: float, digits: int, rate: float, lost: int):
+    time = np.delete(np.arange(2001), np.arange(700, 700 + lost)) / rate
+    stamps = np.round(start + time, digits)
+    # The step is known from the ends, each rounded.
+    np.testing.assert_allclose(elapsed_times(stamps), time, atol=2 * resolution(stamps), rtol=0)
+    even = np.diff(elapsed_times(stamps)) * rate
+    assert np.abs(even - np.round(even)).max() < 1e-3
+    assert rounding_notes(stamps)[0].endswith("s from even, which is their rounding, and are taken for even")
+
+
+def test_other_stamps_stay_as_they_are():
+    rng = np.random.default_rng(0)
+    uneven = np.cumsum(rng.uniform(1, 2, 500)) / 1000
+    for stamps in (TIME, uneven, np.round(uneven, 6), TIME**1.1, 1.7e9 + uneven):
+        np.testing.assert_array_equal(elapsed_times(stamps), stamps - stamps[0])
+        assert rounding_notes(stamps) == ()
 
 
 def test_stamps_that_jitter():

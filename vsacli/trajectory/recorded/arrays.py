@@ -11,6 +11,7 @@ from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import METHODS
+from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health
 from vsacli.trajectory.recorded.problems import time_problems, value_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
@@ -39,7 +40,7 @@ def profiles_of_arrays(
         raise InputError(Problem("", 0, str(problem)) for problem in problems)
     warnings = tuple(map(str, health(times, records)))
     profiles = {record.signal.key: SampledProfile.of(record, fit) for record in records}
-    return RecordedTimes(times), profiles, warnings
+    return RecordedTimes(times, rounding_notes(times)), profiles, warnings
 
 
 def _recorded(

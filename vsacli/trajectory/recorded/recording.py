@@ -19,6 +19,7 @@ from vsacli.documents.table import Lines, Table, read_table
 from vsacli.robot.commanded_joints import CommandedJoints, takers
 from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout
+from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, time_problems, value_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
@@ -104,7 +105,7 @@ def read_recording(
     source, lines = table.source, table.lines
     del table  # as large as the records, which may be fitted now
     profiles = tuple(_profile(record, wanted[record.signal], resampled=resampled) for record in records)
-    return Recording(RecordedTimes(time), profiles, warnings, notes, source, lines)
+    return Recording(RecordedTimes(time, rounding_notes(time)), profiles, warnings, notes, source, lines)
 
 
 def _profile(record: Samples, chosen: FitChoice, *, resampled: bool) -> SampledProfile:

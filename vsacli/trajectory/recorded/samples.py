@@ -14,6 +14,7 @@ from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import Fit, fit_samples, mismatches
 from vsacli.trajectory.fits.bounds import Unresolved, unresolved, vibrations
 from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences
+from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.times import stretch
 
 
@@ -50,7 +51,7 @@ class Samples:
         start = float(stamps[0]) if len(stamps) else 0.0
         return cls(
             signal=signal,
-            time=stamps - start,
+            time=elapsed_times(stamps),
             values=values,
             derivatives=derivatives,
             labels=labels,
@@ -200,7 +201,7 @@ class SampledProfile:
             rows = np.empty((record.signal.orders, self.components, len(time)))
             exact = np.ones(self.components, dtype=bool)
         else:
-            rows = self.at(time)
+            rows = self.at(record.time[start:stop])
             exact = self.fit.exact
         rows[0, exact] = record.values[exact, start:stop]
         for row, given in zip(rows[1:], record.derivatives, strict=True):

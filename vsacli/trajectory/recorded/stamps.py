@@ -8,6 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import time_text
+from vsacli.trajectory.recorded.even_stamps import resolution
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.thresholds import (
     ENOUGH_ROWS,
@@ -19,8 +20,6 @@ from vsacli.trajectory.recorded.thresholds import (
 )
 
 UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-
-MOST_DECIMALS = 9
 
 
 def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
@@ -76,14 +75,4 @@ def _jitter(stamps: FloatArray, steps: FloatArray, usual: float) -> float:
     if len(steps) < 2:
         return 0.0
     change = float(np.median(np.abs(np.diff(steps))))
-    return max(0.0, change - 2 * _resolution(stamps)) / usual
-
-
-def _resolution(stamps: FloatArray) -> float:
-    """The last digit of stamps, s: of their decimals, or of their floating-point numbers."""
-    few = stamps[:: max(1, len(stamps) // 1000)]
-    rounding = float(np.spacing(np.abs(stamps).max()))
-    for decimals in range(MOST_DECIMALS + 1):
-        if np.abs(few - np.round(few, decimals)).max() <= 2 * rounding:
-            return max(10.0**-decimals, rounding)
-    return rounding
+    return max(0.0, change - 2 * resolution(stamps)) / usual
