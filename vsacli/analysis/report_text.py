@@ -40,7 +40,7 @@ def sentences(joint: JointReport) -> Iterator[str]:
     """One sentence for each kind of trouble of a joint, naming it."""
     between = {worst.time for worst in joint.between.values()}
     for kind, worst in joint.worst.items():
-        where = ", between the steps" if worst.time in between else ""
+        where = "; this lies between the steps" if worst.time in between else ""
         yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, worst)}{where}"
 
 
