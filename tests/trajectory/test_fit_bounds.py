@@ -8,7 +8,7 @@ from samples.noisy_records import MOTIONS, record
 
 from vsacli.trajectory.fits import SMOOTH, fit_samples
 from vsacli.trajectory.fits.bounds import CAUTION, unresolved, vibrations
-from vsacli.trajectory.fits.spectral_lines import Lines
+from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +53,14 @@ def test_a_vibration_that_may_be_motion_has_the_covariance_of_a_sine(stepwise, f
     # products of derivatives two orders apart cancel to rounding of the larger ones
     scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
     np.testing.assert_allclose(covariance / scale, np.cov(sine, bias=True) / scale, atol=1e-12)
+
+
+def test_lines_of_the_steps_of_an_encoder_are_no_vibration():
+    time = np.arange(4000) / 1000
+    step, turn = 2 * np.pi / 2**12, 0.13 * time  # 85 steps a second
+    rounded = step * np.round(turn / step)
+    assert is_rounding(rounded, rounded - turn)
+    shaking = step * np.round((turn + 2 * step * np.sin(2 * np.pi * 30 * time)) / step)
+    assert not is_rounding(shaking, shaking - turn)
+    noisy = turn + 1e-5 * np.random.default_rng(0).standard_normal(len(time))
+    assert not is_rounding(noisy, noisy - turn)

@@ -11,7 +11,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.information import Posterior
 from vsacli.trajectory.fits.resolution import KnownNoise, deviation_factor, find_resolution, rms_deviation
-from vsacli.trajectory.fits.spectral_lines import Lines, spectral_lines
+from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding, spectral_lines
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -84,7 +84,7 @@ def smoothing_spline(
     deviations = np.array([scale * rms_deviation(model, each) for each in range(order + 1)])
     residual = row - (scale * spline(time)[:, 0] + offset)
     size = scale * float(np.sqrt(np.mean(spline(model.probes, nu=order)[model.inside] ** 2)))
-    lines = spectral_lines(time, residual, order, size)
+    lines = Lines() if is_rounding(row, residual) else spectral_lines(time, residual, order, size)
     # the unit of the posterior that makes its deviations those that are stated
     unit = scale * deviation_factor(model) * math.sqrt(model.noise_variance) * found.stated / found.deviation
     smoothing = Smoothing(deviations, found.stated, found.accepted, lines, model.cautious, unit)

@@ -35,6 +35,13 @@ UNEVEN = 0.2
 """Share of a step by which stamps may be uneven for a periodogram."""
 
 
+STEP_TOLERANCE = 0.01
+"""Share of an encoder's step by which values may miss its multiples, as they were printed."""
+
+ROUNDING_RATIO = 1.5
+"""Of the power of a residual to that of rounding to an encoder's steps, up to which rounding is all of it."""
+
+
 class Lines(NamedTuple):
     """Frequencies that stand out of the residual of a fit.
 
@@ -89,6 +96,20 @@ def spectral_lines(time: FloatArray, residual: FloatArray, order: int, size: flo
     near = np.unique(found[~mains, None] + np.arange(-LEAKAGE, LEAKAGE + 1))
     share = float(np.sum(power[near]) / max(np.sum(power), np.finfo(float).tiny))
     return Lines(tuple(frequencies[mains].tolist()), tuple(frequencies[~mains].tolist()), share)
+
+
+def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
+    """Whether an encoder's steps explain a residual: at constant velocity they leave lines, no vibration.
+
+    Args:
+        row: (samples,), what was recorded.
+        residual: (samples,), of its fit.
+    """
+    values = np.unique(row)
+    step = float(np.diff(values).min())
+    counts = (values - values[0]) / step
+    multiples = bool(np.all(np.abs(counts - np.round(counts)) < STEP_TOLERANCE))
+    return multiples and bool(np.mean(residual**2) <= ROUNDING_RATIO * step**2 / 12)
 
 
 def _mains(frequencies: FloatArray) -> BoolArray:
