@@ -13,6 +13,9 @@ from vsacli.trajectory.fits.information import block_count, sort_rows
 
 BINS_PER_SPAN = 2
 
+BLOCK_SAMPLES = 65536
+"""Whose B-splines are held at a time: what fits into a cache is twice as fast."""
+
 LONGEST_LINK = 4.001
 """Bins between two means whose errors are still taken for correlated: a row of the difference of both must
 not reach further than a block of unknowns."""
@@ -76,24 +79,25 @@ class Bins:
             noise: standard deviation of a sample's noise, if it is known.
         """
         start, span = float(time[0]), float(time[-1] - time[0]) / spans
-        place = np.clip((time - start) / span, 0, spans * (1 - 1e-15))
-        which = np.minimum((BINS_PER_SPAN * place).astype(int), BINS_PER_SPAN * spans - 1)
-        count = np.bincount(which).astype(np.float64)
+        count, sums = np.zeros(BINS_PER_SPAN * spans), np.zeros((degree + 3, BINS_PER_SPAN * spans))
+        for first in range(0, len(time), BLOCK_SAMPLES):
+            block = slice(first, first + BLOCK_SAMPLES)
+            place = np.clip((time[block] - start) / span, 0, spans * (1 - 1e-15))
+            which = np.minimum((BINS_PER_SPAN * place).astype(int), len(count) - 1)
+            basis = uniform_basis(place - which // BINS_PER_SPAN, degree)
+            count += np.bincount(which, minlength=len(count))
+            for total, values in zip(sums, (time[block], row[block], *basis), strict=True):
+                total += np.bincount(which, values, minlength=len(count))
         used = np.flatnonzero(count)
-
-        def mean(values: FloatArray) -> FloatArray:
-            means: FloatArray = np.bincount(which, values).astype(np.float64)[used] / count[used]
-            return means
-
-        basis = uniform_basis(place - which // BINS_PER_SPAN, degree)
-        gaps = np.diff(mean(time)) * BINS_PER_SPAN / span
+        times, means, *design = sums[:, used] / count[used]
+        gaps = np.diff(times) * BINS_PER_SPAN / span
         return cls(
             start=start,
             span=span,
             spans=spans,
             degree=degree,
-            means=mean(row),
-            design=np.stack([mean(each) for each in basis], axis=1),
+            means=means,
+            design=np.stack(design, axis=1),
             first=used // BINS_PER_SPAN,
             gaps=np.where(gaps > LONGEST_LINK, np.inf, gaps),
             samples=len(time) / len(used),

@@ -41,6 +41,9 @@ CLOSE = 100.0
 """Factor above the least residual of all resolutions, up to which one is considered if none is accepted. A
 coarse one may state the least deviation of a derivative that it does not see."""
 
+PROBES = 16384
+"""Samples, about, of which a residual is taken."""
+
 SPANS_PER_PERIOD = 4.0
 """Of the highest frequency of a motion whose bandwidth is known: of a sine of that frequency the spline of
 degree 7 misses less than 1 % of the fourth derivative."""
@@ -65,7 +68,7 @@ class Resolution(NamedTuple):
         model: the coarser of both, or the finer if noise does not explain the change.
         deviation: of the highest derivative by noise, relative.
         change: of that derivative from one to the other, relative.
-        residual: root mean square.
+        residual: of the model, root mean square.
         given: whether it follows from a bandwidth.
     """
 
@@ -157,7 +160,9 @@ def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, ord
     explained = change < CONFIRMED * deviation
     model = fine if not explained and change < NEGLIGIBLE * size else coarse
     deviation = deviation if model is coarse else rms_deviation(fine, order)
-    return Resolution(model, deviation / size, change / size, _rms(row - model.spline(time)[:, 0]))
+    some = slice(None, None, 1 + len(time) // PROBES)
+    residual = _rms(row[some] - model.spline(time[some])[:, 0])
+    return Resolution(model, deviation / size, change / size, residual)
 
 
 def rms_deviation(model: Model, order: int) -> float:
