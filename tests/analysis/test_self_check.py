@@ -170,17 +170,6 @@ def test_wrong_derivative_is_found_where_sampling_is_fast(order: int, defect: fl
     assert error > bound
 
 
-@pytest.mark.slow
-def test_a_million_samples_at_10_khz_pass_and_a_wrong_derivative_does_not(monkeypatch):
-    time = np.arange(1_000_001) / 10000
-    q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])
-    trajectory = Trajectory.from_samples(time, q, np.full_like(q, 1000.0))
-    error, bound = ladder(vsa_3r(), trajectory)
-    assert error < bound < 1e-6
-    spoil_torque(monkeypatch, 2, scaled(1.01))
-    assert ladder(vsa_3r(), trajectory)[0] == pytest.approx(0.01, rel=0.05)
-
-
 def test_stamps_since_1970_pass():
     time = np.arange(1001) / 1000
     q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])
