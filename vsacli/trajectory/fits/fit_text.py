@@ -92,9 +92,10 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
                 " frequency there is no motion"
             )
         elif not known.determined:
+            remedy = "record it with less noise, or slower" if part.smooth else "try it with fit: smooth"
             yield (
                 f"{highest} of {label} is not determined by the record to 10 %: its standard deviation is"
-                f" {100 * known.relative:.2g} % of its root mean square; record it with less noise, or slower"
+                f" {100 * known.relative:.2g} % of its root mean square; {remedy}"
             )
 
 
