@@ -89,7 +89,7 @@ def check_feasibility(
     """Say whether ROBOT can execute TRAJECTORY, without computing a result file.
 
     The same computation as invdyn, and the same report. Exit code 0 if every step is feasible, regular and
-    within limits, else 3.
+    within limits, and a record, if there is one, determines that; else 3.
 
     --suggest looks for what would mend it: slower, another stiffness (by a constant, or as a smooth profile),
     another preload, or several of these together, so that every step keeps the near-singular margin and all
