@@ -19,6 +19,10 @@ ROUNDING = 8 * np.finfo(float).eps
 FINEST = 0.01
 """Quantile of the changes of steps that stands for the step of an encoder; smaller ones may be accidents."""
 
+UNRESOLVED = 1e-8
+"""Share of the largest value that no sensor resolves, and no single-precision number; computed columns, such as
+suggested profiles, have errors of solvers of a tenth of it."""
+
 CHUNK = 1024 * BLOCK
 """Samples whose differences are weighted at a time."""
 
@@ -75,8 +79,10 @@ def _differences(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _quantum(values: FloatArray) -> float:
-    """Small changes from step to step that are none of rounding; zero if there are none."""
+    """Small changes from step to step that are none of rounding, or what no sensor resolves if that is more."""
+    largest = float(np.abs(values).max())
     changes = np.abs(np.diff(values, n=2))
-    changes = changes[changes > ROUNDING * np.abs(values).max()]
+    changes = changes[changes > ROUNDING * largest]
     place = int(FINEST * len(changes))
-    return float(np.partition(changes, place)[place]) if len(changes) else 0.0
+    found = float(np.partition(changes, place)[place]) if len(changes) else 0.0
+    return max(found, UNRESOLVED * largest)
