@@ -20,8 +20,8 @@ FINEST = 0.01
 """Quantile of the changes of steps that stands for the step of an encoder; smaller ones may be accidents."""
 
 UNRESOLVED = 1e-8
-"""Share of the largest value that no sensor resolves, and no single-precision number; computed columns, such as
-suggested profiles, have errors of solvers of a tenth of it."""
+"""Share of the largest value that no sensor resolves, and no single-precision number; columns that were
+computed, such as suggested profiles, have errors of solvers of a fifth of it."""
 
 CHUNK = 1024 * BLOCK
 """Samples whose differences are weighted at a time."""
@@ -79,7 +79,7 @@ def _differences(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _quantum(values: FloatArray) -> float:
-    """Small changes from step to step that are none of rounding, or what no sensor resolves if that is more."""
+    """Small changes from step to step that are none of rounding, or what no sensor resolves if it is more."""
     largest = float(np.abs(values).max())
     changes = np.abs(np.diff(values, n=2))
     changes = changes[changes > ROUNDING * largest]
