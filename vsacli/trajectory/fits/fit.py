@@ -207,7 +207,9 @@ class Fit:
         basis = local_basis(part.spline.t, self.degree, probes, order + 1)
         found = units * np.sqrt(np.mean(of_derivatives(posterior, basis)[order, order]))
         size = np.sqrt(np.mean(part.spline(probes, nu=order) ** 2, axis=0))
-        return np.asarray(units * np.maximum(1.0, known.relative * size / found))
+        # relative to the derivative without this error, which the size of this spline's includes
+        share = known.relative / np.hypot(1.0, known.relative)
+        return np.asarray(units * np.maximum(1.0, share * size / found))
 
 
 def join(
