@@ -37,9 +37,10 @@ ACCEPTED = 0.25
 """Largest relative deviation of the highest derivative with which a resolution is accepted. Motions whose
 fast parts pass for noise had 0.3 and more."""
 
-CLOSE = 100.0
+CLOSE = 3.0
 """Factor above the least residual of all resolutions, up to which one is considered if none is accepted. A
-coarse one may state the least deviation of a derivative that it does not see."""
+coarse one may state the least deviation of a derivative that it does not see: with a factor of 100, steps of
+velocity smoothed over 50 ms were missed by 0.03 rad, and motor torques 17 % off where 7 % were stated."""
 
 PROBES = 16384
 """Samples, about, of which a residual is taken."""
