@@ -184,9 +184,10 @@ def test_a_rigid_robot_needs_a_velocity_that_vanishes_at_the_ends() -> None:
 
 
 def write_csv(*columns: str) -> None:
-    """A smooth table whose column number k is 900 + k at the start."""
+    """A smooth table whose column number k is 900 + k at the start, or a thousandth of it if of positions."""
     time = np.linspace(0, 1, 11)
-    table = np.column_stack([time, *(900 + k + time**2 for k in range(len(columns)))])
+    sizes = [1e-3 if column.endswith("q") or column.startswith("q") else 1.0 for column in columns]
+    table = np.column_stack([time, *(size * (900 + k + time**2) for k, size in enumerate(sizes))])
     lines = [",".join(["time", *columns]), *(",".join(map(str, row)) for row in table.tolist())]
     Path("move.csv").write_text("\n".join(lines) + "\n")
 

@@ -142,6 +142,12 @@ class RunUncertainty:
         ]
 
 
+def _sum(before: FloatArray, terms: FloatArray) -> FloatArray:
+    """One term after the other, so that rounding does not depend on how they are divided into blocks."""
+    total: FloatArray = np.cumsum(np.concatenate([before[None], terms]), axis=0)[-1]
+    return total
+
+
 class _Powers:
     """Sums over steps of the squares of a variable and of its deviation, (joints[, 2])."""
 
@@ -159,8 +165,8 @@ class _Powers:
         """Merge steps, (samples, joints[, 2]); those without a value do not count."""
         exists = np.isfinite(values)
         self._count += np.sum(exists, axis=0)
-        self._values += np.sum(values**2, axis=0, where=exists)
-        self._deviations += np.sum(deviations**2, axis=0, where=exists)
+        self._values = _sum(self._values, np.where(exists, values, 0.0) ** 2)
+        self._deviations = _sum(self._deviations, np.where(exists, deviations, 0.0) ** 2)
         self._peak = np.maximum(self._peak, np.max(np.abs(values), axis=0, where=exists, initial=0.0))
         self._largest = np.maximum(self._largest, np.max(deviations, axis=0, where=exists, initial=0.0))
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray
-from vsacli.base.signals import orders_of_derivation
+from vsacli.base.signals import COMMANDED, Signal, orders_of_derivation
 from vsacli.base.variables import UNCERTAIN, Block
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
@@ -138,8 +138,19 @@ def _deviations(robot: Robot, trajectory: Trajectory, elapsed: FloatArray, engin
     for signal, spread in spreads.items():
         for name, rows in zip(signal.names, np.moveaxis(spread, 1, 0), strict=True):
             if name in estimates[signal].estimated:
+                rows[_ignored(robot, signal)] = np.nan
                 found[name], unstated[name] = rows.T, ~estimates[signal].stated
     return _Part(found, unstated)
+
+
+def _ignored(robot: Robot, signal: Signal) -> list[int]:
+    """The joints that do not take a signal, although there may be a column of it for them."""
+    commanded = signal.key in COMMANDED
+    return [
+        index
+        for index, joint in enumerate(robot.joints)
+        if commanded and signal.key not in joint.actuator.commanded
+    ]
 
 
 def _spreads(covariance: FloatArray) -> FloatArray:

@@ -51,6 +51,10 @@ LEAST_SQUARES_GAIN = {7: (1.0, 1.823, 4.484, 12.11, 34.37), 5: (1.0, 1.829, 4.53
 of a least-squares spline near many such samples, far from its ends."""
 
 
+FEWEST_JUDGED = 32
+"""Samples from which on differences tell noise from motion; through fewer, as of a table of set points, the
+spline goes whatever they are."""
+
 SMALLEST_SHARE = 1e-3
 """Share of the largest component's derivative against which smaller ones are measured: what is below may be
 nothing but rounding of a component that rests."""
@@ -100,6 +104,7 @@ def fit_samples(
         parts += _least_squares(time, values, present, degree)
     elif present.size:
         parts.append(_interpolation(time, values, present, degree))
+    if present.size and method != LEAST_SQUARES and len(time) >= FEWEST_JUDGED:
         typical = typical_noise(time, values[present], degree + 1)
         expected = np.where(np.isnan(given[present]), typical, given[present])
         record.spoilt[present] = _spoilt(parts[0].spline, time, values[present], expected, order)
