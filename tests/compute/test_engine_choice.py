@@ -174,7 +174,7 @@ def test_compiler_that_is_not_taken(command: str, reason: str, monkeypatch: pyte
 @pytest.mark.parametrize("folder", ["/nonexistent", "/dev/full"])
 def test_without_a_folder_for_temporary_files(folder: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(tempfile, "tempdir", folder)
-    reason = "the folder for temporary files cannot be used: "
+    reason = "folder for temporary files: cannot be used: "
     assert reason in choose("auto", KERNEL, 10_000_000).reason
     with pytest.raises(InputError, match=reason):
         choose("c", KERNEL, 1)

@@ -15,6 +15,7 @@ from samples.plants import all_rigid, elastic, rigid, with_actuators
 from samples.robots import random_robot, vsa_3r, with_gravity
 from samples.shipped import shipped_run
 from samples.simulated import short_motion
+from scipy.integrate import trapezoid
 from scipy.interpolate import make_interp_spline
 
 from vsacli import inverse_dynamics
@@ -208,7 +209,7 @@ def test_what_is_spent_less_what_is_recovered_is_the_work():
         work = np.nansum(result.motor_energy[-1, index])
         assert joint.energy.spent - joint.energy.recovered == pytest.approx(work, abs=1e-10)
         positive = np.fmax(result.motor_power[:, index], 0)
-        spent = np.nansum(np.trapezoid(positive, result.time, axis=0))
+        spent = np.nansum(trapezoid(positive, result.time, axis=0))
         assert joint.energy.spent == pytest.approx(spent, rel=1e-5)  # the trapezoidal rule at 1 kHz
 
 

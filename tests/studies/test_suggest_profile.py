@@ -18,6 +18,7 @@ from samples.remedies import (
     rest_to_rest,
 )
 from samples.robots import vsa_3r
+from scipy.integrate import trapezoid
 
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.analysis.run import Run, inverse_dynamics
@@ -81,7 +82,7 @@ def test_no_other_function_between_the_bounds_is_smaller():
     bounds = Bounds(time, bump(time, 30.0, centre, 0.4), np.full_like(time, np.inf))
 
     def size(values, bend):
-        return np.trapezoid(values**2 + smoothing**4 * bend**2, time)
+        return trapezoid(values**2 + smoothing**4 * bend**2, time)
 
     spline = nearest_spline(bounds, smoothing)
     least = size(spline(time), spline(time, nu=2))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from vsacli.analysis.report import Report
@@ -98,11 +97,12 @@ class Result(Shown, Block):
         Raises:
             StorageError: a file exists and must not be replaced, or the folder cannot be written.
         """
+        from vsacli.base.storage import temporary_folder
         from vsacli.results.plots import plot_stored, save_figures
         from vsacli.results.store.reader import StoredResult
 
-        with TemporaryDirectory(prefix="vsacli-") as place:
-            path = Path(place) / f"{stem}.h5"
+        with temporary_folder() as place:
+            path = place / f"{stem}.h5"
             self.save(path)
             with StoredResult.open(path) as stored:
                 figures = plot_stored(stored)

@@ -39,6 +39,32 @@ def storage_error(path: str | Path, error: OSError) -> StorageError:
     return StorageError(path, f"cannot be written: {reason}; nothing was changed there")
 
 
+@contextlib.contextmanager
+def reporting_temporary_errors() -> Iterator[None]:
+    """Turn an OSError of the enclosed statements into a StorageError about the folder for temporary files."""
+    try:
+        yield
+    except OSError as error:
+        reason = _REASON.get(error.errno or 0, error.strerror or str(error))
+        advice = "name another one by the environment variable TMPDIR"
+        raise StorageError("folder for temporary files", f"cannot be used: {reason}; {advice}") from error
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A new folder, which goes with all that is in it at the end of the context.
+
+    Raises:
+        StorageError: there is no place for one.
+    """
+    from tempfile import TemporaryDirectory
+
+    with contextlib.ExitStack() as stack:
+        with reporting_temporary_errors():
+            folder = stack.enter_context(TemporaryDirectory(prefix="vsacli-", ignore_cleanup_errors=True))
+        yield Path(folder)
+
+
 def check_target(path: str | Path, *, overwrite: bool) -> Path:
     """The file that `path` means, links followed, if it may be written.
 

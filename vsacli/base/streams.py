@@ -10,6 +10,8 @@ from contextvars import ContextVar
 from functools import cache
 from typing import IO
 
+from vsacli.base.storage import reporting_temporary_errors
+
 STANDARD = "-"
 """Stands for the stream; a file of that name is `./-`."""
 
@@ -23,7 +25,8 @@ def place_of(path: str | os.PathLike[str]) -> str:
     Standard input has one, since it can be read only once, and whatever `reading_copies` says.
 
     Raises:
-        OSError: standard input is closed, or there is no room for the copy.
+        OSError: standard input is closed, or cannot be read.
+        StorageError: there is no room for the copy.
     """
     name = os.fspath(path)
     copies = _copies.get()
@@ -50,7 +53,8 @@ def _standard_input() -> IO[bytes]:
 
     if sys.stdin is None:
         raise OSError(0, "standard input is closed")
-    copy = tempfile.NamedTemporaryFile(prefix="vsacli-")  # noqa: SIM115 - it lasts as long as the process
+    with reporting_temporary_errors():
+        copy = tempfile.NamedTemporaryFile(prefix="vsacli-")  # noqa: SIM115 - it lasts as long as the process
     shutil.copyfileobj(sys.stdin.buffer, copy)
     copy.flush()
     return copy

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy as np
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
+from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.base.streams import reading_copies
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Tell, unheard
@@ -77,13 +77,14 @@ def _reading(inputs: Sequence[StoredInput], path: str | Path) -> Iterator[tuple[
     if not {"robot", "trajectory"} <= roles.keys():
         raise InputError.one("does not say from which files it was computed, so it cannot be repeated", path)
     with ExitStack() as stack:
-        place = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="vsacli-")))
+        place = stack.enter_context(temporary_folder())
         copies = {}
         for number, each in enumerate(inputs):
             if each.content is None:
                 raise InputError.one(f"does not hold {each.path}, so it cannot be repeated", path)
             copies[each.path] = str(place / str(number))
-            Path(copies[each.path]).write_bytes(each.content)
+            with reporting_temporary_errors():
+                Path(copies[each.path]).write_bytes(each.content)
         stack.enter_context(reading_copies(copies))
         yield roles["robot"], roles["trajectory"]
 

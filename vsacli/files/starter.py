@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.slow_down import smallest_slow_down
@@ -21,6 +20,9 @@ def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str
         robot: the robot.
         text: of the file, with the usual duration.
         usual: duration, s.
+
+    Raises:
+        StorageError: there is no room for a temporary file.
     """
     acceptance, trajectory = Acceptance(robot, NEAR_SINGULAR_MARGIN), _read(text, robot)
     if not acceptance.refused_joints(trajectory).any():
@@ -37,9 +39,10 @@ def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str
 
 
 def _read(text: str, robot: Robot) -> Trajectory:
-    with TemporaryDirectory(prefix="vsacli-") as folder:
-        path = Path(folder) / "starter.yaml"
-        path.write_text(text, encoding="utf-8")
+    with temporary_folder() as folder:
+        path = folder / "starter.yaml"
+        with reporting_temporary_errors():
+            path.write_text(text, encoding="utf-8")
         return load_trajectory(path, robot)
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import StorageError
+from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.compute.engine.cache import LIBRARY, Cache, CacheError, key_of, open_cache
 from vsacli.compute.engine.compiler import TIMEOUT, Compiler, CompilerError, Library
 from vsacli.compute.engine.engines import Kernel, Tell, kernel_program
@@ -164,16 +165,17 @@ def _built(
     source: str, key: str, outputs: int, compiler: Compiler, cache: Cache | None, tell: Tell
 ) -> Library:
     try:
-        with TemporaryDirectory(prefix="vsacli-") as folder:
-            text, library = Path(folder) / "program.c", Path(folder) / LIBRARY
-            text.write_text(source, encoding="utf-8")
+        with temporary_folder() as folder:
+            text, library = folder / "program.c", folder / LIBRARY
+            with reporting_temporary_errors():
+                text.write_text(source, encoding="utf-8")
             compiler.build(text, library)
             loaded = Library(library, outputs)
             if cache is not None:
                 _keep(cache, key, library, tell)
             return loaded
-    except OSError as error:
-        raise CompilerError(f"the folder for temporary files cannot be used: {error.strerror}") from None
+    except StorageError as error:
+        raise CompilerError(str(error)) from None
 
 
 def _keep(cache: Cache, key: str, library: Path, tell: Tell) -> None:

@@ -51,8 +51,10 @@ class Change:
     @property
     def rms(self) -> float:
         """Root of the mean square over time, N m/rad (N/m)."""
+        from scipy.integrate import trapezoid
+
         duration = self.time[-1] - self.time[0]
-        return math.sqrt(float(np.trapezoid(self.rows[0] ** 2, self.time)) / duration)
+        return math.sqrt(float(trapezoid(self.rows[0] ** 2, self.time)) / duration)
 
 
 def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: float | None) -> Change:
