@@ -73,7 +73,7 @@ def test_the_example_does_not_care(case: tuple[str, str], report: str, tmp_path:
 
 
 @needs_compiler
-@pytest.mark.parametrize("cache", ["relative", "/dev/null/cache"])
+@pytest.mark.parametrize("cache", ["relative", slow("/dev/null/cache")])
 def test_compiled_code_without_a_cache_folder_of_ones_own(cache: str, tmp_path: Path) -> None:
     home = tmp_path / "home"
     home.mkdir()
@@ -94,7 +94,7 @@ def closing(*streams: int) -> Any:
     return close
 
 
-@pytest.mark.parametrize("streams", [(0,), (1,), (2,), (1, 2), (0, 1, 2)])
+@pytest.mark.parametrize("streams", [slow((0,)), (1,), (2,), slow((1, 2)), slow((0, 1, 2))], ids=str)
 @pytest.mark.parametrize("command", ["invdyn", slow("invdyn --plot"), slow("check-feasibility")])
 def test_closed_streams(command: str, streams: tuple[int, ...], tmp_path: Path) -> None:
     code, out, err = run(*COMMANDS[command], folder=tmp_path, preexec_fn=closing(*streams))
@@ -122,7 +122,7 @@ NO_TEMPORARY = "folder for temporary files: cannot be used: No usable temporary 
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (COMMANDS["invdyn"], 4, "r.h5: cannot be written: "),
+        slow(COMMANDS["invdyn"], 4, "r.h5: cannot be written: "),
         (COMMANDS["check-feasibility --plot"], 4, NO_TEMPORARY),
         (("new", "trajectory", "--robot", ROBOT), 4, NO_TEMPORARY),
         (("validate", "-"), 4, NO_TEMPORARY),
