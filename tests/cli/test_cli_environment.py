@@ -39,7 +39,7 @@ COMMANDS: dict[str, tuple[object, ...]] = {
     "check-feasibility --plot": (*EXAMPLE, "--plot", "figures"),
 }
 
-QUICK = {("a notebook's terminal", "invdyn --plot"), ("no home", "invdyn"), ("ASCII", "check-feasibility")}
+QUICK = {("a notebook's terminal", "invdyn --plot"), ("ASCII", "check-feasibility")}
 
 UNWANTED = ("Traceback", "Warning", "bug")
 """In what is printed, the last as `vsacli` says it."""
@@ -94,7 +94,7 @@ def closing(*streams: int) -> Any:
     return close
 
 
-@pytest.mark.parametrize("streams", [slow((0,)), (1,), (2,), slow((1, 2)), slow((0, 1, 2))], ids=str)
+@pytest.mark.parametrize("streams", [slow((0,)), (1,), slow((2,)), slow((1, 2)), slow((0, 1, 2))], ids=str)
 @pytest.mark.parametrize("command", ["invdyn", slow("invdyn --plot"), slow("check-feasibility")])
 def test_closed_streams(command: str, streams: tuple[int, ...], tmp_path: Path) -> None:
     code, out, err = run(*COMMANDS[command], folder=tmp_path, preexec_fn=closing(*streams))

@@ -168,7 +168,7 @@ def test_estimate_is_that_of_dense_algebra(degree):
     stacked = np.vstack([x, np.sqrt(penalties)[:, None] * penalty])
     triangle = np.linalg.qr(stacked, mode="r")
     inverse = np.linalg.inv(triangle)
-    coefficients = np.linalg.lstsq(stacked, np.append(y, np.zeros(len(penalty))))[0]
+    coefficients = np.linalg.lstsq(stacked, np.append(y, np.zeros(len(penalty))), rcond=None)[0]
     # rounding, times the condition of the rows, some 1e5
     np.testing.assert_allclose(model.coefficients, coefficients, rtol=0, atol=1e-9)
     rest = np.sum((stacked @ coefficients - np.append(y, np.zeros(len(penalty)))) ** 2)
