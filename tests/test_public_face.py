@@ -161,6 +161,7 @@ def test_a_report_of_another_form_is_refused(result: Result, tmp_path: Path) -> 
     path.unlink()  # it was closed
 
 
+@pytest.mark.slow
 def test_figures_are_those_of_the_command(result: Result, tmp_path: Path) -> None:
     names = ["motion", "motor-torque", "elastic-torque", "energy"]
     assert list(result.plot()) == names

@@ -98,6 +98,7 @@ def test_unknown_format_is_a_usage_error(vsacli, feasible_result):
     assert "'gif' is not one of 'png', 'pdf', 'svg'" in done.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline", "nonsense"])
 def test_the_backend_of_a_notebook_does_not_matter(tmp_path, feasible_result, backend, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", backend)

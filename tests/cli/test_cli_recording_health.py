@@ -62,6 +62,7 @@ def test_gap_frozen_sensor_and_stamps_since_1970(vsacli, recorded, start):
     assert len(health) == 2
 
 
+@pytest.mark.slow
 def test_wrapped_angles_are_unwrapped_on_demand(vsacli, recorded, tmp_path):
     q = positions()
     turned = q + np.array([1.0, 3.1, 0.0])

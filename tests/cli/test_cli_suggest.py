@@ -104,6 +104,7 @@ def test_nothing_is_written_if_nothing_needs_to_change(vsacli, tmp_path, motion)
     assert contents(tmp_path).keys() == {"move.yaml"}
 
 
+@pytest.mark.slow
 def test_nothing_is_written_if_nothing_helps(vsacli, tmp_path, too_soft):
     robot = edited(
         ROBOT,

@@ -145,6 +145,7 @@ def test_torques_of_springs_and_motors_add_up():
     np.testing.assert_allclose(motors.sum(axis=2), result.tau_e, rtol=0, atol=1e-13 * peak)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("c", marks=needs_compiler)])
 @pytest.mark.parametrize("shipped", [("measured_1r", "measured_1r"), ("qbmove_arm_manual", "qbmove_arm")])
 def test_a_link_without_mass_asks_for_no_torque(shipped: tuple[str, str], engine: str) -> None:

@@ -117,6 +117,7 @@ def test_cost_does_not_grow_with_the_samples(monkeypatch):
     assert 0 < counts[0] == counts[1]
 
 
+@pytest.mark.slow
 def test_recording_is_followed_from_breakpoint_to_breakpoint():
     trajectory = recorded(21, noise=1e-3)
     result = integrated(ARM, trajectory)
@@ -135,6 +136,7 @@ def test_long_recording_drifts_a_little(monkeypatch):
     assert max(drifts(rough)) > 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("floor", [800.0 * (1 + 2e-9), slow(800.0 + 1e-4)])
 def test_passing_closely_by_goes_on(floor: float):
     trajectory = dipping(floor)

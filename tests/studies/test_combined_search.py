@@ -126,6 +126,7 @@ def unlike():
     return robot.replace("joints.elbow.actuator.preload", worse), trajectory
 
 
+@pytest.mark.slow
 def test_other_preload_comes_last_although_it_is_enough():
     robot, trajectory = unlike()
     remedies = suggest(robot, trajectory, 1e-4).remedies

@@ -60,6 +60,7 @@ def peak_load(robot, trajectory):
     return np.abs(block.tau_e).max(axis=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("duration", "stiffness"), [(4.0, 790.0), (0.5, 850.0), (0.3, 850.0)])
 def test_offset_reaches_the_closed_bound(duration, stiffness):
     robot, trajectory = vsa_3r(), rest_to_rest(duration, stiffness, rate=800 / duration)
@@ -96,6 +97,7 @@ def test_deflection_limit_lowers_the_stiffness_to_its_closed_bound():
     assert offsets(robot, still)["swing"] == pytest.approx(ceiling - 950.0, abs=UNIT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("motor", "duration"),
     [slow({"max_torque": 60.0}, 1.0), slow({"max_torque": 20.0}, 4.0), ({"max_torque": 180.0}, 0.55)],
@@ -114,6 +116,7 @@ def test_motor_limit_takes_the_way_that_is_shorter(motor, duration):
     assert not any(with_offset(value) for value in nearer.tolist())
 
 
+@pytest.mark.slow
 def test_steps_between_the_watched_ones_count():
     """Motor torque peaks where a given ddstiffness does, for one step of 8001."""
     motion = rest_to_rest(4.0, rate=2000).block(0, 8001)
@@ -129,6 +132,7 @@ def test_steps_between_the_watched_ones_count():
     assert not accepted(robot, trajectory, MARGIN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "spring",
     [
@@ -152,6 +156,7 @@ def test_prismatic_joint_has_its_unit():
     assert found.stiffness_offset.sentence.endswith(" N/m")
 
 
+@pytest.mark.slow
 def test_raised_and_lowered_joints_in_one_sentence():
     robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 900.0)))
     found = suggest(robot, rest_to_rest(4.0, (800.0, 950.0, 800.0)))
@@ -161,6 +166,7 @@ def test_raised_and_lowered_joints_in_one_sentence():
     )
 
 
+@pytest.mark.slow
 def test_corridor_and_stiffness_limit_exclude_each_other():
     robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 820.0)))
     assert reason(robot, rest_to_rest(4.0, (850.0, 790.0, 850.0))) == (
@@ -189,6 +195,7 @@ def test_limits_of_the_motion_are_none_of_the_stiffness(limits, expected):
     assert reason(robot, rest_to_rest(1.0)) == expected
 
 
+@pytest.mark.slow
 def test_motor_velocity_that_no_stiffness_brings_down():
     robot = changed(BASE, motor={"max_velocity": 1.0})
     assert reason(robot, rest_to_rest(1.0)).startswith(

@@ -238,6 +238,7 @@ def test_limits_of_the_motion_are_none_of_the_stiffness():
     )
 
 
+@pytest.mark.slow
 def test_motor_limit_that_no_profile_keeps():
     robot = changed(BASE, motor={"max_velocity": 1.0})
     assert reason(robot, rest_to_rest(1.0)).startswith(

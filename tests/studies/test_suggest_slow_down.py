@@ -47,6 +47,7 @@ def test_fast_motion_of_the_paper_ends_at_its_threshold_duration():
     assert 0.5 * factor == pytest.approx(0.53557, abs=0.5 * STEP + 1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("duration", [0.5, slow(0.4)])
 def test_slow_down_agrees_with_a_dense_scan(duration):
     robot = vsa_3r()
@@ -119,6 +120,7 @@ def test_motion_that_passes_the_horizontal_while_braking_must_be_neither_fast_no
     assert not accepted(robot, trajectory.stretched(3 * factor))
 
 
+@pytest.mark.slow
 def test_steps_between_the_watched_ones_count():
     """A dip of the stiffness three steps wide, in 20 001 steps of which a thousand are watched at first."""
     duration, at = 0.5, 8123
@@ -155,6 +157,7 @@ def test_wrench_counts_and_is_stretched_too():
     check_smallest(vsa_3r(), loaded, factor)
 
 
+@pytest.mark.slow
 def test_wrench_between_the_watched_steps_counts():
     """A push one step long, in 8001 steps of which a thousand are watched at first."""
     motion = rest_to_rest(0.5, 870.0, rate=16_000).block(0, 8001)

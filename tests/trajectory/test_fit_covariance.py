@@ -43,6 +43,7 @@ def test_local_basis_is_that_of_scipy(degree, orders):
         np.testing.assert_allclose(rows[i] / scale, expected[:, i, within] / scale, rtol=0, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [LEAST_SQUARES, INTERPOLATE])
 @pytest.mark.parametrize(("degree", "orders"), [(7, 5), (5, 3)])
 def test_independent_noise_is_carried_to_derivatives(method, degree, orders):

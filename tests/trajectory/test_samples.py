@@ -205,6 +205,7 @@ sizes = st.floats(-300, 99).map(lambda power: 10.0**power)
 scales = st.floats(-29, 28).map(lambda power: 10.0**power)
 
 
+@pytest.mark.slow
 @settings(deadline=None)  # the first imports SciPy
 @given(
     seed=st.integers(0, 1000),

@@ -220,6 +220,7 @@ def test_short_records(count):
     assert np.abs(fit.at(time, 1)[0, 1] - 0.3).max() < 100 * EPS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 1e-5])
 def test_vibration_that_may_be_motion_is_kept_by_default_and_said(noise):
     time = np.arange(10001) / 1000
