@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple, Self
 
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
 from vsacli.dynamics.inverse import check_fit
@@ -21,6 +22,10 @@ AS_IT_IS = Combination(1.0, {}, {}, 0.0)
 
 SIMPLER_SHARE = 1.05
 """How much larger a remedy with fewer kinds of change may be and still be worth more."""
+
+STRICTER = (1.0, 1.001, 1.01)
+"""Factors of the margin with which is searched, one after the other: what has the margin at the steps may
+fall short of it between them, by up to 0.8 % of itself where this was first seen."""
 
 FASTER_SHARE = 0.8
 """Share of the extra time of a remedy that another may take to be worth its while although it is larger."""
@@ -44,23 +49,50 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
     check_fit(robot, trajectory)
     check_near_singular(near_singular)
     acceptance = Acceptance(robot, near_singular)
-    if not acceptance.refused_joints(trajectory).any():
+    asked = Task(acceptance, trajectory)
+    as_it_is = Remedy(0.0, robot, trajectory)
+    if not acceptance.refused_joints(trajectory).any() and asked.confirms(as_it_is):
         return Suggestions(near_singular)
     if reasons := acceptance.position_reasons(trajectory):
         none = NotPossible(reasons)
         return Suggestions(near_singular, none, none, none)
-    task = Task(acceptance, trajectory)
-    slower = _attempt(lambda: task.with_constants(_slow_down(task)))
-    offset = _attempt(lambda: task.with_constants(task.constants()))
-    profile = _attempt(lambda: task.with_profiles(AS_IT_IS))
-    alone = [found for found in (slower, offset, profile) if isinstance(found, Remedy)]
+    for factor in STRICTER:
+        found = _Found.of(replace(asked, acceptance=Acceptance(robot, factor * near_singular)))
+        chosen, failed = _worth_choosing(found.remedies, asked)
+        if not failed:
+            break
     return Suggestions(
         near_singular,
-        slow_down=_part(slower, "slow_down"),
-        stiffness_offset=_part(offset, "stiffness_offset"),
-        stiffness_profile=_part(profile, "stiffness_profile"),
-        remedies=tuple(_worth_choosing([*alone, *_combined(task)], task)),
+        slow_down=_part(found.slower, "slow_down", failed),
+        stiffness_offset=_part(found.offset, "stiffness_offset", failed),
+        stiffness_profile=_part(found.profile, "stiffness_profile", failed),
+        remedies=tuple(chosen),
     )
+
+
+class _Found(NamedTuple):
+    """What a search finds: each kind of change by itself, and what may take several."""
+
+    slower: Remedy | NotPossible
+    offset: Remedy | NotPossible
+    profile: Remedy | NotPossible
+    combined: list[Remedy]
+
+    @classmethod
+    def of(cls, task: Task) -> Self:
+        """What mends a task at its steps."""
+        return cls(
+            _attempt(lambda: task.with_constants(_slow_down(task))),
+            _attempt(lambda: task.with_constants(task.constants())),
+            _attempt(lambda: task.with_profiles(AS_IT_IS)),
+            list(_combined(task)),
+        )
+
+    @property
+    def remedies(self) -> list[Remedy]:
+        """All of them."""
+        alone = [each for each in (self.slower, self.offset, self.profile) if isinstance(each, Remedy)]
+        return [*alone, *self.combined]
 
 
 def _slow_down(task: Task) -> Combination:
@@ -75,9 +107,13 @@ def _attempt(find: Callable[[], Remedy]) -> Remedy | NotPossible:
         return NotPossible(error.reasons)
 
 
-def _part(found: Remedy | NotPossible, name: str) -> Any:
+def _part(found: Remedy | NotPossible, name: str, failed: Sequence[Remedy]) -> Any:
     """The only change of a remedy, or why there is none."""
-    return found if isinstance(found, NotPossible) else getattr(found, name)
+    if isinstance(found, NotPossible):
+        return found
+    if any(found is each for each in failed):
+        return NotPossible(("what keeps every limit at the steps exceeds one between them",))
+    return getattr(found, name)
 
 
 def _combined(task: Task) -> Iterator[Remedy]:
@@ -101,13 +137,18 @@ def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Re
             yield task.with_profiles(found)
 
 
-def _worth_choosing(candidates: Iterable[Remedy], task: Task) -> list[Remedy]:
-    """Those that a run confirms and no simpler one makes superfluous; with another preload last."""
+def _worth_choosing(candidates: Iterable[Remedy], task: Task) -> tuple[list[Remedy], list[Remedy]]:
+    """Those that a run confirms and no simpler one makes superfluous, with another preload last.
+
+    Returns:
+        These, and those that a run does not confirm, since they fall short between the steps.
+    """
     chosen: list[Remedy] = []
+    failed: list[Remedy] = []
     for remedy in sorted(candidates, key=lambda each: (len(each.kinds), each.size)):
-        if not any(_superfluous(remedy, beside) for beside in chosen) and task.confirms(remedy):
-            chosen.append(remedy)
-    return sorted(chosen, key=lambda each: (each.preload is not None, each.size))
+        if not any(_superfluous(remedy, beside) for beside in chosen):
+            (chosen if task.confirms(remedy) else failed).append(remedy)
+    return sorted(chosen, key=lambda each: (each.preload is not None, each.size)), failed
 
 
 def _superfluous(remedy: Remedy, beside: Remedy) -> bool:
