@@ -21,7 +21,7 @@ ROW = re.compile(r"^\| `(?P<entry>\w+(?:\.\w+)?)` \| .+ \|$", re.MULTILINE)
 HOMES = {"yaml": "documents", "h5py": "results.store", "matplotlib": "results.plots", "click": "cli"}
 """Libraries that only one folder may import."""
 
-HEAVY = ("numpy", "scipy", "matplotlib", "h5py")
+HEAVY = ("numpy", "scipy", "matplotlib", "h5py", "hashlib")
 
 NOT_FOR_THE_MAIN_JOB = (
     *("scipy", "matplotlib", "numpy.ma", "numpy.polynomial", "numpy.typing"),

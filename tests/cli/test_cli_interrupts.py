@@ -29,20 +29,18 @@ def allow_interrupts():
         signal.signal(number, signal.SIG_DFL)
 
 
+def started(*command, folder, before=allow_interrupts, **options):
+    """A process in a folder, whose standard streams are read as text."""
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(list(command), cwd=folder, preexec_fn=before, **{**pipes, **options})
+
+
 @pytest.fixture
 def writing(tmp_path):
     """A run of a million samples that writes r.h5, and is in the middle of it."""
     seven_joint_motion(tmp_path / "long.yaml", rate=333_333)
     arguments = [SEVEN_JOINTS, "long.yaml", "-o", "r.h5", "--variables", "tau_motor,flags", "--overwrite"]
-    process = subprocess.Popen(
-        [COMMAND, "invdyn", *arguments],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=allow_interrupts,
-    )
-    with process:
+    with started(COMMAND, "invdyn", *arguments, folder=tmp_path) as process:
         deadline = time.monotonic() + PATIENCE
         while sum(path.stat().st_size for path in temporaries(tmp_path)) < 5_000_000:  # bytes, of 130 MB
             assert time.monotonic() < deadline, "nothing is written"
@@ -90,19 +88,13 @@ def test_killed_run_leaves_the_target_and_does_not_disturb_the_next(tmp_path, ta
     assert installed("invdyn", ROBOT, motion, "-o", "r.h5", "--overwrite", folder=tmp_path).returncode == 0
     with h5py.File(tmp_path / "r.h5") as file:
         assert file.attrs["complete"] == 1
+    assert not temporaries(tmp_path)  # the next run has swept what was left
 
 
 def test_interrupt_without_a_file(tmp_path):
     seven_joint_motion(tmp_path / "long.yaml", rate=3_333_333)
-    process = subprocess.Popen(
-        [COMMAND, "check-feasibility", SEVEN_JOINTS, "long.yaml", "-v"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=allow_interrupts,
-    )
-    with process:
+    command = [COMMAND, "check-feasibility", SEVEN_JOINTS, "long.yaml", "-v"]
+    with started(*command, folder=tmp_path) as process:
         assert process.stderr.readline().startswith("lwr-7r-vsa: 7 joints;")  # the inputs are read
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE)
@@ -111,15 +103,9 @@ def test_interrupt_without_a_file(tmp_path):
 
 def test_signals_that_the_parent_ignores_stay_ignored(tmp_path, motion):
     """As under `nohup`: signals from 0.05 s on, past the start of Python, change nothing."""
-    process = subprocess.Popen(
-        [COMMAND, "invdyn", ROBOT, motion, "-o", "r.h5"],
-        cwd=tmp_path,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=ignore_signals,
-    )
-    with process:
+    command = [COMMAND, "invdyn", ROBOT, motion, "-o", "r.h5"]
+    nowhere = subprocess.DEVNULL
+    with started(*command, folder=tmp_path, before=ignore_signals, stdout=nowhere) as process:
         while process.poll() is None:
             time.sleep(0.05)
             for number in ENDINGS:
@@ -135,14 +121,8 @@ def ignore_signals():
 @pytest.mark.parametrize("imported", ["click.core", "numpy.linalg"])
 def test_interrupt_in_the_first_instants_is_quiet(tmp_path, motion, imported):
     """It comes as soon as a module has been imported, which Python is told to say."""
-    process = subprocess.Popen(
-        [sys.executable, "-X", "importtime", "-m", "vsacli", "invdyn", ROBOT, motion, "-o", "r.h5"],
-        cwd=tmp_path,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=allow_interrupts,
-    )
-    with process:
+    command = [sys.executable, "-X", "importtime", "-m", "vsacli", "invdyn", ROBOT, motion, "-o", "r.h5"]
+    with started(*command, folder=tmp_path, stdout=None) as process:
         while not process.stderr.readline().rstrip().endswith(f" {imported}"):
             assert process.poll() is None, "the module is not imported"
         process.send_signal(signal.SIGINT)

@@ -80,6 +80,12 @@ def test_what_differs_is_told_with_its_amount(vsacli: Any) -> None:
     ]
 
 
+def test_a_result_is_known_by_what_it_holds(vsacli: Any) -> None:
+    assert vsacli("invdyn", ROBOT, REST_TO_REST, "-o", "result", "-q").code == 0
+    done = vsacli("validate", "result", "--recompute", "-q")
+    assert (done.code, done.out) == (0, "result: computed again, equal bit for bit\n")
+
+
 def test_engine_and_options_are_on_record(vsacli: Any) -> None:
     assert vsacli("invdyn", ROBOT, REST_TO_REST, "--engine", "numpy", "-o", "r.h5", "-q").code == 0
     with StoredResult.open("r.h5") as result:

@@ -35,8 +35,7 @@ def reporting_storage_errors(path: str | Path) -> Iterator[None]:
 
 def storage_error(path: str | Path, error: OSError) -> StorageError:
     """The sentence for an operating system error met while writing `path`."""
-    reason = _REASON.get(error.errno or 0, error.strerror or str(error))
-    return StorageError(path, f"cannot be written: {reason}; nothing was changed there")
+    return StorageError(path, f"cannot be written: {_reason(error)}; nothing was changed there")
 
 
 @contextlib.contextmanager
@@ -45,9 +44,9 @@ def reporting_temporary_errors() -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        reason = _REASON.get(error.errno or 0, error.strerror or str(error))
         advice = "name another one by the environment variable TMPDIR"
-        raise StorageError("folder for temporary files", f"cannot be used: {reason}; {advice}") from error
+        message = f"cannot be used: {_reason(error)}; {advice}"
+        raise StorageError("folder for temporary files", message) from error
 
 
 @contextlib.contextmanager
@@ -102,6 +101,10 @@ def check_free_space(path: str | Path, size: int) -> None:
             f"needs {size / 1e6:.0f} MB, but the disk has {free / 1e6:.0f} MB left; "
             "free some space, or store fewer variables with --variables",
         )
+
+
+def _reason(error: OSError) -> str:
+    return _REASON.get(error.errno or 0, error.strerror or str(error))
 
 
 def already_there(path: str | Path) -> StorageError:

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.base.outputs import Outputs, Staged
 from vsacli.cli.command_parts import example, overwrite_option, result_line
 from vsacli.cli.console import Talk, talk_options
 
 if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs, Staged
     from vsacli.results.plots import FigureFiles
     from vsacli.results.store.reader import StoredResult
 
@@ -44,6 +44,8 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
     <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid joint by
     joint.
     """
+    from vsacli.base.outputs import Outputs
+
     with Outputs(overwrite=overwrite, inputs=files) as outputs:
         if len(files) == 1:
             _draw_file(Path(files[0]), Path(folder), file_format, outputs, talk)
