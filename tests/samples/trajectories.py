@@ -20,6 +20,7 @@ FIRM = "stiffness: {type: constant, value: 9000}\n"
 VIA = "position:\n  type: via\n  degree: 7\n  points: [0, {arm: 60 deg, slide: 0.2}, [1, 0.1]]\n"
 SOFTENING = "stiffness:\n  type: via\n  degree: 3\n  points: [9000, [900, 8000], 9000]\n"
 SINUSOIDS = "position:\n  type: sinusoids\n  frequency: 0.5\n  offset: {arm: 30 deg, slide: 0.1}\n"
+SWINGING = "stiffness:\n  type: sinusoids\n  frequency: 0.25\n  offset: [900, 8000]\n"
 STEPS = "stiffness:\n  type: steps\n  degree: 5\n  levels: [9000, [900, 8000], 9500]\n"
 PUSH = (
     "wrench:\n  type: steps\n  frame: base\n  degree: 5\n  levels: [[0, 0, 0, 0, 0, 0], [1, 2, 3, 4, 5, 6]]\n"

@@ -24,6 +24,7 @@ from samples.trajectories import (
     SOFTENING,
     STANDING,
     STEPS,
+    SWINGING,
     VIA,
     load,
     problems,
@@ -90,6 +91,27 @@ def test_a_ramp_lets_sinusoids_begin_and_end_at_rest():
     np.testing.assert_array_equal(ends.q, [[math.radians(30), 0.1]] * 2)
     for derivative in (ends.dq, ends.ddq, ends.d3q, ends.d4q):
         assert not derivative.any()
+
+
+def test_a_stiffness_swings_within_a_ramp():
+    swing = SWINGING + "  sine: [{arm: 300, slide: 0}, [0, 2000]]\n  ramp: 1\n"
+    trajectory = load(LASTING + VIA + swing)
+    commanded = trajectory.at(np.array([0.0, 1.0, 1.5, 2.5, 4.0])).commanded
+    half = math.sqrt(0.5)
+    arm, slide = commanded["stiffness"].T
+    np.testing.assert_allclose(arm, [900, 1200, 900 + 300 * half, 900 - 300 * half, 900], rtol=1e-14)
+    np.testing.assert_allclose(slide, [8000, 8000, 6000, 10000, 8000], rtol=1e-14)
+    for name in ("dstiffness", "ddstiffness"):
+        assert not commanded[name][[0, -1]].any()
+
+
+def test_only_joints_with_a_stiffness_swing():
+    robot = load_robot(ROOT / "robots" / "mixed_3r.yaml")
+    swing = "stiffness: {type: sinusoids, frequency: 1, offset: 900, sine: [{elbow: 50}], cosine: [20]}\n"
+    Path("move.yaml").write_text(LASTING + STANDING + swing)
+    stiffness = load_trajectory("move.yaml", robot).at(np.array([0.25])).commanded["stiffness"][0]
+    np.testing.assert_allclose(stiffness[np.isfinite(stiffness)], [950])
+    assert np.isnan(stiffness).sum() == 2
 
 
 def test_a_sequence_goes_on_where_it_was():

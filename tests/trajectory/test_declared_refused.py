@@ -17,6 +17,7 @@ from samples.trajectories import (
     SOFTENING,
     STANDING,
     STEPS,
+    SWINGING,
     VIA,
     load,
     problems,
@@ -122,6 +123,19 @@ CASES = {
     "too long a ramp": (
         LASTING + SINUSOIDS + "  sine: [1]\n  ramp: 2.5\n" + FIRM,
         "10: position.ramp: must take at most half of the 4 s, not 2.5 s",
+    ),
+    "a stiffness that swings below zero": (
+        LASTING + STANDING + SWINGING + "  sine: [{arm: 850, slide: 0}, 400]\n",
+        "9: stiffness.offset of joint arm: the sum falls to -182.7 after 3.326 s, but must stay positive; "
+        "take one above 1082.68, or smaller amplitudes",
+    ),
+    "a stiffness that swings to zero": (
+        LASTING + STANDING + SWINGING + "  cosine: [[900, 0]]\n",
+        "9: stiffness.offset of joint arm: the sum falls to 0 after 2.000 s, but must stay positive",
+    ),
+    "a stiffness that swings about zero": (
+        LASTING + STANDING + SWINGING.replace("900", "0") + "  cosine: [[1, 0]]\n",
+        "9: offset of joint arm: must be positive, not 0",
     ),
     "no start": (
         HEAD + SEQUENCE + DWELL + ON + FIRM,

@@ -10,7 +10,7 @@ import pytest
 import sympy
 
 from vsacli.base.errors import InputError
-from vsacli.base.signals import POSITION
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 
 EPS = np.finfo(float).eps
@@ -22,9 +22,9 @@ COSINE = ((0.5, 0.0), (0.0, -0.25), (0.125, 0.0625))
 TIMES = (0.25, 0.5, 1.0, 2.0, 2.25, 3.875, 6.25, 7.0, 8.0, 8.25)
 
 
-def sinusoids(ramp=0.0, span=SPAN, cycles=CYCLES, sine=SINE, cosine=COSINE):
+def sinusoids(ramp=0.0, span=SPAN, cycles=CYCLES, sine=SINE, cosine=COSINE, signal=POSITION):
     return Sinusoids(
-        signal=POSITION, span=span, cycles=cycles, offset=OFFSET, sine=sine, cosine=cosine, ramp=ramp
+        signal=signal, span=span, cycles=cycles, offset=OFFSET, sine=sine, cosine=cosine, ramp=ramp
     )
 
 
@@ -46,12 +46,14 @@ def derivatives(joint, ramped):
     return [[sympy.lambdify(t, form.diff(t, order), "mpmath") for order in range(5)] for form in forms]
 
 
+@pytest.mark.parametrize("signal", [POSITION, STIFFNESS], ids=lambda signal: signal.key)
 @pytest.mark.parametrize("ramped", [False, True])
 @pytest.mark.parametrize("joint", [0, 1])
-def test_derivatives_are_exact_to_rounding(joint, ramped):
-    rows = sinusoids(0.25 if ramped else 0.0).at(np.array(TIMES))
+def test_derivatives_are_exact_to_rounding(joint, ramped, signal):
+    rows = sinusoids(0.25 if ramped else 0.0, signal=signal).at(np.array(TIMES))
+    assert len(rows) == signal.orders
     forms = derivatives(joint, ramped)
-    for order in range(5):
+    for order in range(signal.orders):
         expected = [float(forms[0 if t < 2.25 else 1 if t <= 6.25 else 2][order](t)) for t in TIMES]
         # a few roundings, of angles up to 38 too
         atol = 60 * EPS * np.abs(expected).max()
@@ -101,6 +103,30 @@ def test_samples_do_not_depend_on_the_block(ramp):
     for size in (1, 7, 64):
         parts = [profile.at(time[start : start + size]) for start in range(0, 501, size)]
         np.testing.assert_array_equal(np.concatenate(parts, axis=2), whole)
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.02, 0.25, 0.4, 0.5])
+@pytest.mark.parametrize("cycles", [0.3, 2, 7.4, 61])
+def test_the_lowest_value_is_that_of_a_dense_scan(cycles, ramp):
+    profile = sinusoids(ramp, cycles=cycles)
+    time = np.linspace(*SPAN, 200_001)
+    values, _, bend, *_ = profile.at(time)
+    lowest = profile.lowest()
+    np.testing.assert_array_equal(profile.at(lowest.at)[0].diagonal(), lowest.value)
+    # between samples 40 us apart, an extreme lies at most h^2/8 |q''| beyond
+    beyond = (8 / 200_000) ** 2 / 8 * 1.01 * np.abs(bend).max(axis=1)
+    assert np.all(lowest.value <= values.min(axis=1) + 20 * EPS)
+    assert np.all(lowest.value >= values.min(axis=1) - beyond - 20 * EPS)
+
+
+def test_a_billion_periods_and_components_without_a_value_have_a_lowest_one():
+    many = sinusoids(ramp=0.5, cycles=1e9).lowest()
+    np.testing.assert_allclose(many.value, sinusoids().lowest().value, rtol=1e-6)
+    one = Sinusoids(
+        signal=STIFFNESS, span=SPAN, cycles=1.0, offset=(9.0, math.nan), sine=((2.0, 1.0),), cosine=()
+    )
+    np.testing.assert_array_equal(one.lowest().value, [7.0, math.nan])
+    assert one.lowest().at[0] == pytest.approx(6.25, abs=1e-6)
 
 
 @pytest.mark.parametrize(

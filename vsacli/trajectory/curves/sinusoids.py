@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -16,6 +16,20 @@ from vsacli.trajectory.curves.piecewise import stepwise
 
 RAMP_DEGREE = 9
 """Of the rise at both ends: its first four derivatives vanish there."""
+
+SAMPLES_PER_PERIOD = 64
+"""Of the highest harmonic, where a lowest value is looked for, and at least as many in a ramp: an extreme lies
+at most 0.12 % of the amplitudes beyond the samples about it."""
+
+HALVINGS = 40
+"""Of the time between two such samples, after which the value at the extreme is exact to rounding."""
+
+
+class Lowest(NamedTuple):
+    """The smallest value of each component, (components,), and when it is taken first, s."""
+
+    value: FloatArray
+    at: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +84,55 @@ class Sinusoids(ClosedForm):
             rows = _product(window.at(time), rows)
         rows[0] += np.array(self.offset)[:, None]
         return rows
+
+    def lowest(self) -> Lowest:
+        """The smallest values over the span."""
+        stretches = [self._sampled_lowest(time) for time in self._searched()]
+        values, times = (np.stack(rows) for rows in zip(*stretches, strict=True))
+        first = np.nan_to_num(values, nan=np.inf).argmin(axis=0), np.arange(self.components)
+        return Lowest(values[first], times[first])
+
+    def _searched(self) -> Iterator[FloatArray]:
+        """Times, in stretches, among which the smallest value is: one period between the ramps, or the whole.
+
+        In a ramp the sum is smaller than a period farther from the middle of the span: the period next to the
+        middle has what all its others have. Both ends have the offset.
+        """
+        first, last = self.span
+        period = (last - first) / self.cycles
+        (_, rise), (fall, _) = self._ramps() or [(first, first), (last, last)]
+        harmonics = max(len(self.sine), len(self.cosine))
+        for low, high in (
+            (rise, min(rise + period, fall)),
+            (max(rise - period, first), rise),
+            (fall, min(fall + period, last)),
+        ):
+            count = math.ceil(SAMPLES_PER_PERIOD * (1 + harmonics * (high - low) / period))
+            yield np.linspace(low, high, count + 1)
+        yield np.array(self.span)
+
+    def _sampled_lowest(self, time: FloatArray) -> Lowest:
+        """The smallest of the values at ascending times and at the extremes next to them."""
+        values = self.at(time)[0]
+        found = Lowest(np.full(self.components, np.nan), np.full(self.components, np.nan))
+        for component in np.flatnonzero(~np.isnan(values[:, 0])).tolist():
+            times = np.union1d(time, self._minima(time, values[component], component))
+            of_component = self.at(times)[0, component]
+            best = of_component.argmin()
+            found.value[component], found.at[component] = of_component[best], times[best]
+        return found
+
+    def _minima(self, time: FloatArray, values: FloatArray, component: int) -> FloatArray:
+        """Times of the smallest values next to samples that no neighbour is below, by bisection."""
+        before = np.concatenate(([np.inf], values[:-1]))
+        after = np.concatenate((values[1:], [np.inf]))
+        near = np.flatnonzero((values < before) & (values <= after))
+        low, high = time[np.maximum(near - 1, 0)], time[np.minimum(near + 1, len(time) - 1)]
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            falling = self.at(middle)[1, component] < 0
+            low, high = np.where(falling, middle, low), np.where(falling, high, middle)
+        return (low + high) / 2
 
     def raised(self, by: Sequence[float]) -> Self:
         """The same profile with a constant added to each component."""

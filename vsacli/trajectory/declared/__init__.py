@@ -18,7 +18,7 @@ _EVERY = (*_JOINTS, "wrench")
 TYPES = {
     "polynomial": ("vsacli.trajectory.declared.polynomial:Polynomial", _EVERY),
     "via": ("vsacli.trajectory.declared.via_points:Via", _JOINTS),
-    "sinusoids": ("vsacli.trajectory.declared.sinusoids:SumOfSinusoids", ("position",)),
+    "sinusoids": ("vsacli.trajectory.declared.sinusoids:SumOfSinusoids", _JOINTS),
     "sequence": ("vsacli.trajectory.declared.sequence:Sequence", ("position",)),
     "steps": ("vsacli.trajectory.declared.steps:Steps", ("commanded", "wrench")),
     "constant": ("vsacli.trajectory.declared.polynomial:Hold", _EVERY),

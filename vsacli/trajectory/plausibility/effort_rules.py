@@ -26,6 +26,9 @@ STIFFNESS_UNITS = (*TOO_SOFT, NEWTON_MILLIMETRES)
 SPRINGS = ("stiff springs", "hardening of springs", "early hardening of springs")
 """Rules of the robot that explain what is found here."""
 
+AMPLITUDES = frozenset(("sine", "cosine"))
+"""Keys of what swings about a stiffness, and is none."""
+
 LOWEST_SHARE = 0.2
 """A smaller share of the lowest stiffness at rest is no soft wish but another unit."""
 
@@ -41,10 +44,10 @@ def _wrenches(facts: Facts, *, forces: bool) -> Iterator[Measured]:
 
 
 def _commanded(facts: Facts) -> Iterator[tuple[Measured, Joint, Corridor]]:
-    """Every stiffness with its joint, and with what the springs give at rest."""
+    """Every stiffness but amplitudes, with its joint, and with what the springs give at rest."""
     for measured, number in facts.of_joints(units.STIFFNESS) if not facts.robot.placeholder else ():
         found = facts.corridors[number]
-        if found is not None:
+        if found is not None and AMPLITUDES.isdisjoint(measured.path):
             ends = {"lower": f"{found.lower:.4g}", "upper": f"{found.upper:.4g}", "unit": measured.unit}
             yield measured._replace(beside=ends), facts.robot.joints[number], found
 

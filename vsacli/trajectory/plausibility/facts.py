@@ -83,12 +83,9 @@ class Facts:
 
     def paced(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
         """The number that the pace follows from, if it is a time or a frequency, with the largest size."""
-        given = [each for each in self.numbers if each.path[-1] == "frequency"]
-        given = given or [
-            each
-            for each in self.numbers
-            if each.quantity == units.TIME and each.path[0] in ("duration", POSITION.key)
-        ]
+        of_motion = [each for each in self.numbers if each.path[0] in ("duration", POSITION.key)]
+        given = [each for each in of_motion if each.path[-1] == "frequency"]
+        given = given or [each for each in of_motion if each.quantity == units.TIME]
         longest = max(given, key=lambda each: each.value, default=None)
         if longest is not None and longest.quantity == quantity:
             joint = int(np.argmax(sizes))
