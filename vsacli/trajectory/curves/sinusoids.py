@@ -18,7 +18,7 @@ RAMP_DEGREE = 9
 """Of the rise at both ends: its first four derivatives vanish there."""
 
 SAMPLES_PER_PERIOD = 64
-"""Of the highest harmonic, where a lowest value is looked for, and at least as many in a ramp: an extreme lies
+"""Of the highest harmonic, where a lowest value is looked for, at least as many in a ramp: an extreme lies
 at most 0.12 % of the amplitudes beyond the samples about it."""
 
 HALVINGS = 40
