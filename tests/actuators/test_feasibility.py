@@ -261,9 +261,9 @@ def test_other_preload_may_reach_less_stiffness_under_heavy_load():
     between = np.array([0.99 * lower[low][0], (lower[low][1] + lower[high][1]) / 2])
     for preload, expected in [(high, [False, True]), (low, [False, False])]:
         actuator = with_preload(joint_with(unlike), preload).actuator
-        assert actuator.other_preload(tau_e, between).tolist() == expected
+        assert actuator.other_preload(tau_e, between, tau_e).tolist() == expected
 
 
 def test_other_preload_does_no_better_where_sides_are_alike():
     alike = springs(ALIKE, ALIKE)
-    assert not alike.other_preload(np.array([100.0]), np.array([810.0])).any()
+    assert not alike.other_preload(np.array([100.0]), np.array([810.0]), np.array([0.0])).any()

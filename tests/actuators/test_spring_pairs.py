@@ -237,7 +237,7 @@ def test_negative_preload_is_the_branch_with_the_sides_exchanged(first: Spring, 
     phi_1, phi_2 = (sign * np.abs(draw(rng, curve, 50)) for sign, curve in ((-1, curve_1), (1, curve_2)))
     tau_e = curve_1.torque(phi_1) + curve_2.torque(phi_2)
     stiffness = curve_1.stiffness(phi_1) + curve_2.stiffness(phi_2)
-    found = springs(law_1, law_2, preload="negative").solve(tau_e, stiffness)
+    found = springs(law_1, law_2, preload="negative").solve(tau_e, stiffness, tau_e)
     regular = margin(stiffness, found.lower, found.upper) > 1e-3
     # As for the positive preload.
     np.testing.assert_allclose(found.phi_1[regular], phi_1[regular], rtol=0, atol=1e-10)

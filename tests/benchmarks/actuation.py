@@ -84,7 +84,7 @@ def _drive(joint: Joint, command: Command) -> None:
 def _command(actuator: Antagonistic, samples: int, share: float) -> Command:
     """Demands that can be met: stiffness and load swing, the load to a share of the largest it can carry."""
     time, still = np.linspace(0, 1, samples), np.zeros(samples)
-    least = actuator.solve(np.zeros(1), np.ones(1)).lower[0]
+    least = actuator.solve(np.zeros(1), np.ones(1), np.zeros(1)).lower[0]
     levels = max(least, 10.0) * STIFFNESS_LEVELS
     level = np.rint((len(levels) - 1) * _swinging(time, STIFFNESS_SWINGS)).astype(int)
     load = 2 * _swinging(time, LOAD_SWINGS) - 1
@@ -105,7 +105,7 @@ def _largest_load(actuator: Antagonistic, stiffness: FloatArray) -> FloatArray:
         middle = (low + high) / 2
         fits = np.ones(stiffness.shape, dtype=bool)
         for sign in (-1, 1):
-            solution = actuator.solve(sign * middle, stiffness)
+            solution = actuator.solve(sign * middle, stiffness, np.zeros_like(middle))
             fits &= (solution.lower <= stiffness) & (stiffness <= solution.upper)
         low, high = np.where(fits, middle, low), np.where(fits, high, middle)
     return low

@@ -60,7 +60,7 @@ class AdjustableArm(Actuator):
     def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
         return np.stack((phi[0] + q, phi[1]))
 
-    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
         low, high = (np.full_like(tau_e, self.k * end * end) for end in self.range)
         never = np.zeros_like(tau_e, dtype=bool)
         return PairSolution(low, high, never, never, never, tau_e / stiffness, np.sqrt(stiffness / self.k))
@@ -69,7 +69,7 @@ class AdjustableArm(Actuator):
         sigma, dsigma, ddsigma = (
             command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
         )
-        solution = self.solve(command.tau_e, sigma)
+        solution = self.solve(command.tau_e, sigma, command.q)
         reached = reach(sigma, solution, near_singular)
         phi, s = (np.where(reached.infeasible, np.nan, each) for each in (solution.phi_1, solution.phi_2))
         ds = dsigma / (2 * self.k * s)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -156,15 +156,26 @@ class Actuator(ABC):
         """What the springs carry by their laws, from the motion of joint and motors, for the self-check."""
         raise NotImplementedError(f"{type(self).__name__} has no springs")
 
+    @property
+    def spring_group(self) -> Hashable:
+        """Actuators of which this is equal have their springs computed together: those of one kind."""
+        return type(self)
+
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        """The springs of several actuators of the kind, at any state of their joints and motors."""
+        """The springs of several actuators of one `spring_group`, at any state of their joints and motors."""
         raise NotImplementedError(f"{cls.__name__} has no springs")
 
     # Of kinds that take a stiffness
 
-    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
-        """Phi at which the springs carry the torque with the stiffness (14), on the actuator's branch."""
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
+        """Phi at which the springs carry the torque with the stiffness (14), on the actuator's branch.
+
+        Args:
+            tau_e: elastic torque, (samples,).
+            stiffness: demanded joint stiffness, (samples,).
+            q: position of the joint, (samples,), of which the springs of most kinds know nothing.
+        """
         raise NotImplementedError(f"{type(self).__name__} takes no stiffness")
 
     @property
@@ -172,17 +183,17 @@ class Actuator(ABC):
         """The other word that its field `preload` may hold; None if there is none."""
         return None
 
-    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:  # noqa: ARG002
+    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
         """Where another choice of the preload would reach the stiffness, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
 
     integrable: ClassVar[bool] = False
     """Whether phi can be integrated along a trajectory, by the two methods below."""
 
-    def deflection_rates(self, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray) -> FloatArray:
-        """Rates of phi, (2, samples), that give tau_e and the stiffness these rates, (19)-(20)."""
+    def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
+        """Rates of phi, (2, samples), that give tau_e and the stiffness those of the command, (19)-(20)."""
         raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")
 
-    def determinant(self, phi: FloatArray) -> FloatArray:
-        """Determinant of the decoupling matrix A at phi, (67)."""
+    def determinant(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        """Determinant of the decoupling matrix A at phi and positions of the joint, (67)."""
         raise NotImplementedError(f"{type(self).__name__} solves for its deflections at each step")

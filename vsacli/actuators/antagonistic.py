@@ -107,7 +107,7 @@ class Antagonistic(Actuator):
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
         """Deflections on the actuator's branch, their rates, and motor accelerations."""
-        solution = self.solve(command.tau_e, command.commanded["stiffness"])
+        solution = self.solve(command.tau_e, command.commanded["stiffness"], command.q)
         reached = reach(command.commanded["stiffness"], solution, near_singular)
         phi = (solution.phi_1, solution.phi_2)  # (61)
         if integrated is not None:
@@ -164,7 +164,7 @@ class Antagonistic(Actuator):
 
         return PairElasticity([actuator.laws for actuator in actuators])
 
-    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
         """Solve (14) on the branch that the actuator's preload names."""
         first, second = self.laws
         if self.preload == "negative":
@@ -178,19 +178,20 @@ class Antagonistic(Actuator):
             return None
         return "negative" if self.preload == "positive" else "positive"
 
-    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
+    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
         """Where the branch with the opposite preload reaches the stiffness."""
         if self.opposite_preload is None:
             return np.zeros(tau_e.shape, dtype=bool)
         opposite = replace(self, preload=self.opposite_preload)
-        return ~reach(stiffness, opposite.solve(tau_e, stiffness)).infeasible
+        return ~reach(stiffness, opposite.solve(tau_e, stiffness, q)).infeasible
 
-    def deflection_rates(self, phi: FloatArray, dtau_e: FloatArray, dstiffness: FloatArray) -> FloatArray:
+    def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
         """A^-1 (tau_e', sigma'), (19)-(20)."""
         one, two = self._states(phi)
-        return np.stack(solve(one, two, determinant(one, two), dtau_e, dstiffness))
+        right = command.dtau_e, command.commanded["dstiffness"]
+        return np.stack(solve(one, two, determinant(one, two), *right))
 
-    def determinant(self, phi: FloatArray) -> FloatArray:
+    def determinant(self, phi: FloatArray, _q: FloatArray) -> FloatArray:
         """Det A (67)."""
         return determinant(*self._states(phi))
 

@@ -6,7 +6,7 @@ before the motors of joints that have any; values of them have one entry for eac
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ SIDES = 2
 
 
 class _Group(NamedTuple):
-    """The joints whose actuators are of one kind: their springs, and where the joints and motors are."""
+    """Joints of one `Actuator.spring_group`: their springs, and where the joints and motors are."""
 
     elasticity: Elasticity
     joints: IndexArray
@@ -58,18 +58,21 @@ class Drivetrain:
         self.chosen = np.flatnonzero(["stiffness" in actuator.commanded for actuator in actuators])
         self.spring_joint = self.joint[self.sprung]
         self._direct = np.flatnonzero(self.rigid)
-        kinds = dict.fromkeys(type(actuator) for actuator in actuators if actuator.sprung)
-        self._groups = [self._group(kind, actuators) for kind in kinds]
+        groups = dict.fromkeys(actuator.spring_group for actuator in actuators if actuator.sprung)
+        self._groups = [self._group(group, actuators) for group in groups]
         self._alone = len(self._groups) == 1 and not self.rigid.any()
         domains = [
             np.broadcast_to(group.elasticity.domain, (2, *group.springs.shape)) for group in self._groups
         ]
         self.domain = self.of_springs(domains, np.empty((2, len(self.spring_joint))))
 
-    def _group(self, kind: type[Actuator], actuators: Sequence[Actuator]) -> _Group:
-        members = [index for index, actuator in enumerate(actuators) if type(actuator) is kind]
-        springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in members])
-        return _Group(kind.elasticity([actuators[joint] for joint in members]), np.array(members), springs)
+    def _group(self, group: Hashable, actuators: Sequence[Actuator]) -> _Group:
+        indices = [
+            index for index, each in enumerate(actuators) if each.sprung and each.spring_group == group
+        ]
+        springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in indices])
+        members = [actuators[joint] for joint in indices]
+        return _Group(type(members[0]).elasticity(members), np.array(indices), springs)
 
     def of_motors(self, values: FloatArray) -> FloatArray:
         """(..., motors) from (..., joints, 2), whose entries without a motor do not matter."""
@@ -99,11 +102,12 @@ class Drivetrain:
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """phi, (..., springs), from positions of joints (..., joints) and motors (..., springs); or rates."""
-        return self.of_springs([phi for _, phi in self.at(q, theta)], theta)
+        parts = [each.deflections(*positions) for each, positions in self._positions(q, theta)]
+        return self.of_springs(parts, theta)
 
     def torques(self, q: FloatArray, theta: FloatArray) -> Torques:
         """Of the springs: on the links, (..., joints), and against the motors, (..., springs)."""
-        parts = [elasticity.torques(phi) for elasticity, phi in self.at(q, theta)]
+        parts = [elasticity.torques(at) for elasticity, at in self.at(q, theta)]
         return Torques(
             self.by_joint([part.tau_e for part in parts], q),
             self.of_springs([part.tau_spring for part in parts], theta),
@@ -111,29 +115,29 @@ class Drivetrain:
 
     def energy(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Elastic energy of each joint, (..., joints)."""
-        return self.by_joint([elasticity.energy(phi) for elasticity, phi in self.at(q, theta)], q)
+        return self.by_joint([elasticity.energy(at) for elasticity, at in self.at(q, theta)], q)
 
     def stiffness(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Of the joints (11), (..., joints), 0 where there are no springs."""
-        return self.by_joint([each.state(phi).stiffness for each, phi in self.at(q, theta)], q)
+        return self.by_joint([each.state(at).stiffness for each, at in self.at(q, theta)], q)
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Det A (67), (..., joints), NaN where no stiffness is commanded."""
-        found = self.by_joint([each.state(phi).determinant() for each, phi in self.at(q, theta)], q)
+        found = self.by_joint([each.state(at).determinant() for each, at in self.at(q, theta)], q)
         return np.where(self.rigid, np.nan, found)
 
     def state(self, q: FloatArray, theta: FloatArray, dq: FloatArray, dtheta: FloatArray) -> DrivetrainState:
         """The springs with their derivatives, at positions and velocities of joints and motors."""
-        parts = [elasticity.state(phi) for elasticity, phi in self.at(q, theta)]
-        rates = [dphi for _, dphi in self.at(dq, dtheta)]
+        parts = [elasticity.state(at) for elasticity, at in self.at(q, theta)]
+        rates = [rates for _, rates in self.at(dq, dtheta)]
         return DrivetrainState(self, q, theta, list(zip(parts, rates, strict=True)))
 
     def of_groups(self, values: FloatArray) -> list[FloatArray]:
-        """The part of each kind of actuator, (..., joints), of (..., joints)."""
+        """The part of each group of actuators, (..., joints), of (..., joints)."""
         return [values if self._alone else values[..., group.joints] for group in self._groups]
 
     def by_joint(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
-        """(..., joints) from the part of each kind; 0 where there are no springs."""
+        """(..., joints) from the part of each group; 0 where there are no springs."""
         if self._alone:
             return parts[0]
         result = np.zeros_like(like)
@@ -142,7 +146,7 @@ class Drivetrain:
         return result
 
     def of_springs(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
-        """(..., springs) from the part of each kind, (..., joints, motors)."""
+        """(..., springs) from the part of each group, (..., joints, motors)."""
         if self._alone:
             return parts[0].reshape(*like.shape)
         result = np.empty_like(like)
@@ -151,15 +155,19 @@ class Drivetrain:
         return result
 
     def at(self, q: FloatArray, theta: FloatArray) -> list[tuple[Elasticity, FloatArray]]:
-        """The springs of each kind with their phi, (..., joints, motors)."""
-        parts = []
+        """The springs of each group with their coordinates, (..., joints, coordinates), or rates of these."""
+        return [(each, each.coordinates(*positions)) for each, positions in self._positions(q, theta)]
+
+    def _positions(
+        self, q: FloatArray, theta: FloatArray
+    ) -> Iterator[tuple[Elasticity, tuple[FloatArray, FloatArray]]]:
+        """The springs of each group with the positions of joints and motors, (..., joints, motors)."""
         for group, of_joints in zip(self._groups, self.of_groups(q), strict=True):
             if self._alone:
                 of_motors = theta.reshape(*theta.shape[:-1], *group.springs.shape)
             else:
                 of_motors = theta[..., group.springs]
-            parts.append((group.elasticity, group.elasticity.deflections(of_joints, of_motors)))
-        return parts
+            yield group.elasticity, (of_joints, of_motors)
 
 
 class DrivetrainState:
@@ -185,7 +193,7 @@ class DrivetrainState:
     @property
     def dtau_e(self) -> FloatArray:
         """Its rate (17)."""
-        return self._drivetrain.by_joint([part.torque_rate(dphi) for part, dphi in self._parts], self._q)
+        return self._drivetrain.by_joint([part.torque_rate(rates) for part, rates in self._parts], self._q)
 
     @property
     def stiffness(self) -> FloatArray:
@@ -195,7 +203,7 @@ class DrivetrainState:
     @property
     def dstiffness(self) -> FloatArray:
         """Its rate (18)."""
-        return self._drivetrain.by_joint([part.stiffness_rate(dphi) for part, dphi in self._parts], self._q)
+        return self._drivetrain.by_joint([part.stiffness_rate(rates) for part, rates in self._parts], self._q)
 
     @property
     def tau_spring(self) -> FloatArray:
@@ -214,7 +222,7 @@ class DrivetrainState:
         """
         wanted = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
         parts = [
-            part.motor_accelerations(dphi, *of_part)
-            for (part, dphi), of_part in zip(self._parts, wanted, strict=True)
+            part.motor_accelerations(rates, *of_part)
+            for (part, rates), of_part in zip(self._parts, wanted, strict=True)
         ]
         return self._drivetrain.of_springs(parts, self._theta)

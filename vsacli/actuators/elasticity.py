@@ -26,7 +26,8 @@ class Torques(NamedTuple):
 class Elasticity(ABC):
     """The springs of joints whose actuators are of one kind: a potential of q and theta, and its derivatives.
 
-    Springs are described by phi, one number for each motor, which depends linearly on q and theta.
+    Springs are described by phi, one number for each motor, which depends linearly on q and theta. What else
+    they depend on belongs to the coordinates that the methods below take.
 
     Attributes:
         domain: lowest and highest phi for which the laws hold, (2, joints, motors) or to be spread so.
@@ -38,21 +39,25 @@ class Elasticity(ABC):
         """Phi from positions, or its rates from velocities: theta - q unless the kind says otherwise."""
         return theta - q[..., None]
 
+    def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """What the springs depend on, (..., joints, coordinates), or its rates: phi, unless overridden."""
+        return self.deflections(q, theta)
+
     @abstractmethod
-    def torques(self, phi: FloatArray) -> Torques:
+    def torques(self, coordinates: FloatArray) -> Torques:
         """The torques of the springs."""
 
     @abstractmethod
-    def energy(self, phi: FloatArray) -> FloatArray:
+    def energy(self, coordinates: FloatArray) -> FloatArray:
         """Elastic energy of each joint, J."""
 
     @abstractmethod
-    def state(self, phi: FloatArray) -> ElasticState:
+    def state(self, coordinates: FloatArray) -> ElasticState:
         """The springs with their derivatives."""
 
 
 class ElasticState(ABC):
-    """The springs of joints at given phi: elastic torque and stiffness, and how motions change them."""
+    """The springs of joints at given coordinates: torque and stiffness, and how motions change them."""
 
     @property
     @abstractmethod
@@ -70,16 +75,16 @@ class ElasticState(ABC):
         """Torque against each motor (62), (..., joints, motors)."""
 
     @abstractmethod
-    def torque_rate(self, dphi: FloatArray) -> FloatArray:
+    def torque_rate(self, rates: FloatArray) -> FloatArray:
         """Rate of the elastic torque (17), (..., joints)."""
 
     @abstractmethod
-    def stiffness_rate(self, dphi: FloatArray) -> FloatArray:
+    def stiffness_rate(self, rates: FloatArray) -> FloatArray:
         """Rate of the stiffness (18), (..., joints)."""
 
     @abstractmethod
     def motor_accelerations(
-        self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+        self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:
         """Accelerations of the motors that give torque and stiffness these second derivatives, (70)-(72).
 

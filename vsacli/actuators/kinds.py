@@ -19,6 +19,7 @@ ACTUATORS = LazyRegistry(
         "antagonistic": "vsacli.actuators.antagonistic:Antagonistic",
         "elastic": "vsacli.actuators.elastic:Elastic",
         "rigid": "vsacli.actuators.rigid:Rigid",
+        "serial": "vsacli.actuators.serial:Serial",
     }
 )
 """Kinds of actuator by the name they have in a robot file."""

@@ -77,7 +77,7 @@ class JointSummary:
         self._record_reach(flags, gap, block)
         outside = gap < -SINGULAR_MARGIN
         if self._other_preload and outside.any():
-            demand = block.tau_e[outside, index], stiffness[outside]
+            demand = block.tau_e[outside, index], stiffness[outside], block.q[outside, index]
             self._other_preload = bool(self._joint.actuator.other_preload(*demand).all())
 
     def report(
@@ -203,9 +203,9 @@ class DriftSummary:
 
     def add(self, block: Block) -> None:
         """Merge a block of steps; those without deflections do not count."""
-        tau_e, stiffness = block.tau_e[:, self._index], block.stiffness[:, self._index]
-        root = self._joint.actuator.solve(tau_e, stiffness).deflections
-        drift = np.abs(block.phi[:, self._index].T - root).max(axis=0)
+        demand = block.tau_e[:, self._index], block.stiffness[:, self._index], block.q[:, self._index]
+        root = self._joint.actuator.solve(*demand).deflections
+        drift = np.fmax.reduce(np.abs(block.phi[:, self._index].T - root))
         integrated = np.flatnonzero(~np.isnan(drift))
         if integrated.size:
             step = integrated[drift[integrated].argmax()]

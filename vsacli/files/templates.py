@@ -166,10 +166,12 @@ def _way(joint: Joint) -> tuple[float, float]:
 
 
 def _stiffness(robot: Robot) -> Values:
-    loads = static_load(robot).values
+    loads = static_load(robot)
     chosen = {
-        joint.name: _stiffnesses(joint, float(load))
-        for joint, load in zip(robot.joints, loads, strict=True)
+        joint.name: _stiffnesses(joint, float(load), float(configuration[index]))
+        for index, (joint, load, configuration) in enumerate(
+            zip(robot.joints, loads.values, loads.configurations, strict=True)
+        )
         if "stiffness" in joint.actuator.commanded
     }
     if not chosen:
@@ -180,9 +182,9 @@ def _stiffness(robot: Robot) -> Values:
     }
 
 
-def _stiffnesses(joint: Joint, load: float) -> tuple[float, float]:
-    """Two that are reachable while the joint carries its load; if none is, while it carries nothing."""
-    ranges = stiffness_ranges(joint, load)
+def _stiffnesses(joint: Joint, load: float, q: float) -> tuple[float, float]:
+    """Two that are reachable while the joint carries its load at q; if none is, while it carries nothing."""
+    ranges = stiffness_ranges(joint, load, q)
     lower, upper = ranges["loaded"] if ranges["loaded"][0] < ranges["loaded"][1] else ranges["unloaded"]
     lower, upper = max(lower, joint.limits.stiffness[0]), min(upper, joint.limits.stiffness[1])
     soft, stiff = START_TO_LOWEST * lower, END_TO_LOWEST * lower

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.reach import reach_flags
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
@@ -44,17 +45,14 @@ class Task:
     def roots(self, joints: tuple[int, ...], time: FloatArray) -> FloatArray:
         """Roots of (14) of some joints."""
         return np.stack(
-            [
-                actuator.solve(command.tau_e, command.commanded["stiffness"]).deflections
-                for actuator, command in self._commands(joints, time)
-            ]
+            [_root(actuator, command).deflections for actuator, command in self._commands(joints, time)]
         )
 
     def rates(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> FloatArray:
         """Rates of the deflections of some joints, (19)."""
         return np.stack(
             [
-                actuator.deflection_rates(of_joint, command.dtau_e, command.commanded["dstiffness"])
+                actuator.deflection_rates(of_joint, command)
                 for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
             ]
         )
@@ -76,10 +74,14 @@ class Task:
             yield self._actuators[joint], command_of(joint, commanded)
 
 
+def _root(actuator: Actuator, command: Command) -> PairSolution:
+    return actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
+
+
 def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
     """Singular is, too, where det A has another sign than on the joint's branch: it was zero on the way."""
-    solution = actuator.solve(command.tau_e, command.commanded["stiffness"])
+    solution = _root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
-    here, on_branch = (np.sign(actuator.determinant(each)) for each in (phi, solution.deflections))
+    here, on_branch = (np.sign(actuator.determinant(each, command.q)) for each in (phi, solution.deflections))
     singular = has(flags, Flag.SINGULAR) | (here != on_branch)
     return np.where(has(flags, Flag.INFEASIBLE), UNREACHABLE, np.where(singular, SINGULAR, FOLLOWED))

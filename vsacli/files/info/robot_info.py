@@ -65,14 +65,16 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
         {
             **_json_fields(joint),
             "static_load": {"torque": float(value), "at": configuration.tolist()},
-            "stiffness_range": stiffness_ranges(joint, float(value)),
+            "stiffness_range": stiffness_ranges(joint, float(value), float(configuration[index])),
         }
-        for joint, value, configuration in zip(robot.joints, values, loads.configurations, strict=True)
+        for index, (joint, value, configuration) in enumerate(
+            zip(robot.joints, values, loads.configurations, strict=True)
+        )
     ]
 
 
-def stiffness_ranges(joint: Joint, load: float) -> dict[str, list[float]]:
-    """The stiffness reachable `unloaded`, and `loaded` by a torque in either direction, N m/rad (N/m).
+def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[float]]:
+    """The stiffness reachable `unloaded`, and `loaded` by a torque in either direction, N m/rad (N/m), at q.
 
     Empty if its stiffness is not commanded.
     """
@@ -80,7 +82,7 @@ def stiffness_ranges(joint: Joint, load: float) -> dict[str, list[float]]:
         return {}
     tau_e = np.array([0.0, load, -load])
     with np.errstate(all="ignore"):  # a load may be beyond all numbers
-        solution = joint.actuator.solve(tau_e, np.ones(3))
+        solution = joint.actuator.solve(tau_e, np.ones(3), np.full(3, q))
     return {
         "unloaded": [float(solution.lower[0]), float(solution.upper[0])],
         "loaded": [float(solution.lower.max()), float(solution.upper.min())],

@@ -42,7 +42,7 @@ def corridor(joint: Joint) -> Corridor | None:
     """That of a joint; None if its stiffness cannot be commanded."""
     if "stiffness" not in joint.actuator.commanded:
         return None
-    solution = joint.actuator.solve(np.zeros(1), np.ones(1))
+    solution = joint.actuator.solve(np.zeros(1), np.ones(1), np.zeros(1))
     return Corridor(float(solution.lower[0]), float(solution.upper[0]))
 
 

@@ -119,7 +119,7 @@ def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -
         near_singular: the margin m.
     """
     actuator = variable_stiffness_actuator(joint)
-    corridor = actuator.solve(command.tau_e, command.commanded["stiffness"])
+    corridor = actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
     least, most = joint.limits.stiffness
     low = np.maximum(corridor.lower / (1 - near_singular), least)
     high = np.minimum(corridor.upper / (1 + near_singular), most)
@@ -139,7 +139,7 @@ def _deflection_ceiling(actuator: Actuator, command: Command, lower: FloatArray)
     for _ in range(BISECTIONS):
         share = (kept + broken) / 2
         stiffness = lower + command.commanded["stiffness"] * share / (1 - share)
-        solution = actuator.solve(command.tau_e, stiffness)
+        solution = actuator.solve(command.tau_e, stiffness, command.q)
         within = np.all(np.abs(solution.deflections) <= limits, axis=0)
         kept, broken = np.where(within, share, kept), np.where(within, broken, share)
     return lower + command.commanded["stiffness"] * kept / (1 - kept)

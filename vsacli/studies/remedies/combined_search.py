@@ -101,17 +101,17 @@ def _choices(robot: Robot, watched: Motion | None) -> list[dict[str, Joint]]:
         preload = joint.actuator.opposite_preload
         if preload is not None:
             exchanged = robot.replace(f"joints.{index}.actuator.preload", preload).joints[index]
-            load = torques[:, index], watched.commanded["stiffness"][:, index]
+            load = torques[:, index], watched.commanded["stiffness"][:, index], watched.q[:, index]
             if not _alike(joint.actuator, exchanged.actuator, *load):
                 choices[index][preload] = exchanged
     return choices
 
 
-def _alike(one: Actuator, other: Actuator, tau_e: FloatArray, stiffness: FloatArray) -> bool:
+def _alike(one: Actuator, other: Actuator, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> bool:
     """Whether two preloads of an actuator are mirror images, as those of like springs are."""
     if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
         return False
-    first, second = one.solve(tau_e, stiffness), other.solve(tau_e, stiffness)
+    first, second = one.solve(tau_e, stiffness, q), other.solve(tau_e, stiffness, q)
     pairs = (first.lower, second.lower), (first.upper, second.upper)
     return all(np.allclose(here, there, rtol=SAME_CORRIDOR, equal_nan=True) for here, there in pairs)
 

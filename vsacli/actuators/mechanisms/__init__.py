@@ -1,0 +1,15 @@
+"""Mechanisms of serial actuators: springs between a motor that carries the load and one that sets them.
+
+Adding a mechanism is adding a class derived from `Mechanism` and its line in `MECHANISMS`.
+"""
+
+from __future__ import annotations
+
+from vsacli.base.lazy import LazyRegistry
+
+MECHANISMS = LazyRegistry(
+    {
+        "awas": "vsacli.actuators.mechanisms.awas:Awas",
+    }
+)
+"""Mechanisms by the name they have in a robot file."""

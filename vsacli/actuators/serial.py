@@ -1,0 +1,197 @@
+"""One motor that carries the load, and one that sets the springs behind it: MACCEPA, AwAS, levers, cams.
+
+The springs' potential takes the place of (14) and (61)-(72); a mechanism says what it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
+from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.mechanisms import MECHANISMS
+from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.mechanisms.state import MechanismState
+from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.reach import reach
+from vsacli.actuators.transmission import Command, Transmission
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.variables import Variable
+from vsacli.documents.fields import OneOf, Pair, Record, check_fields, value
+from vsacli.documents.source import Source
+
+SMALL_DEFLECTION = 1e-3
+"""Deflection, rad (m), whose torque is large beside rounding; a motor that carries the load alone passes
+through zero, where its own torque measures nothing."""
+
+
+@dataclass(frozen=True)
+class Serial(Actuator):
+    """Motor 1 moves the link through springs that motor 2 sets."""
+
+    motor: tuple[Motor, Motor] = value(
+        Pair(Record(Motor)), "motor 1, which carries the load, and motor 2, which sets the springs"
+    )
+    mechanism: Mechanism = value(OneOf(MECHANISMS), "the springs and what motor 2 does to them")
+
+    motor_count = 2
+    commanded = ("stiffness",)
+    integrable = True
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @classmethod
+    def has(cls, variable: Variable) -> list[bool]:
+        """Motor 2 has no deflection."""
+        return [True, False] if variable.name in {"phi", "dphi"} else super().has(variable)
+
+    @classmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:
+        """Motors alike, and an arm of adjustable length."""
+        word = "awas"
+        mechanism = {"type": word, **MECHANISMS[word].example(joint_type)}
+        return {"motor": Motor.example(joint_type), "mechanism": mechanism}
+
+    @classmethod
+    def placeholder(cls, constants: PlaceholderConstants) -> Self:
+        """Springs on an arm, whose range of stiffness has that of an elastic transmission in its middle."""
+        from vsacli.actuators.mechanisms.awas import Awas
+
+        motor = Motor(inertia=constants.motor_inertia)
+        return cls(
+            motor=(motor, motor), mechanism=Awas(k=50 * constants.stiffness, arm=(0.05, 0.2), lead=0.02)
+        )
+
+    @property
+    def motors(self) -> tuple[JointMotor, ...]:
+        """Motors 1 and 2."""
+        return tuple(motor.at_joint for motor in self.motor)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the mechanism."""
+        return self.mechanism.warnings
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Those of the mechanism."""
+        return self.mechanism.sources
+
+    @property
+    def spring_group(self) -> Hashable:
+        """Joints with equal mechanisms are computed together."""
+        return self.mechanism
+
+    def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        """Theta_1 = phi + q; theta_2 is the setting."""
+        return np.stack((phi[0] + q, phi[1]))
+
+    def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
+        """Deflection and setting on the mechanism's branch, their rates, and motor accelerations.
+
+        NaN where the step is infeasible; what needs the inverse of A also where it is singular.
+        """
+        stiffness, dstiffness, ddstiffness = (
+            command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
+        )
+        solution = self.solve(command.tau_e, stiffness, command.q)
+        reached = reach(stiffness, solution, near_singular)
+        phi = solution.deflections
+        if integrated is not None:
+            phi = integrated
+            reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
+        phi = np.where(reached.infeasible, np.nan, phi)
+        state = self._state(phi, command.q)
+        rates = np.where(
+            reached.singular[..., None], np.nan, state.rates(command.dtau_e, dstiffness, command.dq)
+        )
+        return Transmission(
+            stiffness=stiffness,
+            dstiffness=dstiffness,
+            ddstiffness=ddstiffness,
+            phi=phi,
+            dphi=rates[..., :2].T,
+            ddtheta=state.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness).T,
+            tau_spring=state.tau_spring.T,
+            elastic_energy=state.energy,
+            det_A=state.determinant(),
+            stiffness_lower=solution.lower,
+            stiffness_upper=solution.upper,
+            flags=reached.flags,
+        )
+
+    def spring_rates(self, of_joint: OfJoint) -> FloatArray:
+        """Rates of the derivatives of the potential over theta_1 and theta_2."""
+        rates = of_joint["dphi"][0], of_joint["dtheta"][1], of_joint["dq"]
+        return self._state_of(of_joint).spring_rates(np.stack(rates, axis=-1)).T
+
+    def carried(self, of_joint: OfJoint) -> Carried:
+        """What the mechanism carries."""
+        state = self._state_of(of_joint)
+        size = np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
+        return Carried(state.tau_e, size, state.stiffness)
+
+    @classmethod
+    def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
+        """The springs of joints whose mechanisms are equal."""
+        return _Springs(actuators[0].mechanism)
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
+        """Phi and theta_2, on the mechanism's branch."""
+        return self.mechanism.solve(tau_e, stiffness, q)
+
+    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
+        """Where another branch of the mechanism reaches the stiffness."""
+        return self.mechanism.other_preload(tau_e, stiffness, q)
+
+    def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
+        """A^-1 (tau_e', sigma')."""
+        state = self._state(phi, command.q)
+        return state.rates(command.dtau_e, command.commanded["dstiffness"], command.dq)[..., :2].T
+
+    def determinant(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        """Det A over (theta_1, theta_2)."""
+        return self._state(phi, q).determinant()
+
+    def _state(self, phi: FloatArray, q: FloatArray) -> MechanismState:
+        return self.mechanism.state(np.stack((*phi, q), axis=-1))
+
+    def _state_of(self, of_joint: OfJoint) -> MechanismState:
+        """At the motion of joint and motors."""
+        return self._state(np.stack((of_joint["phi"][0], of_joint["theta"][1])), of_joint["q"])
+
+
+class _Springs(Elasticity):
+    """A mechanism at any number of joints."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._mechanism = mechanism
+        self.domain = np.array((mechanism.deflection_range, mechanism.setting_range)).T[:, None]
+
+    def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Phi and theta_2."""
+        return np.stack((theta[..., 0] - q, theta[..., 1]), axis=-1)
+
+    def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Phi, theta_2 and q."""
+        return np.stack((theta[..., 0] - q, theta[..., 1], q), axis=-1)
+
+    def torques(self, coordinates: FloatArray) -> Torques:
+        """Derivatives of the potential."""
+        state = self._mechanism.state(coordinates)
+        return Torques(state.tau_e, state.tau_spring)
+
+    def energy(self, coordinates: FloatArray) -> FloatArray:
+        """The potential."""
+        return self._mechanism.state(coordinates).energy
+
+    def state(self, coordinates: FloatArray) -> ElasticState:
+        """The potential with its derivatives."""
+        return self._mechanism.state(coordinates)
