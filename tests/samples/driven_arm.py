@@ -1,0 +1,87 @@
+"""Arms of `samples.full_model` as robots of vsacli; whether the full model follows the computed torques."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from samples.full_model import Drive, FullModel, PlanarArm
+from vsacli import inverse_dynamics
+from vsacli.actuators.actuator import Actuator
+from vsacli.analysis.result import Result
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
+from vsacli.robot.model import Robot
+from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+LINK = PlanarArm(lengths=[0.4], masses=[1.5], centres=[0.25], inertias=[0.03], damping=[0.2])
+"""A pendulum."""
+
+ARM = PlanarArm(
+    lengths=[0.4, 0.3, 0.2],
+    masses=[1.5, 1.0, 0.6],
+    centres=[0.25, 0.12, 0.1],
+    inertias=[0.03, 0.02, 0.004],
+    damping=[0.2, 0.1, 0.05],
+)
+"""Three links."""
+
+START, MOVE = np.array([-1.2, 0.5, 0.3]), np.array([0.8, -0.9, 1.1])
+"""Where the joints begin, and how far they go, rad."""
+
+DURATION, RATE = 0.5, 2000
+"""s and 1/s; so short that a plant that falls away from the motion does not fall far."""
+
+
+def robot_of(arm: PlanarArm, actuators: list[Actuator]) -> Robot:
+    """The arm as a robot."""
+    links = zip(arm.lengths, arm.masses, arm.centres, arm.inertias, arm.damping, actuators, strict=True)
+    joints = tuple(
+        Joint(
+            name=f"joint_{number}",
+            type="revolute",
+            dh=DenavitHartenberg(a=length, alpha=0),
+            link=Link(
+                mass=mass,
+                com=(centre - length, 0, 0),
+                inertia=Inertia(**dict.fromkeys(("xx", "yy", "zz"), inertia)),
+            ),
+            damping=damping,
+            actuator=actuator,
+        )
+        for number, (length, mass, centre, inertia, damping, actuator) in enumerate(links, 1)
+    )
+    return Robot(name="arm", gravity=(0, -arm.gravity, 0), joints=joints)
+
+
+def motion_of(stiffness: list[tuple[float, float]]) -> Trajectory:
+    """Rest to rest; the stiffness of each joint from one to another, NaN where none is commanded."""
+    span, joints = (0.0, DURATION), len(stiffness)
+    start, end = zip(*stiffness, strict=True)
+    position = RestToRest(
+        signal=POSITION,
+        span=span,
+        degree=11,
+        start=tuple(START[:joints]),
+        end=tuple((START + MOVE)[:joints]),
+    )
+    profile = RestToRest(signal=STIFFNESS, span=span, degree=7, start=start, end=end)
+    return Trajectory(UniformTimes(DURATION, RATE), position, {"stiffness": profile}, name="move")
+
+
+def assert_follows(
+    arm: PlanarArm, actuators: list[Actuator], drives: list[Drive], stiffness: list[tuple[float, float]]
+) -> Result:
+    """The computed torques move the full model along the command: 1e-9 rad, and 1e-9 of each stiffness.
+
+    The integration is good to some 1e-12; the spline through the torques to some 1e-11.
+    """
+    result = inverse_dynamics(robot_of(arm, actuators), motion_of(stiffness))
+    assert not result.flags.any(), result
+    start = result.q[0], result.theta[0], result.dq[0], result.dtheta[0]
+    followed = FullModel(arm, drives).follow(result.time, result.tau_motor, *start)
+    np.testing.assert_allclose(followed.q, result.q.T, rtol=0, atol=1e-9)
+    sprung = [drive.springs is not None for drive in drives]
+    np.testing.assert_allclose(followed.stiffness[sprung], result.stiffness.T[sprung], rtol=1e-9)
+    return result

@@ -1,0 +1,83 @@
+"""One or more devices of each mechanism, with the potential of its springs as a formula of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy
+
+from samples.full_model import Drive, Potential, springs_of
+from vsacli.actuators.mechanisms.awas import Awas
+from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.serial import Serial
+from vsacli.base.arrays import BoolArray, FloatArray
+
+INERTIA, DAMPING = (0.3, 0.02), (0.1, 0.05)
+"""Of motors 1 and 2."""
+
+OnBranch = Callable[[FloatArray, FloatArray], BoolArray]
+
+
+@dataclass(frozen=True)
+class Device:
+    """A mechanism, and what the tests need to know about it.
+
+    Attributes:
+        mechanism: as vsacli has it.
+        potential: U(q, theta_1, theta_2) in sympy's functions; written anew, not taken from the mechanism.
+        stiffness: two that the device has under 30 N m, for a motion, N m/rad.
+        deflections: phi from which states are drawn, rad.
+        settings: theta_2 from which they are drawn.
+        on_branch: which of the states with positive stiffness lie on the mechanism's branch; all by default.
+    """
+
+    mechanism: Mechanism
+    potential: Potential
+    stiffness: tuple[float, float]
+    deflections: tuple[float, float]
+    settings: tuple[float, float]
+    on_branch: OnBranch = lambda phi, _: np.ones_like(phi, dtype=bool)
+
+    @property
+    def actuator(self) -> Serial:
+        """The mechanism between two motors."""
+        first, second = (Motor(inertia=b, damping=d) for b, d in zip(INERTIA, DAMPING, strict=True))
+        return Serial(motor=(first, second), mechanism=self.mechanism)
+
+    @property
+    def drive(self) -> Drive:
+        """The same in the full model."""
+        return Drive(np.diag(INERTIA), DAMPING, self.springs)
+
+    @cached_property
+    def springs(self) -> Callable[..., Any]:
+        """The torques of the potential."""
+        return springs_of(self.potential, 2)
+
+
+def _awas(k: float, lead: float) -> Potential:
+    return lambda q, theta_1, theta_2: k * (lead * theta_2) ** 2 * sympy.sin(theta_1 - q) ** 2
+
+
+DEVICES = {
+    "awas": Device(
+        mechanism=Awas(k=50000, arm=(0.02, 0.12), lead=0.01),
+        potential=_awas(50000, 0.01),
+        stiffness=(300, 700),
+        deflections=(-0.78, 0.78),
+        settings=(2, 12),
+    ),
+    "awas, lead against the motor": Device(
+        mechanism=Awas(k=30000, arm=(0.03, 0.15), lead=-0.02),
+        potential=_awas(30000, -0.02),
+        stiffness=(600, 200),
+        deflections=(-0.78, 0.78),
+        settings=(-7.5, -1.5),
+    ),
+}
+"""By the name of the mechanism, and what is special about the device."""
