@@ -44,6 +44,8 @@ class ResultFile(Shown, StoredResult):
         try:
             values = self.read(name)
         except InputError as error:
+            if name in self.variables:
+                raise  # it is damaged
             raise AttributeError(str(error)) from None
         setattr(self, name, values)
         return values

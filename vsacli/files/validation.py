@@ -20,7 +20,6 @@ from vsacli.robot.urdf.reader import read_urdf
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
-BLOCK_SAMPLES = 8192
 MOST_ROBOTS_SHOWN = 3
 SPRING_COLUMNS = {"deflection", "torque"}
 WITHOUT_ROBOT = "no usable robot is among the files, so joint names, units and limits are not checked"
@@ -202,12 +201,8 @@ def _urdf(path: str, _: Robots) -> Checked:
 
 
 def _stored(path: str, _: Robots) -> Checked:
-    """Read every value once: damage inside the file shows only then."""
     with open_stored(path) as result:
-        for name in result.variables:
-            for start in range(0, result.samples, BLOCK_SAMPLES):
-                result.read(name, start, start + BLOCK_SAMPLES)
-        result.provenance()
+        result.check()
         names = f"{result.robot_name}, {result.trajectory_name}"
         return _usable(path, f"{result.kind} of {names}, {_count(result.samples, 'step')}, {result.verdict}")
 

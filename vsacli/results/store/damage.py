@@ -1,17 +1,19 @@
-"""Damaged and hostile HDF5 files: what the library itself would not survive is found before it sees it.
+"""Damaged and hostile HDF5 files: what the library itself would not survive never reaches it.
 
 HDF5 reports most damage by exceptions. It loops without end on one kind, an object of size zero in a heap of
-texts, and it allocates whatever a damaged shape asks for.
+texts, and it allocates whatever a damaged shape asks for. Nothing is looked at before it is needed: opening
+a file takes no longer the more samples it holds.
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
 import struct
 from collections.abc import Iterator
 from itertools import accumulate
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any
 
 import h5py
 
@@ -21,9 +23,6 @@ from vsacli.results.store.schema import CHUNK_BYTES
 
 EXPECTED = "expected a result file, as invdyn or simulate writes it"
 
-BYTES_PER_READ = 2**24
-"""Bytes of a file looked at in one go."""
-
 _COLLECTION = struct.Struct("<8xQ")
 _OBJECT = struct.Struct("<HHIQ")
 _REFERENCE = struct.Struct("<IQI")
@@ -32,17 +31,89 @@ _SMALLEST_HEAP = 4096
 _LARGEST_HEAP = 2**26
 
 
-def open_checked(path: str | Path) -> h5py.File:
-    """Open a file for reading, after all of it was searched for what HDF5 does not survive.
+class CheckedFile(h5py.File):  # type: ignore[misc]  # h5py has no types
+    """An HDF5 file open for reading, of which the library sees no heap of texts that it would not survive.
+
+    Args:
+        path: the file.
 
     Raises:
-        InputError: there is no such file, or it is none of HDF5, or damaged.
+        InputError: there is no such file, or it is none of HDF5, or damaged where it begins.
         StorageError: the operating system refuses to read it, or another program is writing it.
     """
-    _check_signature(path)
-    with reporting_damage(path):
-        check_heaps(path)
-        return h5py.File(path, "r")
+
+    def __init__(self, path: str | Path) -> None:
+        _check_signature(path)
+        with reporting_damage(path):
+            self._bytes = _CheckedBytes(path)
+            try:
+                super().__init__(self._bytes, "r")
+            except BaseException:
+                self._bytes.close()
+                raise
+
+    def close(self) -> None:
+        """Close the file."""
+        super().close()
+        self._bytes.close()
+
+    def bytes_at(self, offset: int, size: int) -> bytes:
+        """Bytes of the file as they are, fewer if it ends before."""
+        self._bytes.seek(offset)
+        return self._bytes.read(size)
+
+
+class _CheckedBytes(io.FileIO):
+    """A file as HDF5 is given it: in place of a heap of texts that has no end, it reads zeros.
+
+    HDF5 reads a heap from its first byte on, whole or its first 4096 bytes, and refuses one that does not
+    begin as heaps do.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        super().__init__(path)
+        try:
+            _lock(self)
+        except BaseException:
+            self.close()
+            raise
+
+    def readinto(self, buffer: Any) -> int:
+        """Read bytes, all that there are."""
+        view, start, done = memoryview(buffer), self.tell(), 0
+        while count := super().readinto(view[done:]):
+            done += count
+        if bytes(view[: len(_HEAP)]) == _HEAP and not self._ends(start):
+            done = 0
+        view[done:] = bytes(len(view) - done)  # beyond the end of the file there is nothing
+        return len(view)
+
+    def _ends(self, offset: int) -> bool:
+        """Whether a heap is as large as it says, and each of its objects ends.
+
+        A heap collection (HDF5 file format 3.0, III.E) is a row of objects, each after its header of index,
+        reference count and size; index 0 is the free space at the end.
+        """
+        self.seek(offset)
+        head = self.read(_COLLECTION.size)
+        size = _COLLECTION.unpack(head)[0] if len(head) == _COLLECTION.size else 0
+        return _SMALLEST_HEAP <= size <= _LARGEST_HEAP and _all_end(self.read(size - len(head)))
+
+
+def _lock(file: io.FileIO) -> None:
+    """Tell programs that would write a file that it is read, as HDF5 itself does, where the system can.
+
+    Raises:
+        BlockingIOError: one is writing.
+    """
+    try:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except (ImportError, OSError):
+        pass  # a system or file system without locks
 
 
 def _check_signature(path: str | Path) -> None:
@@ -66,8 +137,8 @@ def _check_signature(path: str | Path) -> None:
 
 
 @contextlib.contextmanager
-def reporting_damage(path: str | Path) -> Iterator[None]:
-    """HDF5 reports truncation and corruption by any of these exceptions."""
+def reporting_damage(path: str | Path, what: str = "") -> Iterator[None]:
+    """HDF5 reports truncation and corruption, here of something in a file, by any of these exceptions."""
     try:
         yield
     except InputError:
@@ -86,41 +157,11 @@ def reporting_damage(path: str | Path) -> Iterator[None]:
         NotImplementedError,
     ) as error:
         reason = " ".join(str(error).split())[:200]
-        raise InputError.one(f"is damaged or truncated ({reason}); compute it again", path) from error
+        subject = f"variable {what} is" if what else "is"
+        raise InputError.one(f"{subject} damaged or truncated ({reason}); compute it again", path) from error
 
 
-def check_heaps(path: str | Path) -> None:
-    """Refuse a file with a heap of texts that does not end where it says.
-
-    A heap collection (HDF5 file format 3.0, III.E) is a row of objects, each after its header of index,
-    reference count and size; index 0 is the free space at the end.
-
-    Raises:
-        InputError: naming the offset.
-        OSError: the file cannot be read.
-    """
-    with open(path, "rb") as file:
-        for offset in _heaps(file):
-            file.seek(offset)
-            content = file.read(_COLLECTION.size)
-            size = _COLLECTION.unpack(content)[0] if len(content) == _COLLECTION.size else 0
-            if not (_SMALLEST_HEAP <= size <= _LARGEST_HEAP) or not _ends(file.read(size - len(content))):
-                raise InputError.one(f"is damaged: the texts at byte {offset} have no end", path)
-
-
-def _heaps(file: BinaryIO) -> Iterator[int]:
-    """Offsets at which a heap collection begins."""
-    start, tail = 0, b""
-    while piece := file.read(BYTES_PER_READ):
-        text, found = tail + piece, -1
-        position = file.tell()
-        while (found := text.find(_HEAP, found + 1)) >= 0:
-            yield start - len(tail) + found
-            file.seek(position)
-        start, tail = start + len(piece), text[-len(_HEAP) + 1 :]
-
-
-def _ends(objects: bytes) -> bool:
+def _all_end(objects: bytes) -> bool:
     """Whether the objects of a heap fill it: each has a size above zero, and none goes beyond the end."""
     position = 0
     while len(objects) - position >= _OBJECT.size:
@@ -132,7 +173,7 @@ def _ends(objects: bytes) -> bool:
     return True
 
 
-def own_dataset(file: h5py.File, name: str) -> h5py.Dataset:
+def own_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
     """A dataset, if its values stand in this file and need no more memory at a time than the file has bytes.
 
     Raises:
@@ -150,8 +191,13 @@ def own_dataset(file: h5py.File, name: str) -> h5py.Dataset:
         raise ValueError(f"the values of {name} are not in this file")
     _check_chunks(dataset, file_size(file))
     if h5py.check_string_dtype(dataset.dtype) is not None:
-        _check_texts(dataset, file_size(file))
+        _check_texts(dataset, file)
     return dataset
+
+
+def read_attributes(file: h5py.File) -> None:
+    """Read all attributes of everything once: damage of one shows only then."""
+    file.visititems(lambda _name, each: dict(each.attrs) and None)
 
 
 def file_size(file: h5py.File) -> int:
@@ -184,14 +230,12 @@ def _check_chunks(dataset: h5py.Dataset, size: int) -> None:
         raise ValueError(f"{dataset.name} claims chunks of {claimed:,} bytes in a file of {size:,}")
 
 
-def _check_texts(dataset: h5py.Dataset, size: int) -> None:
+def _check_texts(dataset: h5py.Dataset, file: CheckedFile) -> None:
     """Texts of any length are references to heaps, each a length, an address and an index."""
-    offset = dataset.id.get_offset()
+    offset, size = dataset.id.get_offset(), file_size(file)
     if offset is None:
         return
-    with open(dataset.file.filename, "rb") as file:
-        file.seek(offset)
-        references = file.read(min(dataset.size * _REFERENCE.size, size))
+    references = file.bytes_at(offset, min(dataset.size * _REFERENCE.size, size))
     whole = len(references) // _REFERENCE.size * _REFERENCE.size
     claimed = sum(length for length, _, _ in _REFERENCE.iter_unpack(references[:whole]))
     if claimed > size:

@@ -12,7 +12,7 @@ import numpy as np
 
 from vsacli.base.streams import place_of
 from vsacli.documents.source import Source
-from vsacli.results.store.damage import own_dataset
+from vsacli.results.store.damage import CheckedFile, own_dataset
 from vsacli.results.store.schema import TEXT, storable
 
 LARGEST_STORED = 256 * 2**20
@@ -82,7 +82,7 @@ def _write_content(group: h5py.Group, source: Source) -> None:
         return  # it has gone, and the run with what was read of it goes on
 
 
-def read_sources(file: h5py.File) -> Iterator[StoredInput]:
+def read_sources(file: CheckedFile) -> Iterator[StoredInput]:
     """The files, in the order in which they were written."""
     number = 1
     while (name := f"inputs/file_{number}") in file:
@@ -96,7 +96,7 @@ def read_sources(file: h5py.File) -> Iterator[StoredInput]:
         number += 1
 
 
-def _content(file: h5py.File, name: str) -> bytes | None:
+def _content(file: CheckedFile, name: str) -> bytes | None:
     if f"{name}/text" in file:
         text: str = own_dataset(file, f"{name}/text").asstr()[()]
         return text.encode()

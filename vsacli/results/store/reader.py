@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar, cast
@@ -16,12 +17,20 @@ from vsacli.base.arrays import FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line, shown
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
-from vsacli.results.store.damage import bounded, open_checked, own_dataset, reporting_damage
+from vsacli.results.store.damage import (
+    CheckedFile,
+    bounded,
+    own_dataset,
+    read_attributes,
+    reporting_damage,
+)
 from vsacli.results.store.inputs import StoredInput, read_sources
 from vsacli.results.store.schema import FORMAT, row_shape, storage_type
 
 GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
 
+BLOCK_SAMPLES = 8192
+"""Samples that are read at a time to see whether they can be."""
 
 COMPUTED_BY = ("engine", "compiler", "threads")
 """Attributes that older files have not."""
@@ -42,7 +51,6 @@ class StoredResult:
         gear_ratio: (joints, 2), of the motors; NaN where the robot file gives none.
         variables: names of the variables the file holds, in declared order, without `time`.
         samples: number of steps stored.
-        time: (samples,) in s.
         report_json: the report of the run, as in `--json`.
     """
 
@@ -62,7 +70,7 @@ class StoredResult:
         """
         return open_one_of(path, cls)
 
-    def __init__(self, path: str | Path, file: h5py.File) -> None:
+    def __init__(self, path: str | Path, file: CheckedFile) -> None:
         self.path = Path(path)
         self._file = file
         with reporting_damage(path):
@@ -78,10 +86,9 @@ class StoredResult:
             self.variables = tuple(
                 name for name, variable in self.declared.items() if variable.dims and name in file
             )
-            self.time: FloatArray = self._bounded("time")[...]
-            self.samples = len(self.time)
+            self.samples = self._samples()
             self.report_json = self._json("report/json")
-            self._check_shapes()
+        self._whole: set[str] = set()
 
     def _bounded(self, name: str) -> h5py.Dataset:
         return bounded(own_dataset(self._file, name))
@@ -103,29 +110,60 @@ class StoredResult:
             raise ValueError(f"{name} is no JSON object")
         return cast("dict[str, Any]", shown(content))
 
-    def _check_shapes(self) -> None:
-        """Refuse what does not fit together, so that every variable can be read piece by piece."""
-        joints = len(self.joint_names)
-        if {len(self.joint_types), len(self.actuators)} != {joints} or self.time.ndim != 1:
+    def _samples(self) -> int:
+        """How many there are, if joints and times fit together."""
+        shape = self._bounded("time").shape
+        if {len(self.joint_types), len(self.actuators)} != {len(self.joint_names)} or len(shape) != 1:
             raise ValueError("joints and times do not fit together")
-        for name in self.variables:
-            dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name])
-            shape = (self.samples, *row_shape(self.declared[name], joints))
-            if dataset.shape != shape or dataset.dtype != expected:
-                raise ValueError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")
+        return int(shape[0])
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """Times, (samples,), s.
+
+        Raises:
+            InputError: they are damaged.
+        """
+        with reporting_damage(self.path, "time"):
+            values: FloatArray = self._bounded("time")[...]
+        return values
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
         """Steps start..stop-1 of a variable, (steps, joints) or (steps, joints, 2), in its declared units.
 
         Raises:
-            InputError: there is no such variable, the file does not hold it, or the file is damaged.
+            InputError: there is no such variable, the file does not hold it, or it is damaged there.
         """
         select_variables([name], self.declared)
         if name not in self._file:
             raise InputError.one(f"holds no {name}; {self._to_get.format(name)}", self.path)
-        with reporting_damage(self.path):
+        with reporting_damage(self.path, name):
+            self._check_layout(name)
             values: FloatArray | FlagArray = self._file[name][start:stop]
         return values
+
+    def _check_layout(self, name: str) -> None:
+        """Refuse a variable that does not fit the others, so that it can be read piece by piece."""
+        if name in self._whole:
+            return
+        dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name])
+        shape = (self.samples, *row_shape(self.declared[name], len(self.joint_names)))
+        if dataset.shape != shape or dataset.dtype != expected:
+            raise ValueError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")
+        self._whole.add(name)
+
+    def check(self) -> None:
+        """Read everything once, which opening a file does not.
+
+        Raises:
+            InputError: something is damaged.
+        """
+        for name in ("time", *self.variables):
+            for start in range(0, self.samples, BLOCK_SAMPLES):
+                self.read(name, start, start + BLOCK_SAMPLES)
+        self.provenance()
+        with reporting_damage(self.path):
+            read_attributes(self._file)
 
     def provenance(self) -> dict[str, Any]:
         """Who made the file, when, with which versions, and path and SHA-256 of each file that was read.
@@ -175,7 +213,7 @@ def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
         InputError, StorageError: as `StoredResult.open`.
     """
     with contextlib.ExitStack() as stack:
-        file = stack.enter_context(open_checked(path))
+        file = stack.enter_context(CheckedFile(path))
         found = _format(path, file)
         kind = next((kind for kind in kinds if kind.format == found), None)
         if kind is None:
@@ -191,7 +229,7 @@ def stored_format(path: str | Path) -> str | None:
     Raises:
         InputError, StorageError: as `StoredResult.open`.
     """
-    with open_checked(path) as file:
+    with CheckedFile(path) as file:
         return _format(path, file)
 
 
