@@ -7,13 +7,15 @@ import os
 import stat
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
 from vsacli.base import staging
 from vsacli.base.errors import InputError, StorageError
-from vsacli.base.outputs import Outputs
+from vsacli.base.outputs import Outputs, Staged
+from vsacli.base.storage import reporting_storage_errors, temporary_folder
 
 
 def contents(folder: Path) -> dict[str, str]:
@@ -154,9 +156,52 @@ def test_the_leavings_of_dead_processes_are_swept_and_no_others(tmp_path: Path) 
     for name in (left, living, elsewhere, used_again, *strange):
         (tmp_path / name).write_text("half", encoding="utf-8")
     (tmp_path / left.replace(left[-20:-4], "0" * 16)).mkdir()
+    owners = {each.path.name: each.owner for each in staging.unfinished(tmp_path)}
+    assert owners[left] is staging.Owner.ENDED
+    assert owners[living] is staging.Owner.RUNNING
+    assert owners[elsewhere] is staging.Owner.ELSEWHERE
+    assert len(owners) == 5
     with Outputs() as outputs:
         outputs.file(tmp_path / "a")
     kept = {living, elsewhere, *strange, "a"}
     if staging._start(os.getpid()) == staging.UNKNOWN_START:
         kept.add(used_again)  # a system that does not say when a process began
     assert {path.name for path in tmp_path.iterdir()} == kept
+
+
+def fail(path: Path) -> None:
+    """Report a full disk as one that a file is written to."""
+    with reporting_storage_errors(path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def test_a_full_folder_for_temporary_files_is_named_itself() -> None:
+    match = "^folder for temporary files: cannot be used: the disk is full; name another one by .* TMPDIR$"
+    with pytest.raises(StorageError, match=match), temporary_folder() as place:
+        fail(Staged.unnamed(place / "result.h5").path)
+    assert not place.exists()
+
+
+def test_what_fails_elsewhere_is_not_the_fault_of_temporary_files(tmp_path: Path) -> None:
+    match = r"r\.h5: cannot be written: the disk is full"
+    with pytest.raises(StorageError, match=match), temporary_folder():
+        fail(tmp_path / "r.h5")
+
+
+def test_temporary_folders_of_killed_processes_are_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    script = (
+        "import os; from vsacli.base.storage import temporary_folder;"
+        "context = temporary_folder(); print(context.__enter__()); os.kill(os.getpid(), 9)"
+    )
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", script], env=environment, check=False, capture_output=True)
+    (left,) = tmp_path.iterdir()
+    assert stat.S_IMODE(left.stat().st_mode) == 0o700
+    (tmp_path / "elsewhere").mkdir()
+    link = tmp_path / left.name.replace(left.name[-20:-4], "0" * 16)
+    link.symlink_to("elsewhere")
+    with temporary_folder() as place:
+        assert set(tmp_path.iterdir()) == {place, tmp_path / "elsewhere"}

@@ -14,12 +14,11 @@ from samples.command_line import ROBOT
 from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 
+from vsacli.base.staging import staging_name
 from vsacli.compute.engine import cache, choose
 from vsacli.compute.engine.cache import (
-    ABANDONED_AFTER,
     CHECKSUM,
     LIBRARY,
-    UNFINISHED,
     Cache,
     CacheError,
     open_cache,
@@ -58,10 +57,10 @@ def files(folder: Path) -> list[str]:
 def test_library_is_kept_and_found(folder: Path):
     assert warnings() == ()
     assert files(folder) == [CHECKSUM, LIBRARY]
-    (entry,) = folder.iterdir()
-    built = entry.stat().st_mtime_ns
+    (library,) = folder.rglob(LIBRARY)
+    built = library.stat().st_mtime_ns
     assert warnings() == ()
-    assert entry.stat().st_mtime_ns == built
+    assert library.stat().st_mtime_ns == built
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
@@ -138,30 +137,102 @@ def test_full_disk_is_told_and_leaves_nothing(folder: Path, monkeypatch: pytest.
 
 
 def test_what_a_killed_process_left_is_swept(tmp_path: Path):
-    old, new = (tmp_path / f"{UNFINISHED}{name}" for name in ("old", "new"))
+    script = "from vsacli.base.staging import staging_name; print(staging_name())"
+    dead = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    old, new = (tmp_path / name for name in (dead.stdout.strip(), staging_name()))
     for left in (old, new):
         left.mkdir()
         (left / LIBRARY).write_bytes(b"half")
-    then = old.stat().st_mtime - 2 * ABANDONED_AFTER
-    os.utime(old, (then, then))
-    library = tmp_path / "built.so"
-    library.write_bytes(b"whole")
-    Cache(tmp_path).store("key", library)
-    stored = Cache(tmp_path).find("key")
-    assert stored is not None
-    assert stored.read_bytes() == b"whole"
+    stored(tmp_path, "key", b"whole")
+    library = Cache(tmp_path).find("key")
+    assert library is not None
+    assert library.read_bytes() == b"whole"
     assert not old.exists()
     assert new.exists()
+    assert [entry.key for entry in Cache(tmp_path).entries()] == ["key"]
+
+
+def stored(folder: Path, key: str, content: bytes, used: float | None = None) -> None:
+    """Put a library into a cache, last used then."""
+    built = folder.with_name("built.so")
+    built.write_bytes(content)
+    Cache(folder).store(key, built)
+    if used is not None:
+        os.utime(folder / key, (used, used))
+
+
+@pytest.fixture
+def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache of at most 3 kB, with room for three libraries."""
+    monkeypatch.setattr(cache, "MOST_BYTES", 3500)
+    (tmp_path / "small").mkdir()
+    return tmp_path / "small"
+
+
+def test_what_was_not_used_for_the_longest_time_makes_room(small: Path):
+    for number, key in enumerate(["a", "b", "c"]):
+        stored(small, key, bytes(1000), used=1e9 + number)
+    assert Cache(small).find("a") is not None  # by which it is the one used last
+    stored(small, "d", bytes(1000))
+    assert {path.name for path in small.iterdir()} == {"a", "c", "d"}
+    stored(small, "large", bytes(10_000))
+    assert [path.name for path in small.iterdir()] == ["large"]
+
+
+def test_a_library_that_is_removed_meanwhile_is_none(small: Path, monkeypatch: pytest.MonkeyPatch):
+    stored(small, "a", bytes(1000))
+    genuine = cache._checksum
+
+    def removing(path: Path) -> str:
+        Cache(small).clear()
+        return genuine(path)
+
+    monkeypatch.setattr(cache, "_checksum", removing)
+    assert Cache(small).find("a") is None
+
+
+CROWD = """
+import sys
+from pathlib import Path
+from vsacli.compute.engine import cache
+
+cache.MOST_BYTES = 3500
+folder = Path(sys.argv[1])
+library = folder.with_name(f"built-{sys.argv[2]}.so")
+for number in range(60):
+    key = f"{number * int(sys.argv[2]) % 17}"
+    found = cache.Cache(folder).find(key)
+    if found is None:
+        library.write_bytes(key.encode() * 500)
+        cache.Cache(folder).store(key, library)
+    else:
+        try:
+            assert found.read_bytes() == key.encode() * 500
+        except FileNotFoundError:
+            pass  # removed since; the loader would compile it anew
+    if number == 40:
+        cache.Cache(folder).clear()
+"""
+
+
+def test_processes_that_make_room_at_once(small: Path):
+    command = [sys.executable, "-W", "error", "-c", CROWD, str(small)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    running = [subprocess.Popen([*command, str(seed)], **pipes) for seed in (3, 5, 7)]
+    assert [process.communicate(timeout=60) for process in running] == [("", "")] * 3
+    assert all(process.returncode == 0 for process in running)
+    entries = Cache(small).entries()
+    assert {path.name for path in small.iterdir()} == {entry.key for entry in entries}
+    assert sum(entry.size for entry in entries) <= 3500 + 3 * 1100  # each keeps what it has just stored
 
 
 def test_the_first_of_two_libraries_stays(tmp_path: Path):
     for content in (b"first", b"second"):
-        (tmp_path / "built.so").write_bytes(content)
-        Cache(tmp_path).store("key", tmp_path / "built.so")
+        stored(tmp_path, "key", content)
     library = Cache(tmp_path).find("key")
     assert library is not None
     assert library.read_bytes() == b"first"
-    assert not list(tmp_path.glob(f"{UNFINISHED}*"))
+    assert [path.name for path in tmp_path.iterdir()] == ["key"]
 
 
 @pytest.mark.slow

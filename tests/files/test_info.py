@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import json
 import math
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -276,3 +277,58 @@ def test_every_robot_that_comes_along_is_described(vsacli: Any, name: str) -> No
     assert done.code == 0
     table = [list(lines) for _, lines in itertools.groupby(done.out.splitlines(), bool)]
     assert len(table) >= 7
+
+
+def test_the_cache_is_shown_and_emptied(vsacli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    folder = tmp_path / "cache" / "vsacli"
+    left = ".vsacli-000000000000-1-1-0123456789abcdef.tmp"
+    for key in ("a", "b"):
+        (folder / key).mkdir(parents=True)
+        (folder / key / "program.so").write_bytes(bytes(1_500_000))
+    (tmp_path / "out" / left).mkdir(parents=True)
+    (tmp_path / "out" / left / "figure.png").write_bytes(bytes(20_000))
+    done = vsacli("info", "--cache", "out")
+    assert (done.code, done.err) == (0, "")
+    assert done.out.splitlines() == [
+        f"compiled code: 2 libraries, 3 MB of at most 100 MB, in {folder}",
+        f"unfinished: out/{left}, 0.02 MB, of another host or container: "
+        "remove it if nothing runs there any more",
+    ]
+    assert json.loads(vsacli("info", "--cache", "out", "--json").out) == {
+        "kind": "cache",
+        "folder": str(folder),
+        "entries": 2,
+        "size": 3_000_000,
+        "limit": 100_000_000,
+        "unfinished": [{"path": f"out/{left}", "size": 20_000, "owner": "elsewhere"}],
+    }
+    assert vsacli("info", "--cache", "--field", "entries").out == "2\n"
+    assert vsacli("info", "--cache", "--clear").out.startswith("compiled code: 0 libraries, 0 MB of")
+    assert not list(folder.iterdir())
+    assert (tmp_path / "out" / left).is_dir()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        ((), 2, "Error: Missing argument 'FILE'."),
+        (("--clear", "x"), 2, "Error: --clear empties the cache; give --cache, too"),
+        (("--cache", "nowhere"), 2, "nowhere: is no folder, in which to look for unfinished files"),
+    ],
+    ids=["nothing", "clear alone", "no folder"],
+)
+def test_ways_to_ask_for_nothing(vsacli: Any, arguments: tuple[str, ...], code: int, message: str) -> None:
+    done = vsacli("info", *arguments)
+    assert (done.code, done.out) == (code, "")
+    assert done.err.splitlines()[-1] == message
+
+
+def test_a_cache_that_cannot_be_used(vsacli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    done = vsacli("info", "--cache")
+    assert (done.code, done.out) == (4, "")
+    assert done.err.startswith("compiled code: there is no cache folder: ")

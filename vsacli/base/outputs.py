@@ -32,6 +32,13 @@ class Staged:
     target: Path
     temporary: Path
 
+    @classmethod
+    def unnamed(cls, path: Path) -> Staged:
+        """A file that goes with the temporary folder it is in."""
+        with reporting_storage_errors(path):
+            path.touch()
+        return cls(path, path, path)
+
     def write_text(self, text: str) -> None:
         """Write a text.
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from vsacli.base.errors import StorageError
+from vsacli.base.staging import remove, staging_name, sweep
 
 _REASON = {
     errno.ENOSPC: "the disk is full",
@@ -53,15 +54,30 @@ def reporting_temporary_errors() -> Iterator[None]:
 def temporary_folder() -> Iterator[Path]:
     """A new folder, which goes with all that is in it at the end of the context.
 
-    Raises:
-        StorageError: there is no place for one.
-    """
-    from tempfile import TemporaryDirectory
+    Those of killed processes are removed. What the disk refuses to take in it is told as a fault of the
+    folder for temporary files, whatever the file there is called.
 
-    with contextlib.ExitStack() as stack:
+    Raises:
+        StorageError: there is no place for one, or not enough of it.
+    """
+    from tempfile import gettempdir
+
+    with reporting_temporary_errors():
+        place = Path(gettempdir())
+    sweep(place)
+    folder = place / staging_name()
+    try:
         with reporting_temporary_errors():
-            folder = stack.enter_context(TemporaryDirectory(prefix="vsacli-", ignore_cleanup_errors=True))
-        yield Path(folder)
+            folder.mkdir(mode=0o700)
+        try:
+            yield folder
+        except StorageError as error:
+            if isinstance(error.__cause__, OSError) and Path(error.path).is_relative_to(folder):
+                with reporting_temporary_errors():
+                    raise error.__cause__ from None
+            raise
+    finally:
+        remove(folder)
 
 
 def check_target(path: str | Path, *, overwrite: bool) -> Path:
@@ -100,7 +116,7 @@ def check_free_space(path: str | Path, size: int) -> None:
             path,
             f"needs {size / 1e6:.0f} MB, but the disk has {free / 1e6:.0f} MB left; "
             "free some space, or store fewer variables with --variables",
-        )
+        ) from OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _reason(error: OSError) -> str:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import cache
-from typing import IO
 
-from vsacli.base.storage import reporting_temporary_errors
+from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 
 STANDARD = "-"
 """Stands for the stream; a file of that name is `./-`."""
+
+BYTES_PER_READ = 2**20
 
 
 _copies: ContextVar[Mapping[str, str]] = ContextVar("copies", default={})  # noqa: B039 - never changed
@@ -32,7 +33,7 @@ def place_of(path: str | os.PathLike[str]) -> str:
     copies = _copies.get()
     if name in copies:
         return copies[name]
-    return _standard_input().name if name == STANDARD else name
+    return _standard_input() if name == STANDARD else name
 
 
 @contextmanager
@@ -46,15 +47,18 @@ def reading_copies(copies: Mapping[str, str]) -> Iterator[None]:
 
 
 @cache
-def _standard_input() -> IO[bytes]:
-    """A temporary file that goes with the process: inputs are read more than once, to name lines."""
-    import shutil
-    import tempfile
+def _standard_input() -> str:
+    """A copy that goes with the process: inputs are read more than once, to name lines."""
+    import atexit
 
     if sys.stdin is None:
         raise OSError(0, "standard input is closed")
+    kept = ExitStack()
+    atexit.register(kept.close)
+    copy = kept.enter_context(temporary_folder()) / "stdin"
     with reporting_temporary_errors():
-        copy = tempfile.NamedTemporaryFile(prefix="vsacli-")  # noqa: SIM115 - it lasts as long as the process
-    shutil.copyfileobj(sys.stdin.buffer, copy)
-    copy.flush()
-    return copy
+        file = kept.enter_context(copy.open("wb", buffering=0))
+    while piece := sys.stdin.buffer.read(BYTES_PER_READ):
+        with reporting_temporary_errors():
+            file.write(piece)
+    return str(copy)

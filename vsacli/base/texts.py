@@ -31,6 +31,11 @@ def for_markdown(text: str) -> str:
     return _MARKDOWN.sub(r"\\\1", one_line(text))
 
 
+def sentence(clause: str) -> str:
+    """With a full stop, unless it ends as a question."""
+    return clause if clause.endswith(("?", ".")) else f"{clause}."
+
+
 def shown(content: Any) -> Any:
     """JSON values with every text in one line."""
     match content:

@@ -129,7 +129,7 @@ def check_feasibility(
 
 def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: Talk) -> Report:
     """Compute, and draw the figure from a result file that exists no longer than it takes."""
-    from vsacli.base.outputs import Outputs
+    from vsacli.base.outputs import Staged
     from vsacli.base.storage import temporary_folder
     from vsacli.results.plots import (
         FEASIBILITY,
@@ -143,8 +143,8 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
 
     check_drawable([joint.actuator_type for joint in run.robot.joints])
     figures = FigureFiles([FEASIBILITY], folder, stem, "png", outputs)
-    with temporary_folder() as place, Outputs() as passing:
-        file = passing.file(place / "result.h5")
+    with temporary_folder() as place:
+        file = Staged.unnamed(place / "result.h5")
         report = compute(run, talk, ResultWriter(file, run.robot, run.trajectory, FEASIBILITY_VARIABLES))
         with StoredResult.open(file.temporary) as result:
             figures.save({FEASIBILITY: plot_feasibility(result)})

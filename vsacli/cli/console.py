@@ -122,15 +122,28 @@ class _NoProgress:
 
 
 def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--quiet` and `--verbose`; the command receives them as one argument `talk`."""
+    """Add `--quiet` and `--verbose`; the command receives them as one argument `talk`, and no empty text."""
 
     @click.option("-q", "--quiet", is_flag=True, help="No notes and no progress bar on stderr.")
     @click.option("-v", "--verbose", is_flag=True, help="More notes on stderr.")
     @wraps(command)
     def talking(*args: Any, quiet: bool, verbose: bool, **kwargs: Any) -> Any:
+        _refuse_empty_texts(click.get_current_context())
         return command(*args, talk=Talk(quiet, verbose), **kwargs)
 
     return talking
+
+
+def _refuse_empty_texts(context: click.Context) -> None:
+    """An argument of no letters is a variable of the shell that was not set, and never meant.
+
+    Raises:
+        click.BadParameter: there is one.
+    """
+    for parameter in context.command.params:
+        value = context.params.get(parameter.name or "")
+        if value == "" or (isinstance(value, tuple) and "" in value):
+            raise click.BadParameter("is empty; say what is meant", context, parameter)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from vsacli.cli.console import Talk, talk_options
     short_help="Show what a robot, trajectory or result holds.",
     epilog=example("vsacli info robots/vsa_3r.yaml --field joints.elbow.static_load.torque"),
 )
-@click.argument("file")
+@click.argument("file", required=False)
 @click.option("--robot", metavar="ROBOT", help="The robot that a trajectory is for.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 @click.option(
@@ -33,26 +33,60 @@ from vsacli.cli.console import Talk, talk_options
     metavar="FOLDER",
     help="Write the files that a result was computed from there instead.",
 )
+@click.option("--cache", is_flag=True, help="Show the cache of compiled code instead, and unfinished files.")
+@click.option("--clear", is_flag=True, help="With --cache: empty it first.")
 @talk_options
 def info(
-    file: str, robot: str | None, as_json: bool, field: str | None, folder: str | None, talk: Talk
+    file: str | None,
+    robot: str | None,
+    as_json: bool,
+    field: str | None,
+    folder: str | None,
+    cache: bool,
+    clear: bool,
+    talk: Talk,
 ) -> None:
     """Show what a FILE holds: a robot, a trajectory, a result or a simulation.
 
     Of a robot, Denavit-Hartenberg rows, links, actuators, reach, static load and reachable stiffness; of a
     trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report.
-    """
-    if folder is not None:
-        _extract(file, folder, talk)
-        return
-    from vsacli.base.json_records import json_value
-    from vsacli.files.info import describe_file, render
 
-    description = describe_file(file, robot)
+    With --cache, show where compiled code is kept and how much of it, and what interrupted commands have
+    left, or others are still writing, in the folder FILE, by default this one, and in that for temporary
+    files.
+    """
+    if clear and not cache:
+        raise click.UsageError("--clear empties the cache; give --cache, too")
+    if cache:
+        _show(_cache(file or ".", clear), as_json, field)
+    elif file is None:
+        raise click.UsageError("Missing argument 'FILE'.")
+    elif folder is not None:
+        _extract(file, folder, talk)
+    else:
+        from vsacli.files.info import describe_file
+
+        _show(describe_file(file, robot), as_json, field)
+
+
+def _show(description: dict[str, Any], as_json: bool, field: str | None) -> None:
+    from vsacli.base.json_records import json_value
+    from vsacli.files.info import render
+
     if field is not None:
         click.echo(_found(description, field))
     else:
         click.echo(json.dumps(json_value(description), indent=1) if as_json else render(description))
+
+
+def _cache(folder: str, clear: bool) -> dict[str, Any]:
+    from vsacli.files.info import clear_cache, describe_cache
+
+    if not Path(folder).is_dir():
+        raise InputError.one("is no folder, in which to look for unfinished files", folder)
+    if clear:
+        clear_cache()
+    return describe_cache(folder)
 
 
 def _extract(file: str, folder: str, talk: Talk) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate, pairwise
 from typing import TypeVar
@@ -40,3 +41,27 @@ class RowLayout:
     def pack(self, rows: Mapping[str, Iterable[_Row]]) -> list[_Row]:
         """The rows of all arrays."""
         return [row for name in self.shapes for row in rows[name]]
+
+
+class RowKernel(ABC):
+    """A kernel, as engines carry out, whose rows are arrays by name."""
+
+    @property
+    @abstractmethod
+    def arguments(self) -> RowLayout:
+        """Rows that it takes."""
+
+    @property
+    @abstractmethod
+    def results(self) -> RowLayout:
+        """Rows that it gives."""
+
+    @property
+    def inputs(self) -> int:
+        """Number of rows taken."""
+        return self.arguments.size
+
+    @property
+    def outputs(self) -> int:
+        """Number of rows given."""
+        return self.results.size

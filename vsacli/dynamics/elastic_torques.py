@@ -14,7 +14,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
 from vsacli.compute.engine import Engine, choose
-from vsacli.compute.rows import RowLayout
+from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import (
     ZERO,
     Scalar,
@@ -72,7 +72,7 @@ def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> Ti
 
 
 @dataclass(frozen=True)
-class LinkTorques:
+class LinkTorques(RowKernel):
     """The recursion over rows of samples, for an engine.
 
     Inputs are q, dq, ddq, d3q, d4q of the joints, then the wrench and its two derivatives if there is one;
@@ -96,16 +96,6 @@ class LinkTorques:
     def results(self) -> RowLayout:
         """Rows that the recursion gives."""
         return RowLayout(dict.fromkeys(TORQUES, (len(self.robot.joints),)))
-
-    @property
-    def inputs(self) -> int:
-        """Number of rows taken."""
-        return self.arguments.size
-
-    @property
-    def outputs(self) -> int:
-        """Number of rows given."""
-        return self.results.size
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(60)."""

@@ -17,7 +17,7 @@ from vsacli.base.json_records import Stored
 from vsacli.base.signals import COMMANDED, commanded_names, orders_of_derivation
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
-from vsacli.compute.rows import RowLayout
+from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import Scalar
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
@@ -45,7 +45,7 @@ class Stop(Stored):
 
 
 @dataclass(frozen=True)
-class InverseDynamics:
+class InverseDynamics(RowKernel):
     """Inverse dynamics (36)-(74) over rows of samples, for an engine.
 
     Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, then the
@@ -88,16 +88,6 @@ class InverseDynamics:
         joints = len(self.robot.joints)
         of_motors = {name for name in COMPUTED if "motor" in VARIABLES[name].dims}
         return RowLayout({name: (joints, SIDES) if name in of_motors else (joints,) for name in COMPUTED})
-
-    @property
-    def inputs(self) -> int:
-        """Number of rows taken."""
-        return self.arguments.size
-
-    @property
-    def outputs(self) -> int:
-        """Number of rows given."""
-        return self.results.size
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74)."""

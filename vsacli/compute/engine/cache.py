@@ -6,28 +6,41 @@ import hashlib
 import os
 import shutil
 import stat
-import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from typing import NamedTuple
 
 from vsacli.base.errors import VsacliError
+from vsacli.base.staging import is_folder, owner_of, remove, size_of, staging_name, sweep
 
 LIBRARY = "program.so"
 CHECKSUM = "program.sha256"
-UNFINISHED = "unfinished-"
-ABANDONED_AFTER = 3600.0
-"""Age in seconds from which on an unfinished folder is that of a process that was killed."""
+
+MOST_BYTES = 100_000_000
+"""Of all libraries together, those of some hundred robots; beyond it the ones longest unused go."""
 
 
 class CacheError(VsacliError):
     """The cache folder, or something in it, cannot be used; the message says why."""
 
 
+class Entry(NamedTuple):
+    """A stored library: when it was last used, s since 1970, its bytes, and its key."""
+
+    used: float
+    size: int
+    key: str
+
+
 @dataclass(frozen=True)
 class Cache:
-    """Libraries in a folder; get it from `open_cache`."""
+    """Libraries in a folder; get it from `open_cache`.
+
+    Several processes may use it at a time. A library gets its place, and leaves it, by renaming its folder:
+    it is there whole or not at all, and one that is loaded stays so whoever removes it.
+    """
 
     folder: Path
 
@@ -44,26 +57,59 @@ class Cache:
             if (self.folder / key / CHECKSUM).read_text(encoding="ascii", errors="replace") == _checksum(
                 library
             ):
+                os.utime(library.parent)
                 return library
+        if not library.parent.exists():
+            return None  # another process has removed it meanwhile
         self._remove(key)
         raise CacheError(f"{library} was damaged; it is removed")
 
     def store(self, key: str, library: Path) -> None:
         """Copy a library to its place, whole or not at all; of two processes at it, the first one's stays.
 
+        Others that were not used for long make room for it.
+
         Raises:
             CacheError: there is no room or no permission.
         """
         try:
-            self._sweep()
-            with TemporaryDirectory(prefix=UNFINISHED, dir=self.folder, ignore_cleanup_errors=True) as folder:
-                entry = Path(folder) / key
-                entry.mkdir()
+            with self._staged() as folder:
+                entry = folder / key
+                entry.mkdir(parents=True)
                 shutil.copyfile(library, entry / LIBRARY)
                 (entry / CHECKSUM).write_text(_checksum(library), encoding="ascii")
                 _move(entry, self.folder / key)
+            self._make_room(key)
         except OSError as error:
             raise CacheError(f"the cache folder {self.folder} cannot be written: {error.strerror}") from None
+
+    def entries(self) -> list[Entry]:
+        """All libraries, that which was not used for the longest time first."""
+        found = []
+        for path in self.folder.iterdir():
+            with suppress(FileNotFoundError):  # removed meanwhile
+                if is_folder(path) and owner_of(path.name) is None:
+                    found.append(Entry(path.stat().st_mtime, size_of(path), path.name))
+        return sorted(found)
+
+    def clear(self) -> None:
+        """Remove all libraries.
+
+        Raises:
+            CacheError: no permission.
+        """
+        sweep(self.folder)
+        for entry in self.entries():
+            self._remove(entry.key)
+
+    def _make_room(self, new: str) -> None:
+        """Remove what was not used for the longest time until the rest is within bounds; a new one stays."""
+        entries = self.entries()
+        excess = sum(entry.size for entry in entries) - MOST_BYTES
+        for entry in entries:
+            if excess > 0 and entry.key != new:
+                self._remove(entry.key)
+                excess -= entry.size
 
     def _remove(self, key: str) -> None:
         """Out of the way of others at once, then for good.
@@ -72,21 +118,22 @@ class Cache:
             CacheError: no permission.
         """
         try:
-            with TemporaryDirectory(prefix=UNFINISHED, dir=self.folder) as folder:
-                (self.folder / key).rename(Path(folder) / key)
+            with self._staged() as folder:
+                (self.folder / key).rename(folder)
         except FileNotFoundError:  # somebody else was faster
             pass
         except OSError as error:
-            raise CacheError(
-                f"{self.folder / key} is damaged and cannot be removed: {error.strerror}"
-            ) from None
+            raise CacheError(f"{self.folder / key} cannot be removed: {error.strerror}") from None
 
-    def _sweep(self) -> None:
-        """Remove what killed processes left."""
-        for folder in self.folder.glob(f"{UNFINISHED}*"):
-            with suppress(OSError):
-                if folder.stat().st_mtime < time.time() - ABANDONED_AFTER:
-                    shutil.rmtree(folder)
+    @contextmanager
+    def _staged(self) -> Iterator[Path]:
+        """A name for a folder of this process, which goes; those of processes that were killed go as well."""
+        sweep(self.folder)
+        staged = self.folder / staging_name()
+        try:
+            yield staged
+        finally:
+            remove(staged)
 
 
 def open_cache() -> Cache:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
-from vsacli.base.texts import for_markdown
+from vsacli.base.texts import for_markdown, sentence
 from vsacli.base.version import __version__
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.header import comment, header_text
@@ -92,7 +92,7 @@ def readme_text(
     """How to use the code."""
     return _README.format(
         name=for_markdown(robot.name),
-        warnings="".join(f"\nWarning: {for_markdown(warning)}.\n" for warning in robot.warnings),
+        warnings="".join(f"\nWarning: {for_markdown(sentence(warning))}\n" for warning in robot.warnings),
         prefix=prefix,
         upper=prefix.upper(),
         tolerance=TOLERANCE[precision],
@@ -100,7 +100,7 @@ def readme_text(
             f"- `{signature(prefix, function)}`: {function.meaning}" for function in functions
         ),
         joints=", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names)),
-        omitted="".join(f"There is {reason}.\n" for reason in omitted),
+        omitted="".join(f"There is {sentence(reason)}\n" for reason in omitted),
     )
 
 
@@ -131,7 +131,7 @@ def generate(robot: Robot, precision: str = "double") -> Project:
     functions, omitted = _functions(robot)
     prefix = prefix_of(robot)
     title = f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
-    head = comment(" ".join([title, *(f"Warning: {warning}." for warning in robot.warnings)]))
+    head = comment(" ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)]))
     try:
         files = {
             f"{prefix}.h": header_text(prefix, robot, functions, precision, head),

@@ -137,6 +137,18 @@ def _report(kind: str, report: Description) -> str:
         return "its report has another form than this version writes; --json shows it"
 
 
+def _cache(cache: Description) -> Iterator[str]:
+    libraries = "1 library" if cache["entries"] == 1 else f"{cache['entries']} libraries"
+    size, limit = _megabytes(cache["size"]), _megabytes(cache["limit"])
+    yield f"compiled code: {libraries}, {size} of at most {limit}, in {cache['folder']}"
+    for each in cache["unfinished"]:
+        yield f"unfinished: {each['path']}, {_megabytes(each['size'])}, {_OWNERS[each['owner']]}"
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.3g} MB"
+
+
 def _left(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
     """A table with all its columns to the left."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -168,9 +180,15 @@ def _span(ends: Sequence[float], unit: str) -> str:
     return f"to {_short(high)} {unit}" if math.isinf(low) else f"{_short(low)} to {_short(high)} {unit}"
 
 
+_OWNERS = {
+    "ended": "of a process that has ended: the next command that writes there removes it",
+    "running": "of a process that is running",
+    "elsewhere": "of another host or container: remove it if nothing runs there any more",
+}
 _RENDERERS: dict[str, Callable[[Description], Iterator[str]]] = {
     "robot": _robot,
     "trajectory": _trajectory,
     "result": _result,
     "simulation": _result,
+    "cache": _cache,
 }

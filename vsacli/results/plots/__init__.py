@@ -1,5 +1,13 @@
 """Figures of stored results: the only package that imports matplotlib (Figure API, no pyplot, no display)."""
 
+from vsacli.base.errors import StorageError
+
+try:
+    import matplotlib.font_manager  # noqa: F401 - where Matplotlib looks for a folder to keep what it finds
+except OSError as error:
+    reason = "Matplotlib has no folder for its files; name one by the environment variable MPLCONFIGDIR"
+    raise StorageError("figures", f"cannot be drawn: {reason}") from error
+
 from vsacli.results.plots.comparison import COMPARISON, compare_files
 from vsacli.results.plots.corridor_figure import (
     FEASIBILITY,
