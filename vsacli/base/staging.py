@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import enum
-import hashlib
 import os
 import platform
 import re
@@ -115,6 +114,8 @@ def remove(path: Path) -> None:
 @cache
 def _host() -> str:
     """This host, and what its numbers of processes refer to: containers may share a name."""
+    import hashlib
+
     try:
         namespace = os.readlink("/proc/self/ns/pid")
     except OSError:
