@@ -112,6 +112,11 @@ class Actuator(ABC):
         """Its motors as the joint has them."""
 
     @property
+    def coupled_rotors(self) -> float:
+        """B_12, by which either motor feels the acceleration of the other, joint side of the gears."""
+        return 0.0
+
+    @property
     def max_deflections(self) -> tuple[float, ...]:
         """Largest admissible |phi| at each motor; a limit that is flagged."""
         return (math.inf,) * self.motor_count

@@ -13,6 +13,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.actuators.rotors import Rotors
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.variables import VARIABLES
 
@@ -36,6 +37,7 @@ class Drivetrain:
         sprung: (motors,), whether the motor acts through a spring; of motors without one, one a joint.
         joint: (motors,), index of the joint of each motor.
         inertia, damping, max_torque: (motors,) of the motors, joint side of the gear.
+        rotors: of the motors with springs.
         rigid: (joints,), whether the joint has no spring.
         deflected: (joints, 2), where there is a motor whose phi is a deflection.
         chosen: indices of the joints whose stiffness is commanded.
@@ -55,6 +57,7 @@ class Drivetrain:
             np.array([getattr(motor, name) for _, motor in motors])
             for name in ("inertia", "damping", "max_torque")
         )
+        self.rotors = Rotors([actuator for actuator in actuators if actuator.sprung])
         self.chosen = np.flatnonzero(["stiffness" in actuator.commanded for actuator in actuators])
         self.spring_joint = self.joint[self.sprung]
         self._direct = np.flatnonzero(self.rigid)

@@ -5,6 +5,7 @@ The springs' potential takes the place of (14) and (61)-(72); a mechanism says w
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
@@ -21,9 +22,11 @@ from vsacli.actuators.mechanisms.state import MechanismState
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import reach
 from vsacli.actuators.transmission import Command, Transmission
+from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.errors import FieldProblem
 from vsacli.base.variables import Variable
-from vsacli.documents.fields import OneOf, Pair, Record, check_fields, value
+from vsacli.documents.fields import OneOf, Pair, Record, check_fields, number, value
 from vsacli.documents.source import Source
 
 SMALL_DEFLECTION = 1e-3
@@ -38,6 +41,12 @@ class Serial(Actuator):
     motor: tuple[Motor, Motor] = value(
         Pair(Record(Motor)), "motor 1, which carries the load, and motor 2, which sets the springs"
     )
+    coupled_inertia: float = number(
+        units.MOTOR_INERTIA,
+        "inertia B_12 by which either motor feels the other's acceleration, where motor 2 rides on motor 1; "
+        "joint side of the gears; of a motor with gear_ratio, its shaft",
+        default=0.0,
+    )
     mechanism: Mechanism = value(OneOf(MECHANISMS), "the springs and what motor 2 does to them")
 
     motor_count = 2
@@ -45,7 +54,16 @@ class Serial(Actuator):
     integrable = True
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        problems = []
+        first, second = (motor.inertia for motor in self.motors)
+        largest = math.sqrt(first * second)
+        if not abs(self.coupled_rotors) < largest:
+            reason = (
+                f"makes {abs(self.coupled_rotors):g} on the joint side, must be below {largest:g}, root of "
+                f"the product of both motors' inertias there, or B is not positive definite"
+            )
+            problems.append(FieldProblem(("coupled_inertia",), reason))
+        check_fields(self, *problems)
 
     @classmethod
     def has(cls, variable: Variable) -> list[bool]:
@@ -73,6 +91,12 @@ class Serial(Actuator):
     def motors(self) -> tuple[JointMotor, ...]:
         """Motors 1 and 2."""
         return tuple(motor.at_joint for motor in self.motor)
+
+    @property
+    def coupled_rotors(self) -> float:
+        """The coupled inertia times both gear ratios, with their signs."""
+        first, second = (motor.gear_ratio or 1.0 for motor in self.motor)
+        return self.coupled_inertia * first * second
 
     @property
     def warnings(self) -> tuple[str, ...]:

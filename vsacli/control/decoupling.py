@@ -64,7 +64,8 @@ class Decoupling:
             q, dq, link.ddq, link.d3q, v_q, reference.wrench
         )
         ddtheta = springs.motor_accelerations(link.ddq, ddtau_e, v_sigma)
-        return drivetrain.inertia * ddtheta + drivetrain.damping * dtheta + springs.tau_spring  # (73)-(74)
+        of_rotors = drivetrain.rotors.torques(ddtheta)
+        return of_rotors + drivetrain.damping * dtheta + springs.tau_spring  # (73)-(74)
 
     def link_motion(
         self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray, wrench: Wrench | None

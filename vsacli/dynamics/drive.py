@@ -63,9 +63,9 @@ def drive(
     actuator = joint.actuator
     dtheta = actuator.motor_positions(transmission.dphi, command.dq)  # (69)
     motors = actuator.motors
-    inertia = _by_motor([motor.inertia for motor in motors])
     damping = _by_motor([motor.damping for motor in motors])
-    tau_motor = inertia * transmission.ddtheta + damping * dtheta + transmission.tau_spring  # (73)-(74)
+    of_rotors = _rotor_torques(actuator, transmission.ddtheta)
+    tau_motor = of_rotors + damping * dtheta + transmission.tau_spring  # (73)-(74)
     driven = Drive(
         **transmission._asdict(),
         theta=actuator.motor_positions(transmission.phi, command.q),  # (69)
@@ -78,6 +78,13 @@ def drive(
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
     unexplained = not_finite_flags(_not_finite(actuator, of_joint))
     return driven._replace(flags=driven.flags | exceeded | unexplained)
+
+
+def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
+    """B theta'', (2, samples)."""
+    own = _by_motor([motor.inertia for motor in actuator.motors]) * ddtheta
+    coupling = actuator.coupled_rotors
+    return own + coupling * ddtheta[::-1] if coupling else own
 
 
 def _not_finite(actuator: Actuator, of_joint: OfJoint) -> BoolArray:

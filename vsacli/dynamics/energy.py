@@ -109,6 +109,7 @@ class RunEnergy:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._inertia, self._damping = _motor_constants(robot)
+        self._coupling = np.array([joint.actuator.coupled_rotors for joint in robot.joints])
         self._meter = EnergyMeter()
         self._last: _Rows | None = None
 
@@ -120,6 +121,10 @@ class RunEnergy:
         intervals = np.diff(joined.time)
         work = integrals(intervals, joined.passed_on, joined.rate)
         work += np.diff(joined.kinetic)
+        coupled = np.flatnonzero(self._coupling)
+        if coupled.size:
+            motion = joined.dtheta[coupled], joined.ddtheta[coupled]
+            work[coupled] += self._coupling[coupled, None, None] * work_on_each_other(intervals, *motion)
         flow = Flow(intervals, work, joined.motor_power, joined.tau_spring, joined.elastic_energy)
         return over_time(self._meter.add(flow))
 
@@ -134,6 +139,8 @@ class RunEnergy:
         torque *= dtheta
         return _Rows(
             time=block.time,
+            dtheta=dtheta,
+            ddtheta=ddtheta,
             kinetic=self._inertia / 2 * dtheta**2,
             passed_on=torque,
             rate=rate,
@@ -151,6 +158,8 @@ class _Rows(NamedTuple):
     """What the work of motors follows from: B theta'^2/2, and the power passed on or lost, with its rate."""
 
     time: FloatArray
+    dtheta: FloatArray
+    ddtheta: FloatArray
     kinetic: FloatArray
     passed_on: FloatArray
     rate: FloatArray
@@ -204,6 +213,30 @@ def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> F
     integral += values[..., :-1]
     integral *= intervals / 2
     return integral
+
+
+def work_on_each_other(intervals: FloatArray, dtheta: FloatArray, ddtheta: FloatArray) -> FloatArray:
+    """Integral of each motor's velocity times the acceleration of the other over each interval.
+
+    By the cubics with the velocities and accelerations at the ends; error O(h^5). The sum of both is the
+    difference of theta_1' theta_2', as it must be.
+
+    Args:
+        intervals: lengths h, (samples - 1,), s.
+        dtheta: (joints, 2, samples).
+        ddtheta: likewise.
+    """
+    before, after = dtheta[..., :-1], dtheta[..., 1:]
+    rise, rise_after = intervals * ddtheta[..., :-1], intervals * ddtheta[..., 1:]
+
+    def turned(one: FloatArray, two: FloatArray) -> FloatArray:
+        """What is one motor's times what is the other's, less the same with the motors exchanged."""
+        return one * two[:, ::-1] - two * one[:, ::-1]
+
+    area = turned(before, after) - turned(rise, rise_after) / 30
+    area += (turned(before, rise - rise_after) + turned(rise - rise_after, after)) / 5
+    whole = (after * after[:, ::-1] - before * before[:, ::-1]) + area
+    return whole / 2
 
 
 def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) -> FloatArray:

@@ -100,7 +100,6 @@ class Plant:
         self._rigid_inertia = self.drivetrain.direct(self.drivetrain.inertia)
         self._rigid_matrix = np.diag(self._rigid_inertia)
         self._rigid_damping = self.drivetrain.direct(self.drivetrain.damping)
-        self._inertia = self.drivetrain.inertia[self.drivetrain.sprung]
         self._damping = self.drivetrain.damping[self.drivetrain.sprung]
 
     def unpacked(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -145,8 +144,8 @@ class Plant:
         matrix = self.chain.mass_matrix(q) + self._rigid_matrix
         drive = tau_e + self.drivetrain.direct(torque)
         ddq = self.chain.solve(matrix, drive - self.chain.bias(q, dq, wrench) - self._rigid_damping * dq)
-        ddtheta = (torque[..., self.drivetrain.sprung] - self._damping * dtheta - spring) / self._inertia
-        return ddq, ddtheta
+        left = torque[..., self.drivetrain.sprung] - self._damping * dtheta - spring
+        return ddq, self.drivetrain.rotors.accelerations(left)
 
     def link_torque(
         self, dq: FloatArray, ddq: FloatArray, tau_e: FloatArray, torque: FloatArray

@@ -1,0 +1,44 @@
+"""Rotors of motors: the inertia B in (73)-(74), with the coupling of motors that ride on one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vsacli.actuators.actuator import Actuator
+from vsacli.base.arrays import FloatArray
+
+
+class Rotors:
+    """Rotors of all motors with springs in a row, joint by joint; arrays (..., motors).
+
+    Where motor 2 is carried around by motor 1, both feel either acceleration: B is a symmetric 2x2 matrix.
+    """
+
+    def __init__(self, actuators: Sequence[Actuator]) -> None:
+        motors = [
+            (motor.inertia, each.coupled_rotors, 1 - 2 * side)
+            for each in actuators
+            for side, motor in enumerate(each.motors)
+        ]
+        self._inertia, self._coupling, to_other = np.array(motors).reshape(-1, 3).T
+        self._coupled = np.flatnonzero(self._coupling)
+        self._other = self._coupled + to_other[self._coupled].astype(np.intp)
+
+    def torques(self, ddtheta: FloatArray) -> FloatArray:
+        """B theta''."""
+        torques: FloatArray = self._inertia * ddtheta
+        if self._coupled.size:
+            torques[..., self._coupled] += self._coupling[self._coupled] * ddtheta[..., self._other]
+        return torques
+
+    def accelerations(self, torques: FloatArray) -> FloatArray:
+        """Theta'' = B^-1 of what is left of the motors' torques."""
+        accelerations: FloatArray = torques / self._inertia
+        if self._coupled.size:
+            here, other = self._coupled, self._other
+            share = self._coupling[here] / self._inertia[other]
+            effective = self._inertia[here] - share * self._coupling[here]
+            accelerations[..., here] = (torques[..., here] - share * torques[..., other]) / effective
+        return accelerations
