@@ -14,7 +14,8 @@ GROUPS = {
     "Robots": "load_robot import_urdf Robot Joint DenavitHartenberg Link Inertia Pose Limits Antagonistic "
     "Elastic Rigid Motor laws Placeholders",
     "Trajectories": "load_trajectory Trajectory Motion Wrench",
-    "Inverse dynamics and its results": "inverse_dynamics Result Report Flag open_result suggest",
+    "Inverse dynamics and its results": "inverse_dynamics Result Report Flag open_result suggest "
+    "compare Comparison",
     "Links": "link_torques forward_kinematics jacobian mass_matrix",
     "Control and simulation": "State state_derivative Gains feedback_linearization FeedbackLinearization "
     "Integral simulate perturbed InitialError GoalTolerance Tolerances",

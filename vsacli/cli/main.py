@@ -33,6 +33,7 @@ _SECTIONS = {
     "Results": {
         "plot": "vsacli.cli.plot:plot",
         "export": "vsacli.cli.export:export",
+        "compare": "vsacli.cli.compare:compare",
     },
     "Files": {
         "new": "vsacli.cli.new:new",

@@ -35,7 +35,14 @@ MAX_ALIKE = 1000
 """Problems of one kind after which reading is given up."""
 NOT_UTF8 = "\ufffd"
 """What bytes that are not UTF-8 are read as."""
+_HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
+
+
+def split_heading(text: str) -> tuple[str, str | None]:
+    """Name of a column, and the unit in brackets that follows it, if one does."""
+    match = _HEADING.fullmatch(text)
+    return (text, None) if match is None else (match["name"], match["unit"])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,16 @@
-"""Questions that take many runs: what would make an infeasible motion possible."""
+"""Questions beyond a run: what would make a motion possible, and how far a measured one is from it."""
 
 from typing import TYPE_CHECKING
 
 from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from vsacli.studies.measured import Comparison, compare
     from vsacli.studies.remedies import suggest
 
 __all__ = [
+    "Comparison",
+    "compare",
     "suggest",
 ]
 __getattr__, __dir__ = lazy_exports(__name__)

@@ -24,6 +24,7 @@ from vsacli.results.plots.figures import (
     simulation_drawings,
 )
 from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
+from vsacli.results.plots.measured_figure import MeasuredCurve, measured_figure
 
 __all__ = [
     "COMPARISON",
@@ -32,10 +33,12 @@ __all__ = [
     "FORMATS",
     "RESULT_DRAWINGS",
     "FigureFiles",
+    "MeasuredCurve",
     "check_drawable",
     "compare_files",
     "drawable_figures",
     "drawings_of",
+    "measured_figure",
     "omitted_figures",
     "plot_feasibility",
     "plot_stored",

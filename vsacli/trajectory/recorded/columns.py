@@ -14,6 +14,7 @@ from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, wrench_columns
+from vsacli.documents.table import split_heading
 from vsacli.robot.commanded_joints import CommandedJoints
 
 TIME = "time"
@@ -25,7 +26,6 @@ _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
 _WRENCH_WAY: Way = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
 
-_HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 _PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
 
 
@@ -82,8 +82,8 @@ def column_layout(
     Raises:
         InputError: all that is wrong with the header.
     """
-    headings = [_HEADING.fullmatch(text) for text in header]
-    names = [text if match is None else match["name"] for text, match in zip(header, headings, strict=True)]
+    headings = [split_heading(text) for text in header]
+    names = [name for name, _ in headings]
     of_every_joint = [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in _PATTERNS]
     everything = [column for way in of_every_joint for column in _all(way)]
     ways = [_columns(pattern, joints) for pattern in _PATTERNS]
@@ -99,7 +99,7 @@ def column_layout(
         problems.append(f"columns are named both by joint and by number ({examples}); use one way")
     else:
         problems += _gaps(names, way, {signal.names[0] for signal in wanted})
-    units = [None if match is None else match["unit"] for match in headings]
+    units = [unit for _, unit in headings]
     columns = dict(_measured(names, units, way, joints, problems))
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)

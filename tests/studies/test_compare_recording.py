@@ -1,0 +1,162 @@
+"""`vsacli compare`: a recording, made here from exported columns, against its result."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from samples.command_line import ROBOT, edited
+
+from vsacli import compare
+
+BEGIN = 0.5137
+"""Of the result in the recording, s; no multiple of the 2 ms between its rows."""
+
+MOTION = """\
+format: vsacli-trajectory/1
+name: wave
+duration: 3
+rate: 500
+position: {type: polynomial, degree: 7, start: [0, 0, 0], end: [0.9, 0.5, -0.7]}
+stiffness: {type: polynomial, degree: 5, start: 900, end: 1200}
+"""
+
+
+@pytest.fixture
+def computed(vsacli, tmp_path):
+    """Columns of a result `r.h5` by name; on a grid of 2 ms, shifted by BEGIN, they make a recording."""
+    (tmp_path / "wave.yaml").write_text(MOTION)
+    edited(
+        ROBOT, tmp_path / "robot.yaml", ("motor: {inertia: 3.20", "motor: {gear_ratio: 50, inertia: 1.28e-3")
+    )
+    assert vsacli("invdyn", "robot.yaml", "wave.yaml", "-o", "r.h5").code == 0
+    printed = vsacli("export", "r.h5", "--variables", "q,theta,tau_motor").out
+    header, *rows = csv.reader(printed.splitlines())
+    return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+
+
+def recorded(computed, before=BEGIN, after=0.7, step=0.002, delay=0.0):
+    """The columns as a laboratory has them: at rest before and after, at times of its own."""
+    time = np.arange(-before, computed["time"][-1] + after, step)
+    columns = {name: np.interp(time - delay, computed["time"], values) for name, values in computed.items()}
+    return {**columns, "time": time + before}
+
+
+def written(path, columns):
+    with path.open("w") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))
+    return path
+
+
+def test_figures_of_known_errors_come_out(computed, tmp_path):
+    columns = recorded(computed)
+    noise = np.random.default_rng(3).standard_normal(len(columns["time"]))
+    columns["base.q"] = columns["base.q"] + 1e-3 * noise
+    columns["elbow.tau_motor_1"] = 1.04 * columns["elbow.tau_motor_1"] + 2
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
+    signals = {signal.column: signal for signal in found.signals}
+    # The grid has 2 ms; between its points straight lines stand for curves, which moves nothing by 0.1 ms.
+    assert found.begins_at == pytest.approx(BEGIN, abs=1e-4)
+    assert found.compared == pytest.approx(3.0)
+    assert signals["base.q"].rms == pytest.approx(1e-3, rel=0.05)  # of 1500 draws: 2 % is one deviation
+    assert signals["shoulder.q"].rms < 1e-4  # 0.1 ms of 0.4 rad/s
+    assert signals["elbow.tau_motor_1"].gain == pytest.approx(1.04, abs=2e-3)
+    assert signals["elbow.tau_motor_1"].offset == pytest.approx(2, abs=0.2)
+
+
+def test_a_signal_that_lags_behind_the_others_is_told(computed, tmp_path):
+    columns = recorded(computed)
+    columns["base.tau_motor_2"] = recorded(computed, delay=0.006)["base.tau_motor_2"]
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
+    lags = {signal.column: signal.lag for signal in found.signals}
+    assert lags["base.tau_motor_2"] == pytest.approx(0.006, abs=5e-4)
+    assert not abs(lags["base.tau_motor_1"]) >= 5e-4  # NaN says that there is none
+
+
+@pytest.mark.parametrize("cut", [(0.0, 1.2), (1.0, 2.2), (2.0, 3.6)])
+def test_a_piece_cut_out_of_the_motion_is_found(computed, tmp_path, cut):
+    columns = recorded(computed)
+    kept = (columns["time"] >= BEGIN + cut[0]) & (columns["time"] <= BEGIN + cut[1])
+    piece = {name: values[kept] for name, values in columns.items()}
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", piece))
+    # A millionth of the motion's range are 0.1 ms near its ends, where it is slowest.
+    assert found.begins_at == pytest.approx(BEGIN - columns["time"][kept][0], abs=2e-4)
+
+
+SLIPS = {
+    "base.q looks as if it is in degrees": lambda c: {"base.q": np.degrees(c["base.q"])},
+    "base.q runs the other way": lambda c: {"base.q": -c["base.q"]},
+    "base.q is +1 turns off": lambda c: {"base.q": c["base.q"] + 2 * np.pi},
+    "base.q does not move": lambda c: {"base.q": 0 * c["base.q"]},
+    "tau_motor_1 looks as if it is of the other side of the gear": lambda c: {
+        "base.tau_motor_1": c["base.tau_motor_1"] / 50
+    },
+    "columns look exchanged: base.tau_motor_1 is like base.tau_motor_2 computed": lambda c: {
+        "base.tau_motor_1": c["base.tau_motor_2"],
+        "base.tau_motor_2": c["base.tau_motor_1"],
+    },
+    "not compared, as the result has none of that name: temperature": lambda c: {"temperature": c["time"]},
+}
+
+
+@pytest.mark.parametrize("sentence", SLIPS)
+def test_slips_are_named(computed, tmp_path, sentence):
+    columns = recorded(computed)
+    columns.update(SLIPS[sentence](columns))
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
+    assert [note for note in found.notes if sentence in note], found.notes
+
+
+def test_nothing_is_said_of_what_agrees(computed, tmp_path):
+    assert compare(tmp_path / "r.h5", written(tmp_path / "m.csv", recorded(computed))).notes == ()
+
+
+def test_units_and_sides_of_the_gear_are_converted(computed, tmp_path):
+    columns = recorded(computed)
+    given = {
+        "time [ms]": 1000 * columns["time"],
+        "q1 [deg]": np.degrees(columns["base.q"]),
+        "base.tau_motor_shaft_1 [mN m]": 1000 * columns["base.tau_motor_1"] / 50,
+        "base.theta_shaft_2": 50 * columns["base.theta_2"],
+    }
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", given))
+    assert [signal.gain for signal in found.signals] == pytest.approx([1, 1, 1], abs=1e-3)
+
+
+def test_report_figures_and_json(vsacli, computed, tmp_path):
+    written(tmp_path / "m.csv", recorded(computed))
+    done = vsacli("compare", "r.h5", "m.csv", "--plot", "figures")
+    assert done.code == 0
+    assert "3 s of 3 s compared; the result begins 0.5137 s into the recording" in done.out
+    names = {"q", "theta", "tau_motor"}
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {f"r-m-{name}.png" for name in names}
+    report = json.loads(vsacli("compare", "r.h5", "m.csv", "--json", "--begins-at", str(BEGIN)).out)
+    assert report["format"] == "vsacli-comparison/1"
+    assert (report["begins_at"], report["found"], len(report["signals"])) == (BEGIN, False, 15)
+
+
+BAD = {
+    "there is no column 'time'": ("stamp,base.q\n0,1\n1,2\n", []),
+    "no column is a variable of the result": ("time,bose.q\n0,1\n1,2\n", []),
+    "the times must ascend": ("time,base.q\n0,1\n1,2\n1,3\n", []),
+    "a recording needs two rows": ("time,base.q\n0,1\n", []),
+    "the unit [N] is one of something else": ("time,base.q [N]\n0,1\n1,2\n", []),
+    "are the same; leave one": ("time,base.q,q1\n0,1,1\n1,2,2\n", []),
+    "is like the computed signals at no shift": ("time,base.q\n" + "".join(f"{t},1\n" for t in range(9)), []),
+    "change --begins-at": ("time,base.q\n0,1\n1,2\n2,1\n", ["--begins-at", "50"]),
+}
+
+
+@pytest.mark.parametrize("sentence", BAD)
+@pytest.mark.usefixtures("computed")
+def test_recordings_that_cannot_be_compared_are_refused(vsacli, tmp_path, sentence):
+    content, options = BAD[sentence]
+    (tmp_path / "m.csv").write_text(content)
+    done = vsacli("compare", "r.h5", "m.csv", *options)
+    assert (done.code, done.out) == (2, "")
+    assert sentence in done.err
+    assert "m.csv" in done.err

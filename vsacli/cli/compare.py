@@ -1,0 +1,86 @@
+"""`vsacli compare`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from vsacli.cli.command_parts import example, json_option, overwrite_option, result_line
+from vsacli.cli.console import Talk, say, talk_options
+
+if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs
+    from vsacli.studies.measured import Comparison
+
+
+@click.command(
+    "compare",
+    short_help="Compare a result with what was measured.",
+    epilog=example("vsacli compare result.h5 torques.csv --plot figures"),
+)
+@click.argument("result")
+@click.argument("recording")
+@click.option(
+    "--begins-at",
+    metavar="SECONDS",
+    type=float,
+    help="When in the recording the result begins, from its first row on; by default found from the signals.",
+)
+@json_option
+@click.option(
+    "--plot", "folder", metavar="FOLDER", help="Save figures of measured and computed signals there."
+)
+@overwrite_option
+@talk_options
+def compare(
+    result: str,
+    recording: str,
+    begins_at: float | None,
+    as_json: bool,
+    folder: str | None,
+    overwrite: bool,
+    talk: Talk,
+) -> None:
+    """Compare a RESULT, or a simulation, with a RECORDING of the same motion, a CSV file.
+
+    Its column `time` may begin anywhere and have steps of its own. Columns are named as `vsacli export` names
+    them, elbow.q, elbow.tau_motor_1, or elbow.tau_motor_shaft_1 for the motor's side of its gear; a unit in
+    brackets may follow. Others are left out.
+
+    The report gives, for each signal, the error, the gain and offset of measured over computed values, and
+    the lag behind the others.
+    """
+    from vsacli.base.outputs import Outputs
+    from vsacli.results.store.simulation import open_stored
+    from vsacli.studies.measured import compare as compared
+
+    with Outputs(overwrite=overwrite, inputs=[result, recording]) as outputs:
+        with open_stored(result) as stored:
+            talk.detail(result_line(stored))
+            comparison = compared(stored, recording, begins_at)
+        if folder is not None:
+            _draw(comparison, folder, outputs)
+    say(json.dumps(comparison.as_json(), indent=1) if as_json else str(comparison))
+    talk.wrote(outputs)
+
+
+def _draw(comparison: Comparison, folder: str, outputs: Outputs) -> None:
+    """A figure for each variable that was measured."""
+    from vsacli.results.plots import FigureFiles, MeasuredCurve, measured_figure
+
+    curves: dict[str, list[MeasuredCurve]] = {}
+    for signal in comparison.signals:
+        if signal.samples:
+            curve = MeasuredCurve(
+                signal.column, signal.unit, signal.rms, signal.time, signal.computed, signal.measured
+            )
+            curves.setdefault(signal.variable, []).append(curve)
+    stems = [Path(path).stem for path in (comparison.result, comparison.recording)]
+    files = FigureFiles(curves, folder, "-".join(stems), "png", outputs)
+    title = ", ".join(stems)
+    files.save(
+        {variable: measured_figure(of_it, f"{title}: {variable}") for variable, of_it in curves.items()}
+    )

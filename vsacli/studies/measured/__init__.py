@@ -1,0 +1,6 @@
+"""What a laboratory measured beside what was computed."""
+
+from vsacli.studies.measured.against_result import compare
+from vsacli.studies.measured.comparison_report import Comparison
+
+__all__ = ["Comparison", "compare"]

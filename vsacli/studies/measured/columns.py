@@ -1,0 +1,164 @@
+"""Which column of a recording is which variable of a result, in the units of the result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.kinds import existing
+from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.unit_expressions import conversion_factor
+from vsacli.base.variables import MOTORS, Variable
+from vsacli.documents.table import Table, split_heading
+from vsacli.results.store.reader import StoredResult
+
+TIME = "time"
+
+
+class Place(NamedTuple):
+    """Where a column belongs.
+
+    Attributes:
+        variable: of the result.
+        joint: its index.
+        motor: 1 or 2, None if the variable is none of motors.
+        unit: of numbers without a unit of their own.
+        gear: what those are multiplied by to be on the joint side of the gear.
+    """
+
+    variable: str
+    joint: int
+    motor: int | None
+    unit: str
+    gear: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A recorded signal.
+
+    Attributes:
+        column: its name in the recording.
+        place: what it is.
+        values: (samples,), SI units, joint side of the gear.
+    """
+
+    column: str
+    place: Place
+    values: FloatArray = field(repr=False)
+
+
+class Recording(NamedTuple):
+    """What was recorded of the variables of a result.
+
+    Attributes:
+        time: (samples,), s, from the first sample on.
+        signals: in the order of the variables, then of the joints.
+        others: names of the columns that are none of the result's.
+    """
+
+    time: FloatArray
+    signals: tuple[Measured, ...]
+    others: tuple[str, ...]
+
+
+def recording_of(result: StoredResult, table: Table) -> Recording:
+    """The columns of a table that are variables of a result.
+
+    Args:
+        result: an open result or simulation.
+        table: with a column `time`, and columns named as `vsacli export` names them, or by the number of the
+            joint, `q1` for the first; a unit in brackets may follow any name.
+
+    Raises:
+        InputError: there is no such column, a unit is one of something else, or the times do not ascend.
+    """
+    places, headings = known_columns(result), [split_heading(column) for column in table.columns]
+    names = [name for name, _ in headings]
+    problems = [Problem(table.source.path, table.header_line, text) for text in _unusable(names, places)]
+    factors: dict[int, float] = {}
+    for index, (name, unit) in enumerate(headings):
+        if name == TIME or name in places:
+            try:
+                factors[index] = _factor(unit, "s" if name == TIME else places[name].unit)
+            except InputError as error:
+                problems.append(Problem(table.source.path, table.header_line, f"column {name!r}: {error}"))
+    if problems:
+        raise InputError(problems)
+    order = {name: number for number, name in enumerate(places)}
+    signals = [
+        Measured(name, places[name], table.values[:, index] * (factors[index] * places[name].gear))
+        for index, name in enumerate(names)
+        if name in places
+    ]
+    signals.sort(key=lambda signal: order[signal.column])
+    others = tuple(name for name in names if name not in places and name != TIME)
+    return Recording(_elapsed(table, factors[names.index(TIME)]), tuple(signals), others)
+
+
+def known_columns(result: StoredResult) -> dict[str, Place]:
+    """Every name that a column of a result's variables may have."""
+    return {
+        name: place
+        for variable in (result.declared[name] for name in result.variables)
+        if "joint" in variable.dims and variable.name != "flags"
+        for name, place in _names(result, variable)
+    }
+
+
+def _names(result: StoredResult, variable: Variable) -> Iterator[tuple[str, Place]]:
+    """Names of the columns of a variable, of those joints and motors that have it."""
+    of_motors = "motor" in variable.dims
+    for joint, there in enumerate(existing(variable, result.actuators)):
+        unit = variable.quantity.unit(result.joint_types[joint])
+        for number in (motor for motor, exists in zip(MOTORS, there, strict=False) if exists):
+            motor = number if of_motors else None
+            ending = f"_{number}" if of_motors else ""
+            place = Place(variable.name, joint, motor, unit)
+            yield f"{result.joint_names[joint]}.{variable.name}{ending}", place
+            yield f"{variable.name}{joint + 1}{ending}", place
+            ratio = float(result.gear_ratio[joint, number - 1])
+            if variable.geared and np.isfinite(ratio):  # a shaft turns, whatever the joint does
+                on_shaft = variable.quantity.unit("revolute")
+                shaft = place._replace(unit=on_shaft, gear=ratio**-variable.geared)
+                yield f"{result.joint_names[joint]}.{variable.name}_shaft{ending}", shaft
+
+
+def _unusable(names: list[str], places: dict[str, Place]) -> Iterator[str]:
+    if TIME not in names:
+        yield f"there is no column {TIME!r}"
+    found = [name for name in names if name in places]
+    if not found:
+        strangers = [name for name in names if name != TIME]
+        hint = next((hint for name in strangers if (hint := did_you_mean(name, places))), "")
+        examples = ", ".join(list(places)[:3])
+        yield f"no column is a variable of the result, such as {examples}{hint}"
+    for name in sorted({name for name in names if names.count(name) > 1 and name in places}):
+        yield f"column {name!r} appears {names.count(name)} times"
+    twice = {place: name for name in found if (place := places[name]._replace(unit="", gear=1.0))}
+    for name in found:
+        other = twice[places[name]._replace(unit="", gear=1.0)]
+        if other != name:
+            yield f"columns {name!r} and {other!r} are the same; leave one"
+
+
+def _factor(unit: str | None, expected: str) -> float:
+    return 1.0 if unit is None else conversion_factor(unit, expected)
+
+
+def _elapsed(table: Table, factor: float) -> FloatArray:
+    """Times from the first sample on, s; stamps since 1970 lose nothing."""
+    names = [split_heading(column)[0] for column in table.columns]
+    stamps = table.values[:, names.index(TIME)]
+    if len(stamps) < 2:
+        raise InputError.one("a recording needs two rows at least", table.source.path)
+    back = np.flatnonzero(np.diff(stamps) <= 0)
+    if back.size:
+        line = table.line_of(int(back[0]) + 1)
+        raise InputError.one("the times must ascend from row to row", table.source.path, line)
+    return np.asarray((stamps - stamps[0]) * factor)

@@ -1,0 +1,77 @@
+"""What a comparison says, as text and as JSON."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from vsacli.base.json_records import Published
+from vsacli.base.tables import aligned
+from vsacli.studies.measured.agreement import Agreement
+
+SHOWN_LAG = 5e-4
+"""Lag, s, from which on it is shown."""
+
+
+@dataclass(frozen=True)
+class Comparison(Published):
+    """What was measured against what was computed.
+
+    Attributes:
+        result, recording: paths of the files.
+        begins_at: time of the recording at which the result begins, s from its first sample.
+        found: whether that was found from the signals.
+        duration: of the result, s.
+        compared: how much of it the recording covers, s.
+        signals: a record of each column that was compared.
+        notes: what looks like a slip, and what was not compared.
+    """
+
+    result: str
+    recording: str
+    begins_at: float
+    found: bool
+    duration: float
+    compared: float
+    signals: tuple[Agreement, ...]
+    notes: tuple[str, ...] = ()
+
+    format: ClassVar[str] = "vsacli-comparison/1"
+    shape: ClassVar = {
+        "format": "format",
+        **{name: name for name in ("result", "recording", "begins_at", "found", "duration", "compared")},
+        **{name: name for name in ("signals", "notes")},
+    }
+
+    def __str__(self) -> str:
+        return "\n".join(
+            [self._headline(), *aligned(self._rows()), *(f"note: {note}" for note in self.notes)]
+        )
+
+    def _headline(self) -> str:
+        where = f"{abs(self.begins_at):.4f} s {'into' if self.begins_at >= 0 else 'before'} the recording"
+        how = "found from the signals" if self.found else "as given"
+        covered = f"{self.compared:.4g} s of {self.duration:.4g} s compared"
+        return f"{self.result}, {self.recording}: {covered}; the result begins {where} ({how})"
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        header = ("measured", "rms error", "of rms", "largest", "at", "offset", "gain", "lag")
+        return [header, *map(_row, self.signals)]
+
+
+def _row(signal: Agreement) -> tuple[str, ...]:
+    def figure(value: float, form: str, unit: str = "") -> str:
+        return f"{value:{form}}{unit}" if math.isfinite(value) else "-"
+
+    unit = f" {signal.unit}"
+    return (
+        signal.column,
+        figure(signal.rms, ".3g", unit),
+        figure(100 * signal.share, ".3g", " %"),
+        figure(signal.worst, "+.3g", unit),
+        figure(signal.worst_time, ".3f", " s"),
+        figure(signal.offset, "+.2g", unit),
+        figure(signal.gain, ".4g"),
+        figure(1e3 * signal.lag, "+.1f", " ms") if abs(signal.lag) >= SHOWN_LAG else "-",
+    )
