@@ -114,7 +114,8 @@ def csv_columns() -> str:
 def _signal_columns() -> Iterator[tuple[str, str, str]]:
     for signal in (POSITION, *COMMANDED.values()):
         for name in signal.names:
-            needed = "yes" if name == signal.names[0] else "no"
+            of_device = f"for a {signal.device} that is commanded" if signal.device else "yes"
+            needed = of_device if name == signal.names[0] else "no"
             yield f"`<joint>.{name}`", str(VARIABLES[name].quantity), needed
 
 

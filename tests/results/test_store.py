@@ -17,6 +17,7 @@ from samples.marks import slow
 from samples.results import (
     REPORT,
     SOURCE,
+    STORED,
     PlannedTrajectory,
     part,
     random_block,
@@ -31,7 +32,6 @@ from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.outputs import Staged
 from vsacli.base.units import POSITION
-from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import number
 from vsacli.documents.source import Source
 from vsacli.results.store.layout import resolve
@@ -72,7 +72,7 @@ def everything_with_a_type(file):
 
 def test_every_value_comes_back_bit_for_bit_with_h5py_alone(path, block):
     with h5py.File(path) as file:
-        for name in VARIABLES:
+        for name in STORED:
             np.testing.assert_array_equal(file[name][...], getattr(block, name), strict=True)
 
 
@@ -99,7 +99,7 @@ def test_created_is_the_present_time_in_utc(path):
 
 def test_variables_have_their_declared_attributes(path):
     with h5py.File(path) as file:
-        for name, variable in VARIABLES.items():
+        for name, variable in STORED.items():
             attributes = file[name].attrs
             assert attributes["long_name"] == variable.long_name
             assert attributes["equation"] == variable.equation
@@ -126,7 +126,7 @@ def test_flags_explain_themselves_as_cf_asks(path):
     with h5py.File(path) as file:
         attributes = file["flags"].attrs
         assert attributes["flag_masks"].dtype == file["flags"].dtype == np.uint16
-        assert attributes["flag_masks"].tolist() == [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 16384]
+        assert attributes["flag_masks"].tolist() == [1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 8192, 16384]
         assert attributes["flag_meanings"].split() == [flag.label for flag in Flag]
 
 
@@ -172,7 +172,7 @@ def test_chunks_hold_about_a_megabyte_or_less(tmp_path, joints, samples):
         writer.write(random_block(1, joints))
         writer.finish(REPORT)
     with h5py.File(path) as file:
-        for name in VARIABLES:
+        for name in STORED:
             size = np.prod(file[name].chunks) * file[name].dtype.itemsize
             assert size <= 2**20
             # not needlessly small either: the next power of two, or all samples, would exceed it
@@ -328,7 +328,7 @@ def test_reading(path, block):
         assert result.complete is True
         assert result.samples == SAMPLES
         assert result.report_json["warnings"] == ["µ: –"]
-        assert result.variables == tuple(name for name in VARIABLES if name != "time")
+        assert result.variables == tuple(name for name in STORED if name != "time")
         np.testing.assert_array_equal(result.time, block.time)
         np.testing.assert_array_equal(result.read("phi", 20, 30), block.phi[20:30], strict=True)
         np.testing.assert_array_equal(result.read("flags", 200), block.flags[200:], strict=True)

@@ -74,7 +74,7 @@ def lower_by_preload(joint: Joint, tau_e: FloatArray) -> dict[str, FloatArray]:
 
 def command(**given: FloatArray | float) -> Command:
     """Steps that rest under no load at 850 N m/rad, except for what is given."""
-    values = {**dict.fromkeys(Command.names(), 0.0), "stiffness": 850.0, **given}
+    values = {**dict.fromkeys(Command.names(["stiffness"]), 0.0), "stiffness": 850.0, **given}
     arrays = np.broadcast_arrays(
         *(np.atleast_1d(np.asarray(value, dtype=float)) for value in values.values())
     )

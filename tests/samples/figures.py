@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vsacli.base.variables import VARIABLES
+from vsacli.actuators.kinds import existing
+from vsacli.base.variables import VARIABLES, Variable
 
 STIFFNESS_K, STIFFNESS_KC, MOTOR_INERTIA = 400.0, 2000.0, 3.2
 
@@ -39,6 +40,9 @@ class Result:
         self.samples = time.size
         self._values = variables
         self.variables = tuple(name for name in VARIABLES if name in variables)
+
+    def existing(self, variable: Variable) -> np.ndarray:
+        return np.array(existing(variable, self.actuators))
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> np.ndarray:
         return self._values[name][start:stop]

@@ -18,7 +18,7 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import WRENCH
-from vsacli.base.variables import UNCERTAIN, VARIABLES, Block
+from vsacli.base.variables import OF_ANY_ROBOT, UNCERTAIN, VARIABLES, Block
 from vsacli.documents.source import Source
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
@@ -66,6 +66,10 @@ def robot(kinds: str = "RP") -> Robot:
     types = {"R": "revolute", "P": "prismatic"}
     joints = tuple(joint(f"j{index}", types[kind], index) for index, kind in enumerate(kinds))
     return Robot(name="two", joints=joints, sources=(SOURCE,))
+
+
+STORED = {name: variable for name, variable in VARIABLES.items() if variable.requires in OF_ANY_ROBOT}
+"""The variables of results of these robots, by name."""
 
 
 def random_block(samples: int, joints: int, rate: float = 1000.0) -> Block:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FlagArray, FloatArray
-from vsacli.base.signals import commanded_names
+from vsacli.base.signals import COMMANDED, commanded_names
 
 
 class Command(NamedTuple):
@@ -30,14 +30,14 @@ class Command(NamedTuple):
     commanded: Mapping[str, FloatArray]
 
     @classmethod
-    def names(cls) -> tuple[str, ...]:
-        """Names of all its arrays, as of the result variables."""
-        return (*cls._fields[:-1], *commanded_names())
+    def names(cls, signals: Iterable[str]) -> tuple[str, ...]:
+        """Names of all its arrays, as of the result variables, if these signals are given, by key."""
+        return (*cls._fields[:-1], *(name for key in signals for name in COMMANDED[key].names))
 
     @classmethod
     def of(cls, arrays: Mapping[str, FloatArray]) -> Command:
         """From arrays by their names; others are passed over."""
-        commanded = {name: arrays[name] for name in commanded_names()}
+        commanded = {name: arrays[name] for name in commanded_names() if name in arrays}
         own = {name: arrays[name] for name in cls._fields[:-1]}
         return cls(**own, commanded=commanded)
 

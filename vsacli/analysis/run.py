@@ -20,7 +20,7 @@ from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, h
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, Tell, choose, unheard
 from vsacli.dynamics.energy import RunEnergy
-from vsacli.dynamics.inverse import InverseDynamics, check_fit, compute_block, usual_block
+from vsacli.dynamics.inverse import InverseDynamics, compute_block, fitted, usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -76,7 +76,7 @@ class Run:
         tell: Tell = unheard,
     ) -> None:
         check_near_singular(near_singular)
-        check_fit(robot, trajectory)
+        trajectory = fitted(robot, trajectory)
         self.robot = robot
         self.trajectory = trajectory
         self._stop_on_infeasible = stop_on_infeasible

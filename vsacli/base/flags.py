@@ -46,6 +46,12 @@ class Flag(enum.IntFlag):
     POSITION_LIMIT = 128, "the commanded position leaves the joint's range", "position"
     VELOCITY_LIMIT = 256, "the commanded velocity exceeds the joint's limit", "velocity"
     STIFFNESS_LIMIT = 512, "the commanded stiffness leaves the joint's allowed range", "stiffness"
+    INTERNAL_INSTABILITY = (
+        1024,
+        "the motion inside a damped transmission is unstable: deviations from what was computed would grow",
+        None,
+    )
+    DAMPING_LIMIT = 8192, "the commanded damping leaves the range of the damper", "damping"
     NOT_FINITE = (
         16384,
         "something of the motors is infinite or no number, since what it follows from is, or is too large",

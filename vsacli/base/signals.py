@@ -27,6 +27,8 @@ class Signal(NamedTuple):
         positive: whether the value must be positive.
         optional: whether a component may have no value, so that it is NaN all the time.
         components: how many numbers a value has; None: one a joint.
+        device: key in the robot file of what a joint takes it by, if that is not its actuator; a device that
+            is not commanded stands where it stands by itself.
     """
 
     key: str
@@ -38,6 +40,7 @@ class Signal(NamedTuple):
     positive: bool = False
     optional: bool = False
     components: int | None = None
+    device: str | None = None
 
     @property
     def orders(self) -> int:
@@ -75,6 +78,21 @@ STIFFNESS = Signal(
     optional=True,
 )
 
+DAMPING = Signal(
+    key="damping",
+    names=("damping", "ddamping", "dddamping"),
+    quantities=(units.DAMPING, units.DAMPING_RATE, units.DAMPING_ACCELERATION),
+    long_names=(
+        "commanded damping of the joint's damper",
+        "rate of the commanded damping",
+        "second derivative of the commanded damping",
+    ),
+    meaning="damping of the dampers, which adds to that of the joints; by default the least of their ranges",
+    spline_degree=5,
+    optional=True,
+    device="damper",
+)
+
 WRENCH = Signal(
     key="wrench",
     names=WRENCH_NAMES,
@@ -91,7 +109,7 @@ WRENCH = Signal(
     components=len(WRENCH_AXES),
 )
 
-COMMANDED: dict[str, Signal] = {signal.key: signal for signal in (STIFFNESS,)}
+COMMANDED: dict[str, Signal] = {signal.key: signal for signal in (STIFFNESS, DAMPING)}
 """What joints can be commanded by besides their position, by key; its value bears the name of the key."""
 
 

@@ -20,6 +20,10 @@ MOTORS = (1, 2)
 SPRINGS = "springs"
 """What a joint must have to have a variable, unless that is to take a commanded signal."""
 
+OF_ANY_ROBOT = (None, SPRINGS, STIFFNESS.key)
+"""What variables require that every result has, NaN where a joint does not have them. Those that require
+something else are left out of results of robots no joint of which has it."""
+
 
 class Variable(NamedTuple):
     """What is declared of a result variable.

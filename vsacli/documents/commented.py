@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import textwrap
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 from vsacli.base.units import DIMENSIONLESS
-from vsacli.documents.fields import REQUIRED, declared
+from vsacli.documents.fields import REQUIRED, Record, declared
 from vsacli.documents.records import Field, Line, Values, on_one_line
 
 COMMENT_COLUMN = 44
@@ -56,10 +55,17 @@ def _record(cls: type, values: Values, variant: str) -> Iterator[Line]:
             yield from field.kind.lines(name, values[name], comment, of_record)
         elif default is REQUIRED:
             raise KeyError(f"{cls.__name__} needs a value of {name}")
-        elif dataclasses.is_dataclass(default):
-            yield from (line.inactive() for line in field.kind.lines(name, {}, comment, of_record))
+        elif isinstance(field.kind, Record):
+            example = {} if default is not None else _example(field.kind.cls, variant)
+            yield from (line.inactive() for line in field.kind.lines(name, example, comment, of_record))
         else:
             yield Line(f"{name}: {_default(default)}".rstrip(), comment).inactive()
+
+
+def _example(cls: Any, variant: str) -> Values:
+    """Values of a record that is absent by default."""
+    values: Values = cls.example(variant)
+    return values
 
 
 def _default(default: Any) -> str:

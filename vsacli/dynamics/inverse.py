@@ -14,7 +14,7 @@ from vsacli.base.arrays import AnyArray, FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.base.json_records import Stored
-from vsacli.base.signals import COMMANDED, commanded_names, orders_of_derivation
+from vsacli.base.signals import COMMANDED, POSITION
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
 from vsacli.compute.rows import RowKernel, RowLayout
@@ -24,6 +24,7 @@ from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.commanded_joints import takers
 from vsacli.robot.model import Robot, check_robot
+from vsacli.trajectory.devices import with_uncommanded_devices
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -33,7 +34,8 @@ COMPUTED = (*TORQUES, *Drive._fields)
 
 def usual_block(joints: int) -> int:
     """Steps computed at a time: one pass of NumPy's, which hides the interpreter and bounds the memory."""
-    return samples_per_pass(joints * len(orders_of_derivation()))
+    signals = (POSITION, *(signal for signal in COMMANDED.values() if signal.device is None))
+    return samples_per_pass(joints * sum(signal.orders for signal in signals))
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,8 @@ class InverseDynamics(RowKernel):
     def arguments(self) -> RowLayout:
         """Rows that inverse dynamics takes."""
         joints = len(self.robot.joints)
-        commanded = dict.fromkeys(commanded_names(), (joints,))
+        names = (name for signal in self.robot.signals for name in signal.names)
+        commanded = dict.fromkeys(names, (joints,))
         integrated = {"phi": (joints, SIDES)} if self.integrated else {}
         return RowLayout({**self.links.arguments.shapes, **commanded, **integrated})
 
@@ -95,10 +98,11 @@ class InverseDynamics(RowKernel):
         demanded = links(rows[: links.inputs])
         torques = links.results.unpack([_as_row(torque, rows[0]) for torque in demanded])
         of_joints = {**given, **torques}
+        names = Command.names(signal.key for signal in self.robot.signals)
         drives = [
             drive(
                 joint,
-                Command.of({name: of_joints[name][index] for name in Command.names()}),
+                Command.of({name: of_joints[name][index] for name in names}),
                 self.near_singular,
                 np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None,
             )
@@ -133,7 +137,7 @@ def compute_block(
     """
     frame = None if motion.wrench is None else motion.wrench.frame
     kernel = InverseDynamics(robot, frame, near_singular, integrated is not None)
-    given = motion.variables()
+    given = {name: array for name, array in motion.variables().items() if robot.has(VARIABLES[name])}
     rows = {name: by_joint(given[name]) for name in kernel.arguments.shapes if name in given}
     if integrated is not None:
         rows["phi"] = integrated.reshape(-1, integrated.shape[-1])
@@ -156,11 +160,11 @@ def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
     )._asdict()
 
 
-def check_fit(robot: Robot, trajectory: Trajectory) -> None:
-    """Refuse a trajectory that is not for this robot.
+def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
+    """A trajectory for a robot: the same, with what its devices do that are not commanded.
 
     Raises:
-        InputError: it has another number of joints, or no stiffness for an antagonistic one.
+        InputError: it has another number of joints than the robot, or no stiffness for an antagonistic one.
         TypeError: one of both is none.
     """
     check_robot(robot)
@@ -169,19 +173,22 @@ def check_fit(robot: Robot, trajectory: Trajectory) -> None:
     if trajectory.joints != len(robot.joints):
         joints = f"{trajectory.joints} joints, the robot {robot.name} {len(robot.joints)}"
         raise InputError.one(f"the trajectory {trajectory.name} has {joints}")
-    for key in COMMANDED:
+    trajectory = with_uncommanded_devices(trajectory, robot)
+    for key, signal in COMMANDED.items():
         lacking = [
             joint.name
             for joint, chosen in zip(robot.joints, trajectory.chosen(key), strict=True)
-            if key in joint.actuator.commanded and not chosen
+            if key in joint.commanded and not chosen
         ]
         if lacking:
             raise InputError.one(
                 f"the trajectory {trajectory.name} has no {key} for {', '.join(lacking)}; "
-                f"each {takers(key)} joint needs one"
+                f"each {takers(signal)} needs one"
             )
+    return trajectory
 
 
 def command_of(index: int, commanded: Mapping[str, FloatArray]) -> Command:
     """The part of one joint in variables by name, each (samples, joints)."""
-    return Command.of({name: commanded[name][:, index] for name in Command.names()})
+    names = (name for name in Command.names(COMMANDED) if name in commanded)
+    return Command.of({name: commanded[name][:, index] for name in names})

@@ -7,6 +7,7 @@ import numpy as np
 from vsacli.actuators.limit_check import LimitCheck, OfJoint
 from vsacli.base.arrays import FlagArray
 from vsacli.base.flags import Flag
+from vsacli.base.signals import DAMPING
 from vsacli.robot.joint import Joint
 
 
@@ -18,6 +19,8 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
         LimitCheck(Flag.VELOCITY_LIMIT, "dq", None, limits.velocity),
         LimitCheck(Flag.STIFFNESS_LIMIT, "stiffness", None, limits.stiffness),
     ]
+    if joint.damper is not None:
+        checks.append(LimitCheck(Flag.DAMPING_LIMIT, DAMPING.key, None, joint.damper.range))
     checks += joint.actuator.limits()
     return [check for check in checks if np.isfinite(check.range).any()]
 

@@ -147,9 +147,7 @@ def _ignored(robot: Robot, signal: Signal) -> list[int]:
     """The joints that do not take a signal, although there may be a column of it for them."""
     commanded = signal.key in COMMANDED
     return [
-        index
-        for index, joint in enumerate(robot.joints)
-        if commanded and signal.key not in joint.actuator.commanded
+        index for index, joint in enumerate(robot.joints) if commanded and signal.key not in joint.commanded
     ]
 
 

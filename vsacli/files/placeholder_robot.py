@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.damper import Damper
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
@@ -17,7 +18,7 @@ from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
 from vsacli.base.signals import COMMANDED
 from vsacli.documents import tree
-from vsacli.documents.fields import IDENTIFIER
+from vsacli.documents.fields import IDENTIFIER, LARGEST
 from vsacli.documents.reading import survey_document
 from vsacli.documents.source import is_table
 from vsacli.documents.table import read_table
@@ -26,7 +27,7 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
 MOST_JOINTS = 1000
-_POSITION_SUFFIX, _STIFFNESS_SUFFIX = ".q", ".stiffness"
+_POSITION_SUFFIX, _STIFFNESS_SUFFIX, _DAMPING_SUFFIX = ".q", ".stiffness", ".damping"
 
 
 class PlaceholderRobot(NamedTuple):
@@ -45,7 +46,8 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     """A robot of revolute joints that a trajectory would fit if it fits any.
 
     Names and number of the joints are those that the file speaks of; one joint if it says nothing. Joints
-    without stiffness are elastic, all rigid if there is no stiffness at all.
+    without stiffness are elastic, all rigid if there is neither stiffness nor damping. Those with a damping
+    have a damper.
 
     Raises:
         InputError: the file, or a CSV file that it names, cannot be read.
@@ -53,21 +55,26 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     if is_table(path):
         columns = read_table(path).columns
         names = _of_columns(columns) or _numbered(1)
-        return PlaceholderRobot(_robot(names, _with_stiffness(columns, names)), ordered=True)
+        stiffened = _of_suffix(columns, _STIFFNESS_SUFFIX, names) or tuple(names)
+        damped = _of_suffix(columns, _DAMPING_SUFFIX, names)
+        return PlaceholderRobot(_robot(names, stiffened, damped), ordered=True)
     root, survey = survey_document(path, OF_ANY_ROBOT)
     folder = Path(path).parent
     columns = tuple(column for file in _tables(root) for column in read_table(folder / file).columns)
-    positions, stiffnesses = (
+    positions, stiffnesses, dampings = (
         [node for quantity, node in survey if quantity == wanted]
-        for wanted in (units.POSITION, units.STIFFNESS)
+        for wanted in (units.POSITION, units.STIFFNESS, units.DAMPING)
     )
     names = _of_columns(columns) or _of_nodes(positions, stiffnesses)
-    if "stiffness" not in root.entries:
-        stiffened: tuple[str, ...] = ()
-    else:
-        stiffened = _stiffened(stiffnesses, names) if stiffnesses else _with_stiffness(columns, names)
-    ordered = bool(columns or _keys(positions)) or not _keys(stiffnesses)
-    return PlaceholderRobot(_robot(names, stiffened), ordered)
+    stiffened, damped = (
+        _taking(nodes, columns, suffix, names) if key in root.entries else ()
+        for key, nodes, suffix in (
+            ("stiffness", stiffnesses, _STIFFNESS_SUFFIX),
+            ("damping", dampings, _DAMPING_SUFFIX),
+        )
+    )
+    ordered = bool(columns or _keys(positions)) or not _keys([*stiffnesses, *dampings])
+    return PlaceholderRobot(_robot(names, stiffened, damped), ordered)
 
 
 def _tables(root: tree.Mapping) -> Iterator[str]:
@@ -90,9 +97,9 @@ def _of_columns(columns: Iterable[str]) -> tuple[str, ...]:
     return named or _numbered(numbered)
 
 
-def _with_stiffness(columns: Iterable[str], names: Sequence[str]) -> tuple[str, ...]:
+def _of_suffix(columns: Iterable[str], suffix: str, names: Sequence[str]) -> tuple[str, ...]:
     bare = {column.partition("[")[0].strip() for column in columns}
-    return tuple(name for name in names if f"{name}{_STIFFNESS_SUFFIX}" in bare) or tuple(names)
+    return tuple(name for name in names if f"{name}{suffix}" in bare)
 
 
 def _of_nodes(positions: Sequence[tree.Node], stiffnesses: Sequence[tree.Node]) -> tuple[str, ...]:
@@ -120,8 +127,12 @@ def _numbered(count: int) -> tuple[str, ...]:
     return tuple(f"joint_{number}" for number in range(1, min(count, MOST_JOINTS) + 1))
 
 
-def _stiffened(nodes: Sequence[tree.Node], names: Sequence[str]) -> tuple[str, ...]:
-    """The joints to which values per joint give a stiffness."""
+def _taking(
+    nodes: Sequence[tree.Node], columns: Iterable[str], suffix: str, names: Sequence[str]
+) -> tuple[str, ...]:
+    """The joints to which values per joint give a signal, or to which columns of this suffix do."""
+    if not nodes:
+        return _of_suffix(columns, suffix, names) or tuple(names)
     for node in nodes:
         match node:
             case tree.Mapping(entries=entries):
@@ -132,28 +143,29 @@ def _stiffened(nodes: Sequence[tree.Node], names: Sequence[str]) -> tuple[str, .
     return tuple(names)
 
 
-def _robot(names: Sequence[str], stiffened: Sequence[str]) -> Robot:
+def _robot(names: Sequence[str], stiffened: Sequence[str], damped: Sequence[str]) -> Robot:
     return Robot(
         name="stand-in",
         placeholder=True,
-        joints=tuple(_joint(name, _actuator(name, stiffened)) for name in names),
+        joints=tuple(_joint(name, _actuator(name, stiffened, damped), damped) for name in names),
     )
 
 
-def _actuator(name: str, stiffened: Sequence[str]) -> Actuator:
+def _actuator(name: str, stiffened: Sequence[str], damped: Sequence[str]) -> Actuator:
     motor = Motor(inertia=1.0)
-    if not stiffened:
+    if not stiffened and not damped:
         return Rigid(motor=motor)
     if name in stiffened:
         return Antagonistic(motor=(motor, motor), spring=(Cubic(k=1.0, k_c=1.0),) * 2)
     return Elastic(motor=motor, stiffness=1.0)
 
 
-def _joint(name: str, actuator: Actuator) -> Joint:
+def _joint(name: str, actuator: Actuator, damped: Sequence[str]) -> Joint:
     return Joint(
         name=name,
         type="revolute",
         dh=DenavitHartenberg(a=1.0, alpha=0.0),
         link=Link(mass=1.0, com=(0.0, 0.0, 0.0), inertia=Inertia(xx=1.0, yy=1.0, zz=1.0)),
         actuator=actuator,
+        damper=Damper(location="link", range=(0.0, LARGEST)) if name in damped else None,
     )

@@ -12,7 +12,6 @@ from typing import Any, Literal, TextIO, TypeAlias
 
 import numpy as np
 
-from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError, VsacliError
 from vsacli.base.units import time_text
@@ -202,7 +201,7 @@ def _existing(result: StoredResult, variable: Variable) -> BoolArray:
     """(joints, columns of each): which columns of a variable there are; of the wrench (axes, 1)."""
     if "joint" not in variable.dims:
         return np.ones((len(column_names(variable, ())), 1), dtype=bool)
-    return np.array(existing(variable, result.actuators))
+    return result.existing(variable)
 
 
 def _undefined(values: FloatArray | FlagArray, there: BoolArray) -> BoolArray:

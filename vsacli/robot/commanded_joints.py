@@ -30,11 +30,9 @@ class CommandedJoints:
         """Those of a robot."""
         exempt = {
             key: {
-                joint.name: joint.actuator.uncommanded.get(key, f"its actuator takes no {key}")
-                for joint in robot.joints
-                if key not in joint.actuator.commanded
+                joint.name: joint.uncommanded(signal) for joint in robot.joints if key not in joint.commanded
             }
-            for key in COMMANDED
+            for key, signal in COMMANDED.items()
         }
         rigid = not any(joint.actuator.sprung for joint in robot.joints)
         return cls(dict(zip(robot.joint_names, robot.joint_types, strict=True)), exempt, rigid)
@@ -49,12 +47,20 @@ class CommandedJoints:
         """Keys of the signals that any joint takes."""
         return frozenset(key for key, exempt in self.exempt.items() if len(exempt) < len(self.types))
 
+    @property
+    def untaken_devices(self) -> tuple[Signal, ...]:
+        """Signals of devices that no joint has."""
+        return tuple(each for each in COMMANDED.values() if each.device and each.key not in self.taken)
+
     def taking(self, signal: Signal) -> dict[int, str]:
         """The joints that take a signal, by index."""
         exempt = self.exempt.get(signal.key, {})
         return {index: name for index, name in enumerate(self.types) if name not in exempt}
 
 
-def takers(key: str) -> str:
-    """The kinds of actuator that take a signal, as words before "joint"."""
-    return " or ".join(kind for kind, actuator in ACTUATORS.items() if key in actuator.commanded)
+def takers(signal: Signal, joint: str = "joint") -> str:
+    """What kind of joint takes a signal, from the word for one or several."""
+    if signal.device is not None:
+        return f"{joint} with a {signal.device}"
+    kinds = (kind for kind, actuator in ACTUATORS.items() if signal.key in actuator.commanded)
+    return f"{' or '.join(kinds)} {joint}"

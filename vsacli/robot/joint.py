@@ -9,10 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.damper import Damper
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
+from vsacli.base.signals import COMMANDED, Signal
+from vsacli.base.variables import OF_ANY_ROBOT, Variable
 from vsacli.documents.fields import (
     NON_NEGATIVE,
     OneOf,
@@ -152,6 +155,7 @@ class Joint:
         units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
     )
     actuator: Actuator = value(OneOf(ACTUATORS), "what drives the joint")
+    damper: Damper | None = value(Record(Damper), "damper whose damping is commanded", default=None)
     limits: Limits = value(Record(Limits), "limits of the commanded motion", default=Limits())
 
     unit_variant = "type"
@@ -161,6 +165,9 @@ class Joint:
         if not self.actuator.sprung and self.limits.stiffness != UNBOUNDED:
             reason = f"a joint with a {self.actuator_type} actuator has no stiffness to limit; leave it out"
             problems.append(FieldProblem(("limits", "stiffness"), reason))
+        if not self.actuator.sprung and self.damper is not None:
+            reason = f"a joint with a {self.actuator_type} actuator has no springs to calm; leave it out"
+            problems.append(FieldProblem(("damper",), reason))
         check_fields(self, *problems)
 
     @property
@@ -172,6 +179,29 @@ class Joint:
     def actuator_type(self) -> str:
         """The key of its actuator in `ACTUATORS`."""
         return ACTUATORS.name_of(type(self.actuator))
+
+    @property
+    def commanded(self) -> tuple[str, ...]:
+        """Keys of the signals that a trajectory commands besides its motion."""
+        devices = (
+            signal.key
+            for signal in COMMANDED.values()
+            if signal.device is not None and getattr(self, signal.device) is not None
+        )
+        return (*self.actuator.commanded, *devices)
+
+    def uncommanded(self, signal: Signal) -> str:
+        """Why a trajectory does not command a signal, a clause."""
+        if signal.device is not None:
+            return f"it has no {signal.device}"
+        return self.actuator.uncommanded.get(signal.key, f"its actuator takes no {signal.key}")
+
+    def has(self, variable: Variable) -> list[bool]:
+        """Which columns of a result variable it has: of motors 1 and 2, or of the joint."""
+        if variable.requires in OF_ANY_ROBOT:
+            return self.actuator.has(variable)
+        there = variable.requires in self.commanded
+        return [there and column for column in self.actuator.has(variable._replace(requires=None))]
 
     def warnings(self, *, massless: bool = False) -> Iterator[str]:
         """What may not be what was meant, of link and springs; if no link has a mass, nothing on that."""

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Self
 from vsacli.actuators.actuator import Actuator
 from vsacli.base import units
 from vsacli.base.errors import Problem, check_type
+from vsacli.base.signals import COMMANDED, Signal
 from vsacli.base.tables import aligned, html_table
+from vsacli.base.variables import OF_ANY_ROBOT, VARIABLES, Variable
 from vsacli.documents.fields import (
     Items,
     Name,
@@ -100,6 +102,16 @@ class Robot:
     def actuators(self) -> tuple[Actuator, ...]:
         """What drives each joint."""
         return tuple(joint.actuator for joint in self.joints)
+
+    def has(self, variable: Variable) -> bool:
+        """Whether results of the robot hold a variable of joints."""
+        required_of_none = variable.requires in OF_ANY_ROBOT
+        return required_of_none or any(any(joint.has(variable)) for joint in self.joints)
+
+    @property
+    def signals(self) -> tuple[Signal, ...]:
+        """The signals of joints that results hold besides the motion; some joints may not take them."""
+        return tuple(each for each in COMMANDED.values() if self.has(VARIABLES[each.key]))
 
     @property
     def spring_sources(self) -> tuple[Source, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, make_dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
@@ -20,6 +20,7 @@ from vsacli.documents.source import is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
+from vsacli.trajectory.devices import with_uncommanded_devices
 from vsacli.trajectory.plausibility import implausible
 from vsacli.trajectory.plausibility.facts import Facts
 from vsacli.trajectory.profile import Profile, WrenchProfile
@@ -57,8 +58,11 @@ class TrajectoryFile:
         default=None,
     )
 
+    untaken: ClassVar[tuple[Signal, ...]] = ()
+    """Signals of devices that no joint of the robot has."""
+
     def __post_init__(self) -> None:
-        check_fields(self, *self._time_problems())
+        check_fields(self, *self._time_problems(), *self._device_problems())
 
     @property
     def declared(self) -> dict[Signal, Declaration]:
@@ -88,6 +92,13 @@ class TrajectoryFile:
         for signal, formula in self.formulas.items():
             yield from (problem.inside(signal.key) for problem in formula.problems_over(duration))
 
+    def _device_problems(self) -> Iterator[FieldProblem]:
+        for signal in self.declared:
+            if signal in self.untaken:
+                yield FieldProblem(
+                    (signal.key,), f"no joint of the robot has a {signal.device}; leave it out"
+                )
+
     def _time_problems(self) -> Iterator[FieldProblem]:
         if self.recorded:
             if self.duration is not None:
@@ -104,22 +115,24 @@ class TrajectoryFile:
 
 
 @cache
-def content(required: frozenset[str], *, rigid: bool) -> type[TrajectoryFile]:
+def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()) -> type[TrajectoryFile]:
     """The record that says what a trajectory must have.
 
     Args:
-        required: keys of the signals that some joint takes; others may be absent.
+        taken: keys of the signals that some joint takes, which must be there unless they are of a device;
+            others may be absent.
         rigid: whether all joints are rigid.
+        untaken: signals of devices that no joint has, which must be absent.
     """
     fields = {POSITION.key: value(declared_as(Use(POSITION, rigid)), POSITION.meaning)}
     for key, signal in COMMANDED.items():
-        needed = key in required
+        needed = key in taken and signal.device is None
         meaning = signal.meaning + ("; may be absent if there are none" if needed else "")
         fields[key] = value(declared_as(Use(signal)), meaning, default=REQUIRED if needed else None)
     fields[WRENCH.key] = value(declared_as(Use(WRENCH)), WRENCH.meaning, default=None)
     signals = [(name, Any, field) for name, field in fields.items()]
-    doc = {"__doc__": TrajectoryFile.__doc__}
-    return make_dataclass("TrajectoryFile", signals, bases=(TrajectoryFile,), namespace=doc, frozen=True)
+    further = {"__doc__": TrajectoryFile.__doc__, "untaken": untaken}
+    return make_dataclass("TrajectoryFile", signals, bases=(TrajectoryFile,), namespace=further, frozen=True)
 
 
 OF_ANY_ROBOT = content(frozenset(), rigid=True)
@@ -139,8 +152,8 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     if is_table(path):
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
-        return recorded_trajectory(path, joints)
-    cls = content(joints.taken, rigid=joints.rigid)
+        return with_uncommanded_devices(recorded_trajectory(path, joints), robot)
+    cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
     document, source = read_document(path, cls, FORMAT, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints)
     times = _times(document, recordings, source.path)
@@ -154,7 +167,7 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     wrench = document.declared.get(WRENCH)
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
     facts = Facts(robot, tuple(numbers(document, joints.types)), times, motion)
-    return Trajectory(
+    trajectory = Trajectory(
         times,
         profiles[POSITION.key],
         profiles,
@@ -168,6 +181,7 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, times)],
         sources=[source, *(recording.source for recording in recordings)],
     )
+    return with_uncommanded_devices(trajectory, robot)
 
 
 def _read_recordings(document: TrajectoryFile, folder: Path, joints: CommandedJoints) -> list[Recording]:

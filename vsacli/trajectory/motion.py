@@ -17,8 +17,8 @@ class Motion:
     Attributes:
         time: (samples,) in s.
         q, dq, ddq, d3q, d4q: position and its four derivatives, (samples, joints), rad (m) per s^k.
-        commanded: the signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`, (samples,
-            joints); NaN for a joint that is not commanded so.
+        commanded: signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`, (samples, joints);
+            NaN for a joint that is not commanded so.
         wrench: what the environment exerts on the end effector meanwhile, if anything.
     """
 
@@ -35,7 +35,7 @@ class Motion:
     def of(cls, time: FloatArray, arrays: Mapping[str, FloatArray], wrench: Wrench | None = None) -> Motion:
         """From arrays of the joints by the names of result variables; others are passed over."""
         q, dq, ddq, d3q, d4q = (arrays[name] for name in POSITION.names)
-        commanded = {name: arrays[name] for name in commanded_names()}
+        commanded = {name: arrays[name] for name in commanded_names() if name in arrays}
         return cls(time, q, dq, ddq, d3q, d4q, commanded, wrench=wrench)
 
     @property

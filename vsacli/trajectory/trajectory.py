@@ -37,7 +37,7 @@ class Trajectory:
         times: the steps.
         position: the motion at them and between them. All profiles count from the first step: stamps since
             1970 are rounded to 2.4e-7 s, too coarse for knots, integrators and differences.
-        commanded: each signal of `COMMANDED` by its key, e.g. `stiffness`; NaN for a joint for which none is
+        commanded: signals of `COMMANDED` by their keys, e.g. `stiffness`; NaN for a joint for which none is
             chosen.
         wrench: what the environment exerts meanwhile; None if nothing.
         name: used in reports and for the name of the result file.
@@ -62,7 +62,7 @@ class Trajectory:
     ) -> None:
         """Join profiles that have the same joints, and go from zero to the duration.
 
-        A signal that is not among `commanded` is chosen for no joint.
+        A signal that is not among `commanded` is chosen for no joint; that of a device is left out.
 
         Raises:
             InputError: they have not.
@@ -71,6 +71,7 @@ class Trajectory:
         self.commanded = {
             key: commanded[key] if key in commanded else self._nothing(signal)
             for key, signal in COMMANDED.items()
+            if key in commanded or signal.device is None
         }
         profiles = [profile for _, profile in self._profiles()]
         told = (*warnings, *(each for profile in profiles for each in profile.warnings))
@@ -185,8 +186,18 @@ class Trajectory:
 
     def chosen(self, key: str) -> BoolArray:
         """The joints for which a signal is chosen, by its key; (joints,)."""
+        if key not in self.commanded:
+            return np.zeros(self.joints, dtype=bool)
         chosen: BoolArray = ~np.isnan(self.block(0, 1).commanded[key][0])
         return chosen
+
+    def commanding(self, signal: Signal, value: tuple[float, ...], note: str) -> Trajectory:
+        """The same with a constant as a further signal, NaN for joints that do not take it."""
+        same = copy(self)
+        constant = Constant(signal=signal, span=(0.0, self.duration), value=value)
+        same.commanded = {**self.commanded, signal.key: constant}
+        same.notes = (*self.notes, note)
+        return same
 
     @property
     def samples(self) -> int:
@@ -246,7 +257,7 @@ class Trajectory:
         Those that come from fits of recorded samples, and all that is computed, if there are any.
         """
         estimated = {name for estimate in self.estimates.values() for name in estimate.estimated}
-        given = {name for signal, _ in self._profiles() for name in signal.names}
+        given = {name for signal in (POSITION, *COMMANDED.values(), WRENCH) for name in signal.names}
         return tuple(name for name in UNCERTAIN if estimated and (name in estimated or name not in given))
 
     def stretched(self, factor: float) -> Trajectory:

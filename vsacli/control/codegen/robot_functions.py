@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from vsacli.base.flags import finite, not_finite_flags
-from vsacli.base.signals import POSITION, orders_of_derivation
+from vsacli.base.signals import POSITION
 from vsacli.base.variables import VARIABLES
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques
@@ -32,7 +32,8 @@ def motion_structure(robot: Robot) -> Structure:
 def command_structure(robot: Robot) -> Structure:
     """Motion and stiffness."""
     meaning = "Commanded motion and stiffness; only antagonistic joints read a stiffness."
-    return Structure("command", meaning, _arrays(robot, tuple(orders_of_derivation())))
+    names = (name for signal in (POSITION, *robot.signals) for name in signal.names)
+    return Structure("command", meaning, _arrays(robot, tuple(names)))
 
 
 def link_torques_function(robot: Robot) -> Function:

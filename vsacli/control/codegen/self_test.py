@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, over_time
-from vsacli.base.signals import POSITION, orders_of_derivation
+from vsacli.base.signals import POSITION
 from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.interface import Array, Function
 from vsacli.control.codegen.scalar import included
@@ -74,7 +74,8 @@ class Reference:
         return self._rng.uniform(-scale, scale, (CASES, len(self._robot.joints)))
 
     def _command(self) -> Arrays:
-        names = [name for name in orders_of_derivation() if name != "stiffness"]
+        signals = (POSITION, *self._robot.signals)
+        names = [name for signal in signals for name in signal.names if name != "stiffness"]
         drawn = {name: self._drawn(SCALES.get(name, 1.0)) for name in names}
         block = compute_block(self._robot, self._motion(drawn, np.ones_like(drawn["q"])))
         lower = np.nan_to_num(block.stiffness_lower)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import orders_of_derivation
+from vsacli.base.signals import COMMANDED, POSITION
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.control.simulation.tabulated import tabulate
 from vsacli.trajectory.motion import Motion
@@ -25,7 +25,8 @@ class Reference:
 
     def __init__(self, trajectory: Trajectory) -> None:
         self.frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        self._commands = _tabulated(trajectory, tuple(orders_of_derivation()))
+        signals = (POSITION, *(COMMANDED[key] for key in trajectory.commanded))
+        self._commands = _tabulated(trajectory, [name for signal in signals for name in signal.names])
         self._wrench = _tabulated(trajectory, WRENCH_NAMES) if self.frame else None
 
     def __call__(self, time: float | FloatArray) -> Motion:

@@ -26,7 +26,7 @@ from vsacli.control.simulation.rounding import check_rounding
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
 from vsacli.control.simulation.state_trajectory import StateTrajectory, continuous, sampled
 from vsacli.dynamics.forward import State
-from vsacli.dynamics.inverse import check_fit, compute_block
+from vsacli.dynamics.inverse import compute_block, fitted
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -142,7 +142,7 @@ def simulate(
             double precision does not resolve them, a budget below 1.
         TypeError: robot or trajectory is none.
     """
-    check_fit(robot, trajectory)
+    trajectory = fitted(robot, trajectory)
     check_measured(measured, gains)
     first, elapsed = trajectory.start, trajectory.from_zero()
     loop = _closed_loop(robot, elapsed, model or robot, gains)

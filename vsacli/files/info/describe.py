@@ -86,7 +86,7 @@ def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> d
         "samples": trajectory.samples,
         "start": trajectory.times.span[0],
         "joints": [
-            {"name": joint, **{name: ranges.of(name, index) for name in orders_of_derivation()}}
+            {"name": joint, **{name: ranges.of(name, index) for name in ranges.of_joints}}
             for index, joint in enumerate(joint_names)
         ],
         "warnings": list(trajectory.warnings),
@@ -108,6 +108,10 @@ class _Ranges:
     def __init__(self) -> None:
         self._low: dict[str, FloatArray] = {}
         self._high: dict[str, FloatArray] = {}
+
+    @property
+    def of_joints(self) -> list[str]:
+        return [name for name in orders_of_derivation() if name in self._low]
 
     def take(self, block: dict[str, FloatArray]) -> None:
         for name, values in block.items():

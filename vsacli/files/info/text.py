@@ -77,18 +77,19 @@ def _trajectory(trajectory: Description) -> Iterator[str]:
         f"trajectory {trajectory['name']}: {trajectory['samples']} steps, {_short(trajectory['duration'])} s"
         f" from t = {_short(trajectory['start'])} s"
     )
-    rows = [("joint", "q", *(f"peak {name}" for name in MOTION), *COMMANDED)]
+    commanded = [key for key in COMMANDED if key in trajectory["joints"][0]]
+    rows = [("joint", "q", *(f"peak {name}" for name in MOTION), *commanded)]
     rows += [
         (
             joint["name"],
             _range(joint["q"]),
             *(_short(joint[name]["peak"]) for name in MOTION),
-            *(_range(joint[key]) for key in COMMANDED),
+            *(_range(joint[key]) for key in commanded),
         )
         for joint in trajectory["joints"]
     ]
     yield from aligned(rows)
-    units = (f"; {key} {signal.quantities[0]}" for key, signal in COMMANDED.items())
+    units = (f"; {key} {COMMANDED[key].quantities[0]}" for key in commanded)
     yield f"units: q {POSITION}, its k-th derivative per s^k{''.join(units)}"
     if "wrench" in trajectory:
         yield from _wrench(trajectory["wrench"])

@@ -15,7 +15,6 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import POSITION, TORQUE
@@ -130,7 +129,7 @@ def _comparison(results: Sequence[StoredResult], compared: _Compared) -> Figure:
 
 def _curves(results: Sequence[StoredResult], variable: str) -> BoolArray:
     """Which curves of the variable any of the results has at each joint, (joints, 1 or 2)."""
-    there = np.any([existing(result.declared[variable], result.actuators) for result in results], axis=0)
+    there = np.any([result.existing(result.declared[variable]) for result in results], axis=0)
     columns = int(np.count_nonzero(np.any(there, axis=0)))
     return np.asarray(there)[:, :columns]
 

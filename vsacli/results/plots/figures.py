@@ -100,9 +100,7 @@ def _elastic_torque(result: StoredResult, failures: Failures) -> Figure:
 
 def _energy(result: StoredResult, failures: Failures) -> Figure:
     """Energy in the springs at the left, if there are any; beside it what each motor has worked."""
-    motors = int(
-        np.count_nonzero(np.any(existing(result.declared["motor_energy"], result.actuators), axis=0))
-    )
+    motors = int(np.count_nonzero(np.any(result.existing(result.declared["motor_energy"]), axis=0)))
     if not compliant_joints(result.actuators):
         return grouped_figure(result, failures, "motor_energy", _WORK_LABELS)
     height = GROUP_HEIGHT * len(panel_groups(result.joint_types)) + 1

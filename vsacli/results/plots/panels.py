@@ -14,7 +14,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 
-from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.units import TIME, TORQUE
 from vsacli.base.variables import MOTORS, deviation
@@ -155,7 +154,7 @@ def draw_groups(
     place: SubplotSpec, result: StoredResult, failures: Failures, name: str, labels: Sequence[Label]
 ) -> list[Artist]:
     """Draw a variable, a row of panels for each group of joints that have it; returns what a legend shows."""
-    there = np.array(existing(result.declared[name], result.actuators))
+    there = result.existing(result.declared[name])
     drawn = np.flatnonzero(there.any(axis=0)).tolist()
     groups = [group for group in panel_groups(result.joint_types) if there[group].any()]
     uncertain = deviation(name) in result.variables

@@ -17,13 +17,14 @@ import numpy as np
 
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import AnyArray
-from vsacli.base.variables import MOTORS, VARIABLES, Variable
+from vsacli.base.variables import MOTORS, OF_ANY_ROBOT, VARIABLES, Variable
 from vsacli.base.version import __version__
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import declared
 from vsacli.documents.resolved_fields import ResolvedField
 from vsacli.results.store.inputs import write_sources
 from vsacli.results.store.schema import (
+    EXISTING,
     TEXT,
     chunk_rows,
     row_shape,
@@ -148,6 +149,9 @@ def _create_variable(file: h5py.File, variable: Variable, robot: Robot, samples:
         track_order=True,
     )
     dataset.attrs.update(variable_attributes(variable, robot.joint_types))
+    if variable.requires not in OF_ANY_ROBOT:
+        there = [joint.has(variable) for joint in robot.joints]
+        dataset.attrs[EXISTING] = np.array(there, dtype=np.uint8)
     return dataset
 
 

@@ -13,10 +13,11 @@ from typing import Any, Self, TypeVar, cast
 import h5py
 import numpy as np
 
-from vsacli.base.arrays import FlagArray, FloatArray
+from vsacli.actuators.kinds import existing
+from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line, shown
-from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
+from vsacli.base.variables import MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import (
     CheckedFile,
     bounded,
@@ -25,7 +26,7 @@ from vsacli.results.store.damage import (
     reporting_damage,
 )
 from vsacli.results.store.inputs import StoredInput, read_sources
-from vsacli.results.store.schema import FORMAT, row_shape, storage_type
+from vsacli.results.store.schema import EXISTING, FORMAT, row_shape, storage_type
 
 GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
 
@@ -164,6 +165,14 @@ class StoredResult:
         self.provenance()
         with reporting_damage(self.path):
             read_attributes(self._file)
+
+    def existing(self, variable: Variable) -> BoolArray:
+        """Which columns of a variable of joints there are, (joints, 1 or 2)."""
+        if variable.requires in OF_ANY_ROBOT or variable.name not in self.variables:
+            return np.array(existing(variable, self.actuators))
+        with reporting_damage(self.path):
+            stored = np.asarray(self._file[variable.name].attrs[EXISTING], dtype=bool)
+            return stored.reshape(len(self.actuators), -1)
 
     def provenance(self) -> dict[str, Any]:
         """Who made the file, when, with which versions, and path and SHA-256 of each file that was read.

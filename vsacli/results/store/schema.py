@@ -14,6 +14,9 @@ from vsacli.base.wrench import WRENCH_AXES
 
 FORMAT = "vsacli-result/1"
 CHUNK_BYTES = 2**20
+EXISTING = "existing"
+"""Attribute of a variable that depends on devices of the joints: 1 at each column that a joint has."""
+
 TEXT = h5py.string_dtype("utf-8")
 
 

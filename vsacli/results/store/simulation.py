@@ -8,7 +8,8 @@ from pathlib import Path
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import Variable, select_variables
 from vsacli.results.store.reader import StoredResult, open_one_of
-from vsacli.results.store.writer import ResultWriter
+from vsacli.results.store.writer import ResultWriter, absent_at
+from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 FORMAT = "vsacli-simulation/1"
@@ -30,8 +31,10 @@ class SimulationWriter(ResultWriter):
     _format = FORMAT
 
     @staticmethod
-    def _selected(names: Iterable[str] | None, _trajectory: Trajectory) -> tuple[Variable, ...]:
-        return select_variables(SIMULATION_VARIABLES if names is None else names, SIMULATION_VARIABLES)
+    def _selected(names: Iterable[str] | None, robot: Robot, _trajectory: Trajectory) -> tuple[Variable, ...]:
+        absent = absent_at(robot, SIMULATION_VARIABLES)
+        every = [name for name in SIMULATION_VARIABLES if name not in absent]
+        return select_variables(every if names is None else names, SIMULATION_VARIABLES)
 
 
 def open_stored(path: str | Path) -> StoredResult:

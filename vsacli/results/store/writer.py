@@ -16,6 +16,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
+from vsacli.base.signals import COMMANDED
 from vsacli.base.storage import check_free_space, reporting_storage_errors, storage_error
 from vsacli.base.variables import UNCERTAIN, VARIABLES, Variable, deviation, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
@@ -69,7 +70,7 @@ class ResultWriter:
         self._staged = file
         self._robot = robot
         self._trajectory = trajectory
-        self._variables = self._selected(variables, trajectory)
+        self._variables = self._selected(variables, robot, trajectory)
         self._provenance = {"command_line": "", **provenance}
         self._written = 0
 
@@ -175,9 +176,9 @@ class ResultWriter:
         return self._trajectory.samples * row
 
     @staticmethod
-    def _selected(names: Iterable[str] | None, trajectory: Trajectory) -> tuple[Variable, ...]:
-        """The variables of these names, or all that a run along the trajectory has."""
-        absent = _absent(trajectory)
+    def _selected(names: Iterable[str] | None, robot: Robot, trajectory: Trajectory) -> tuple[Variable, ...]:
+        """The variables of these names, or all that a run of the robot along the trajectory has."""
+        absent = _absent(trajectory) | absent_at(robot, VARIABLES)
         if names is None:
             return select_variables(name for name in VARIABLES if name not in absent)
         selected = select_variables(names)
@@ -185,6 +186,20 @@ class ResultWriter:
             if variable.name in absent:
                 raise InputError.one(f"there is no {variable.name}: {absent[variable.name]}")
         return selected
+
+
+def absent_at(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
+    """The variables that a robot does not have, each with the reason."""
+    return {
+        name: f"no joint of {robot.name} has {_requirement(variable)}"
+        for name, variable in declared.items()
+        if not robot.has(variable)
+    }
+
+
+def _requirement(variable: Variable) -> str:
+    signal = COMMANDED.get(f"{variable.requires}")
+    return f"{variable.requires}" if signal is None else f"a {signal.device or signal.key}"
 
 
 def _absent(trajectory: Trajectory) -> dict[str, str]:

@@ -53,18 +53,25 @@ def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int]) -> list
     Every second instant, from the first on, is a step.
     """
     instants = 2 * trajectory.samples - 1
-    names = Command.names()
+    names = Command.names(trajectory.commanded)
     time, rows = np.empty(instants), np.empty((len(joints), len(names), instants))
     samples = usual_block(len(robot.joints))
     for start in range(0, trajectory.samples, samples):
         steps = trajectory.block(start, start + samples + 1)
         middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
         for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
-            _fill(robot, motion, joints, time[first:], rows[:, :, first:])
+            _fill(robot, motion, joints, names, time[first:], rows[:, :, first:])
     return [Load(time, Command.of(dict(zip(names, of_joint, strict=True)))) for of_joint in rows]
 
 
-def _fill(robot: Robot, motion: Motion, joints: list[int], time: FloatArray, rows: FloatArray) -> None:
+def _fill(
+    robot: Robot,
+    motion: Motion,
+    joints: list[int],
+    names: tuple[str, ...],
+    time: FloatArray,
+    rows: FloatArray,
+) -> None:
     """Enter a motion at every second instant."""
     if not len(motion.time):
         return
@@ -72,7 +79,7 @@ def _fill(robot: Robot, motion: Motion, joints: list[int], time: FloatArray, row
     commanded = {**motion.variables(), **elastic_torques(robot, motion)}
     time[places] = motion.time
     for row, joint in zip(rows, joints, strict=True):
-        row[:, places] = np.stack([commanded[name][:, joint] for name in Command.names()])
+        row[:, places] = np.stack([commanded[name][:, joint] for name in names])
 
 
 class Range(NamedTuple):

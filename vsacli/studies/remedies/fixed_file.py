@@ -114,7 +114,7 @@ def _write_table(
     trajectory: Trajectory, recorded: Sequence[Signal], joint_names: Sequence[str], stream: TextIO
 ) -> None:
     names = [name for signal in recorded for name in signal.names]
-    chosen = {name: trajectory.chosen(key) for key, signal in COMMANDED.items() for name in signal.names}
+    chosen = {name: trajectory.chosen(key) for key in trajectory.commanded for name in COMMANDED[key].names}
     headers = [np.array(_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *np.concatenate(headers).tolist()])

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
-from vsacli.dynamics.inverse import check_fit
+from vsacli.dynamics.inverse import fitted
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.combination import Combination, least_change
@@ -46,7 +46,7 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
         InputError: the trajectory is not for the robot, or `near_singular` is no possible margin.
         TypeError: robot or trajectory is none.
     """
-    check_fit(robot, trajectory)
+    trajectory = fitted(robot, trajectory)
     check_near_singular(near_singular)
     acceptance = Acceptance(robot, near_singular)
     asked = Task(acceptance, trajectory)

@@ -26,8 +26,8 @@ from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
-DEFAULT_FITS = dict.fromkeys((POSITION, *COMMANDED.values()), FitChoice())
-"""All signals of joints, each fitted as its noise asks for."""
+NEEDED = (POSITION, *(signal for signal in COMMANDED.values() if signal.device is None))
+"""The signals of joints that a table must have if it is all there is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class Recording:
 def read_recording(
     path: str | os.PathLike[str],
     joints: CommandedJoints,
-    wanted: Mapping[Signal, FitChoice] = DEFAULT_FITS,
+    wanted: Mapping[Signal, FitChoice] | None = None,
     *,
     resampled: bool = False,
     unwrap: bool = False,
@@ -81,7 +81,8 @@ def read_recording(
     Args:
         path: a file with the columns `time` and those of `column_layout`.
         joints: those that are commanded.
-        wanted: the signals to read, each with what is said of its spline.
+        wanted: the signals to read, each with what is said of its spline; all of joints if None, those of
+            devices if they are there, each fitted as its noise asks for.
         resampled: whether the steps will be other times than the recorded ones.
         unwrap: whether to take jumps by 2 pi out of the positions of revolute joints.
 
@@ -90,8 +91,12 @@ def read_recording(
     """
     table = read_table(path)
     file = table.source.path
-    signals = tuple(wanted)
+    signals = NEEDED if wanted is None else tuple(wanted)
     layout = column_layout(table.columns, joints, signals, file, table.header_line)
+    if wanted is None:
+        devices = (signal for signal in COMMANDED.values() if signal.device is not None)
+        signals += tuple(each for each in devices if layout.quantities.get(each.key))
+        wanted = dict.fromkeys(signals, FitChoice())
     time = _si(table, layout.time)
     records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
     turns = list(_unwrapped(records, joints)) if unwrap else []
@@ -119,7 +124,7 @@ def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:
             yield f"its columns of {signal.names[0]} are not used"
     for key, columns in layout.unused.items():
         if columns:
-            yield f"not used: {', '.join(columns)}; only {takers(key)} joints take a {key}"
+            yield f"not used: {', '.join(columns)}; only {takers(COMMANDED[key], 'joints')} take a {key}"
 
 
 def _samples(
