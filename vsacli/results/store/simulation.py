@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
-from vsacli.base.variables import Variable, select_variables
 from vsacli.results.store.reader import StoredResult, open_one_of
-from vsacli.results.store.writer import ResultWriter, absent_at
-from vsacli.robot.model import Robot
+from vsacli.results.store.writer import ResultWriter
 from vsacli.trajectory.trajectory import Trajectory
 
 FORMAT = "vsacli-simulation/1"
@@ -29,12 +26,11 @@ class SimulationWriter(ResultWriter):
     """Writes a simulation file; the trajectory's samples are the most it can have."""
 
     _format = FORMAT
+    _declared = SIMULATION_VARIABLES
 
     @staticmethod
-    def _selected(names: Iterable[str] | None, robot: Robot, _trajectory: Trajectory) -> tuple[Variable, ...]:
-        absent = absent_at(robot, SIMULATION_VARIABLES)
-        every = [name for name in SIMULATION_VARIABLES if name not in absent]
-        return select_variables(every if names is None else names, SIMULATION_VARIABLES)
+    def _absent(_trajectory: Trajectory) -> dict[str, str]:
+        return {}
 
 
 def open_stored(path: str | Path) -> StoredResult:

@@ -53,10 +53,11 @@ class ResultWriter:
         provenance: how it is computed, for the record: attributes of the file, such as `command_line`.
 
     Raises:
-        InputError: a name in `variables` is none, or of a wrench the trajectory does not have.
+        InputError: a name in `variables` is none, or of what the trajectory or the robot does not have.
     """
 
     _format = FORMAT
+    _declared: Mapping[str, Variable] = VARIABLES
 
     def __init__(
         self,
@@ -175,21 +176,35 @@ class ResultWriter:
         row = sum(row_bytes(variable, len(self._robot.joints)) for variable in stored)
         return self._trajectory.samples * row
 
-    @staticmethod
-    def _selected(names: Iterable[str] | None, robot: Robot, trajectory: Trajectory) -> tuple[Variable, ...]:
+    def _selected(
+        self, names: Iterable[str] | None, robot: Robot, trajectory: Trajectory
+    ) -> tuple[Variable, ...]:
         """The variables of these names, or all that a run of the robot along the trajectory has."""
-        absent = _absent(trajectory) | absent_at(robot, VARIABLES)
+        absent = {**self._absent(trajectory), **_not_given(robot, self._declared)}
         if names is None:
-            return select_variables(name for name in VARIABLES if name not in absent)
-        selected = select_variables(names)
+            return select_variables((name for name in self._declared if name not in absent), self._declared)
+        selected = select_variables(names, self._declared)
         for variable in selected:
             if variable.name in absent:
                 raise InputError.one(f"there is no {variable.name}: {absent[variable.name]}")
         return selected
 
+    @staticmethod
+    def _absent(trajectory: Trajectory) -> dict[str, str]:
+        """The variables that a run along a trajectory does not have, each with the reason."""
+        uncertain = trajectory.uncertain
+        certain = [name for name in UNCERTAIN if name not in uncertain]
+        reasons = {
+            deviation(name): f"{name} does not come from a fit of recorded samples" for name in certain
+        }
+        if trajectory.wrench is not None:
+            return reasons
+        wrench = (*WRENCH_NAMES, *map(deviation, WRENCH_NAMES))
+        return reasons | dict.fromkeys(wrench, "the trajectory has no wrench")
 
-def absent_at(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
-    """The variables that a robot does not have, each with the reason."""
+
+def _not_given(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
+    """The variables that a robot does not have, since its file does not give what they need."""
     return {
         name: f"no joint of {robot.name} has {_requirement(variable)}"
         for name, variable in declared.items()
@@ -200,17 +215,6 @@ def absent_at(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
 def _requirement(variable: Variable) -> str:
     signal = COMMANDED.get(f"{variable.requires}")
     return f"{variable.requires}" if signal is None else f"a {signal.device or signal.key}"
-
-
-def _absent(trajectory: Trajectory) -> dict[str, str]:
-    """The variables that a run along a trajectory does not have, each with the reason."""
-    uncertain = trajectory.uncertain
-    certain = [name for name in UNCERTAIN if name not in uncertain]
-    reasons = {deviation(name): f"{name} does not come from a fit of recorded samples" for name in certain}
-    if trajectory.wrench is not None:
-        return reasons
-    wrench = (*WRENCH_NAMES, *map(deviation, WRENCH_NAMES))
-    return reasons | dict.fromkeys(wrench, "the trajectory has no wrench")
 
 
 class Sink(io.RawIOBase):
