@@ -138,13 +138,11 @@ def test_stiffness_ranges_are_those_of_cubic_springs() -> None:
         assert loaded == [pytest.approx(least), math.inf]
 
 
-def test_other_joints_have_no_stiffness_range() -> None:
+def test_other_joints_have_the_stiffness_of_their_spring_or_none() -> None:
     robot = load_robot(REPOSITORY / "robots" / "mixed_3r.yaml")
-    assert [bool(joint["stiffness_range"]) for joint in describe_robot(robot)["joints"]] == [
-        False,
-        False,
-        True,
-    ]
+    base, shoulder, elbow = (joint["stiffness_range"] for joint in describe_robot(robot)["joints"])
+    assert (base, shoulder) == ({}, {"unloaded": [1000, 1000], "loaded": [1000, 1000]})
+    assert elbow["unloaded"] == [800, math.inf]
 
 
 def test_every_declared_number_of_a_robot_is_there() -> None:

@@ -120,7 +120,7 @@ def test_only_antagonistic_joints_take_a_stiffness(value: str, expected: list[fl
     )
 
 
-AN_ELASTIC = "its actuator is elastic, with the constant stiffness that the robot file says"
+AN_ELASTIC = "its actuator is elastic, with the spring that the robot file says"
 A_RIGID = "its actuator is rigid and has no stiffness"
 
 

@@ -1,42 +1,71 @@
-"""One motor behind a spring of constant stiffness: EJ-NEA, Buondonno & De Luca (2015)."""
+"""One motor behind a spring: EJ-NEA, Buondonno & De Luca (2015), there with linear ones."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
-from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
-from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.elasticity import UNBOUNDED, Elasticity, ElasticState, Torques
+from vsacli.actuators.laws import LAWS, SpringLaw
+from vsacli.actuators.laws.rows import SpringRows
+from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.limit_check import LimitCheck, OfJoint
 from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.reach import Reach
 from vsacli.actuators.transmission import Command, Transmission, single_motor
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
-from vsacli.documents.fields import POSITIVE, Record, check_fields, number, value
+from vsacli.base.errors import FieldProblem
+from vsacli.base.flags import Flag, has
+from vsacli.documents.fields import POSITIVE, OneOf, Record, check_fields, number, value
+from vsacli.documents.source import Source
 
 EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
 
 
 @dataclass(frozen=True)
 class Elastic(Actuator):
-    """One motor that moves the link through a spring of constant stiffness."""
+    """One motor that moves the link through a spring: a linear one of some stiffness, or one of any law."""
 
     motor: Motor = value(Record(Motor), "the motor")
-    stiffness: float = number(units.STIFFNESS, "stiffness of the transmission", check=POSITIVE)
+    stiffness: float | None = number(
+        units.STIFFNESS, "stiffness of a linear spring; this or `spring`", check=POSITIVE, default=None
+    )
+    spring: SpringLaw | None = value(OneOf(LAWS), "spring of any law; this or `stiffness`", default=None)
 
     uncommanded: ClassVar[Mapping[str, str]] = {
-        "stiffness": "its actuator is elastic, with the constant stiffness that the robot file says"
+        "stiffness": "its actuator is elastic, with the spring that the robot file says"
     }
 
     def __post_init__(self) -> None:
-        check_fields(self)
+        problems = []
+        if self.stiffness is None and self.spring is None:
+            problems.append(
+                FieldProblem((), "missing key 'stiffness' (of a linear spring) or 'spring' (of any law)")
+            )
+        elif self.stiffness is not None and self.spring is not None:
+            reason = "the law of `spring` says already how stiff it is; leave out one of both"
+            problems.append(FieldProblem(("stiffness",), reason))
+        check_fields(self, *problems)
+
+    @cached_property
+    def law(self) -> SpringLaw:
+        """The law of its spring."""
+        if self.stiffness is None:
+            assert self.spring is not None, "see __post_init__"
+            return self.spring
+        from vsacli.actuators.laws.polynomial import Polynomial
+
+        return Polynomial(c1=self.stiffness)
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """A motor and a spring."""
+        """A motor and a linear spring."""
         return {"motor": Motor.example(joint_type), "stiffness": EXAMPLE_STIFFNESS[joint_type]}
 
     @classmethod
@@ -49,91 +78,179 @@ class Elastic(Actuator):
         """The one motor."""
         return (self.motor.at_joint,)
 
+    @property
+    def max_deflections(self) -> tuple[float, ...]:
+        """That of the spring."""
+        return (self.law.max_deflection,)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the spring."""
+        return self.law.warnings
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Those of the spring."""
+        return self.law.sources
+
+    def limits(self) -> Iterator[LimitCheck]:
+        """Those of every actuator, and the torques that the spring can carry."""
+        yield from super().limits()
+        yield self._carriable
+
+    @property
+    def _carriable(self) -> LimitCheck:
+        return LimitCheck(Flag.INFEASIBLE, "tau_e", None, self.law.torque_range)
+
     def transmit(
         self, command: Command, _near_singular: float, _integrated: FloatArray | None
     ) -> Transmission:
-        """Deflection tau_e/K, and its derivatives."""
-        stiffness = self.stiffness
+        """The deflection at which the spring carries tau_e, and its derivatives."""
+        return self._linear(command, self.stiffness) if self.stiffness else self._nonlinear(command)
+
+    def _linear(self, command: Command, stiffness: float) -> Transmission:
+        """Deflection tau_e/K: nothing is to be solved, and the stiffness is constant."""
+        phi, constant = command.tau_e / stiffness, np.zeros_like(command.q)
         return single_motor(
-            command,
-            stiffness=stiffness,
-            stiffness_rates=0.0,
-            phi=command.tau_e / stiffness,
+            stiffness=np.full_like(command.q, stiffness),
+            dstiffness=constant,
+            ddstiffness=constant,
+            phi=phi,
             dphi=command.dtau_e / stiffness,
             ddtheta=command.ddq + command.ddtau_e / stiffness,
+            tau_spring=command.tau_e,
+            elastic_energy=phi * command.tau_e / 2,
+            flags=np.zeros(command.q.shape, dtype=np.uint16),
+        )
+
+    def _nonlinear(self, command: Command) -> Transmission:
+        """The root of tau(phi) = tau_e, then tau_e' = sigma phi' and tau_e'' = zeta phi'^2 + sigma phi''.
+
+        NaN where tau_e cannot be carried; what needs 1/sigma also where that is zero.
+        """
+        law = self.law
+        infeasible = has(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)
+        phi = np.where(infeasible, np.nan, law.deflection(command.tau_e))
+        energy, spring = law.energy_and_state(phi)
+        reached = Reach(
+            infeasible=infeasible,
+            slack=infeasible & law.pulls_only & (command.tau_e < 0),
+            singular=spring.sigma == 0,
+            near_singular=np.zeros_like(phi, dtype=bool),
+        )
+        divisor = np.where(reached.singular, np.nan, spring.sigma)
+        dphi = command.dtau_e / divisor
+        ddphi = (command.ddtau_e - spring.zeta * dphi * dphi) / divisor
+        return single_motor(
+            stiffness=spring.sigma,
+            dstiffness=spring.zeta * dphi,
+            ddstiffness=spring.eta * dphi * dphi + spring.zeta * ddphi,
+            phi=phi,
+            dphi=dphi,
+            ddtheta=command.ddq + ddphi,
+            tau_spring=spring.tau,
+            elastic_energy=energy,
+            flags=reached.flags,
         )
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """K phi'."""
-        rates: FloatArray = self.stiffness * of_joint["dphi"][:1]
+        """Sigma phi'."""
+        rates: FloatArray = self.law.stiffness(of_joint["phi"][:1]) * of_joint["dphi"][:1]
         return rates
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """K phi, with the stiffness K."""
-        tau_e = of_joint["phi"][0] * self.stiffness
-        return Carried(tau_e, np.abs(tau_e), np.full_like(tau_e, self.stiffness))
+        """Torque and stiffness by the law."""
+        phi = of_joint["phi"][0]
+        tau_e = self.law.torque(phi)
+        return Carried(tau_e, np.abs(tau_e), self.law.stiffness(phi))
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
         """The springs of several joints."""
-        return _Springs(np.array([[actuator.stiffness] for actuator in actuators]))
+        linear = [actuator.stiffness for actuator in actuators if actuator.stiffness]
+        if len(linear) == len(actuators):
+            return _Springs(_LinearRows(linear))
+        return _Springs(SpringRows([(actuator.law,) for actuator in actuators]))
 
 
-class _Springs(Elasticity):
-    """Springs of constant stiffness, (joints, 1)."""
+class _LinearRows:
+    """Linear springs, one at each joint, all evaluated at a time; else as `SpringRows`."""
 
-    def __init__(self, stiffness: FloatArray) -> None:
-        self._stiffness = stiffness
+    domain = UNBOUNDED
 
-    def torques(self, phi: FloatArray) -> Torques:
+    def __init__(self, stiffness: Sequence[float]) -> None:
+        self._stiffness = np.array(stiffness)[:, None]
+
+    def torque(self, phi: FloatArray) -> FloatArray:
         """K phi."""
-        tau = phi * self._stiffness
-        return Torques(tau[..., 0], tau)
+        torque: FloatArray = phi * self._stiffness
+        return torque
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """K phi^2/2."""
-        energy: FloatArray = (phi * phi * (self._stiffness / 2))[..., 0]
+        energy: FloatArray = phi * phi * (self._stiffness / 2)
         return energy
 
-    def state(self, phi: FloatArray) -> ElasticState:
+    def state(self, phi: FloatArray) -> SpringState:
         """K phi, whose derivatives are constants."""
-        return _State(phi, self._stiffness)
+        torque, none = self.torque(phi), np.zeros_like(phi)
+        return SpringState(torque, np.broadcast_to(self._stiffness, torque.shape), none, none)
+
+
+class _Springs(Elasticity):
+    """One spring at each joint."""
+
+    def __init__(self, rows: SpringRows | _LinearRows) -> None:
+        self._rows, self.domain = rows, rows.domain
+
+    def torques(self, phi: FloatArray) -> Torques:
+        """The spring pulls link and motor alike."""
+        tau = self._rows.torque(phi)
+        return Torques(tau[..., 0], tau)
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """That of the spring."""
+        return self._rows.energy(phi)[..., 0]
+
+    def state(self, phi: FloatArray) -> ElasticState:
+        """The spring with its derivatives."""
+        return _State(self._rows.state(phi))
 
 
 class _State(ElasticState):
-    """Springs of constant stiffness, (joints, 1), at phi."""
+    """One spring of each joint, arrays (..., joints, 1)."""
 
-    def __init__(self, phi: FloatArray, stiffness: FloatArray) -> None:
-        self._stiffness = stiffness
-        self._torque = phi * stiffness
+    def __init__(self, springs: SpringState) -> None:
+        self._springs = springs
+        self._one = SpringState(*(each[..., 0] for each in springs))
 
     @property
     def tau_e(self) -> FloatArray:
-        """K phi."""
-        tau_e: FloatArray = self._torque[..., 0]
-        return tau_e
+        """Torque of the spring."""
+        return self._one.tau
 
     @property
     def stiffness(self) -> FloatArray:
-        """K."""
-        return np.broadcast_to(self._stiffness[:, 0], self._torque.shape[:-1])
+        """Its stiffness."""
+        return self._one.sigma
 
     @property
     def tau_spring(self) -> FloatArray:
-        """K phi."""
-        return self._torque
+        """Torque of the spring."""
+        return self._springs.tau
 
     def torque_rate(self, dphi: FloatArray) -> FloatArray:
-        """K phi'."""
-        rate: FloatArray = (self._stiffness * dphi)[..., 0]
-        return rate
+        """Sigma phi'."""
+        return self._one.sigma * dphi[..., 0]
 
     def stiffness_rate(self, dphi: FloatArray) -> FloatArray:
-        """None."""
-        return np.zeros_like(dphi[..., 0])
+        """Zeta phi'; of a linear spring zero, not -0."""
+        return self._one.zeta * dphi[..., 0] + 0.0
 
     def motor_accelerations(
-        self, _dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
+        self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
     ) -> FloatArray:
-        """tau_e''/K + q'', (70) alone."""
-        return (ddtau_e / self.stiffness + ddq)[..., None]
+        """(tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
+        squared = dphi[..., 0] * dphi[..., 0]
+        divisor = np.where(self.stiffness == 0, np.nan, self.stiffness)
+        return ((ddtau_e - self._one.zeta * squared) / divisor + ddq)[..., None]

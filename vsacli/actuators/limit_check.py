@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import AnyArray, FlagArray, FloatArray
-from vsacli.base.flags import Flag, has, marked
+from vsacli.base.flags import LIMITS, Flag, has, marked
 from vsacli.base.variables import VARIABLES, deviation
 
 LIMIT_ROUNDING = 1e-9
@@ -71,10 +71,11 @@ class LimitCheck(NamedTuple):
     def allowance(self, of_joint: OfJoint) -> FloatArray | float:
         """How far outside values may seem to be since they are uncertain, (samples,); 0 if they are not.
 
-        Twice the standard deviation, but at most 1 % of the range, or of the bound if there is only one.
+        Twice the standard deviation, but at most 1 % of the range, or of the bound if there is only one; none
+        where the bit is no limit, but says that there is no way.
         """
         deviations = of_joint.get(deviation(self.variable))
-        if deviations is None:
+        if deviations is None or self.flag not in LIMITS:
             return 0.0
         width = self.range[1] - self.range[0]
         most = LARGEST_ALLOWANCE * (width if np.isfinite(width) else self._largest)
@@ -99,8 +100,8 @@ class LimitCheck(NamedTuple):
 
     @property
     def _largest(self) -> float:
-        """The larger finite bound in size."""
-        return max(abs(bound) for bound in self.range if np.isfinite(bound))
+        """The larger finite bound in size; 0 if there is none."""
+        return max((abs(bound) for bound in self.range if np.isfinite(bound)), default=0.0)
 
     def _outside(self, values: FloatArray) -> FloatArray:
         """How far values lie outside the range; zero or negative inside, NaN for NaN."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -48,9 +47,17 @@ class Rigid(Actuator):
         self, command: Command, _near_singular: float, _integrated: FloatArray | None
     ) -> Transmission:
         """No deflection; there is no stiffness, and so no derivative of one."""
-        still = np.zeros_like(command.q)
+        still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)
         return single_motor(
-            command, stiffness=math.nan, stiffness_rates=math.nan, phi=still, dphi=still, ddtheta=command.ddq
+            stiffness=none,
+            dstiffness=none,
+            ddstiffness=none,
+            phi=still,
+            dphi=still,
+            ddtheta=command.ddq,
+            tau_spring=command.tau_e,
+            elastic_energy=still * command.tau_e,
+            flags=np.zeros(still.shape, dtype=np.uint16),
         )
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:

@@ -67,36 +67,30 @@ class Transmission(NamedTuple):
 
 
 def single_motor(
-    command: Command,
     *,
-    stiffness: float,
-    stiffness_rates: float,
+    stiffness: FloatArray,
+    dstiffness: FloatArray,
+    ddstiffness: FloatArray,
     phi: FloatArray,
     dphi: FloatArray,
     ddtheta: FloatArray,
+    tau_spring: FloatArray,
+    elastic_energy: FloatArray,
+    flags: FlagArray,
 ) -> Transmission:
-    """The transmission of an actuator with one motor, which carries tau_e and is always within reach.
-
-    Args:
-        command: what the joint is asked to do.
-        stiffness: the same at every step, NaN if the joint has none.
-        stiffness_rates: its derivatives, zero or NaN.
-        phi: deflection of the transmission, (samples,).
-        dphi: its rate, (samples,).
-        ddtheta: acceleration of the motor, (samples,).
-    """
-    none = np.full_like(command.q, np.nan)
+    """The transmission of an actuator with one motor, whose stiffness is not commanded; arrays (samples,)."""
+    none = np.full_like(phi, np.nan)
     return Transmission(
-        stiffness=np.full_like(none, stiffness),
-        dstiffness=np.full_like(none, stiffness_rates),
-        ddstiffness=np.full_like(none, stiffness_rates),
+        stiffness=stiffness,
+        dstiffness=dstiffness,
+        ddstiffness=ddstiffness,
         phi=np.stack((phi, none)),
         dphi=np.stack((dphi, none)),
         ddtheta=np.stack((ddtheta, none)),
-        tau_spring=np.stack((command.tau_e, none)),
-        elastic_energy=phi * command.tau_e / 2,
+        tau_spring=np.stack((tau_spring, none)),
+        elastic_energy=elastic_energy,
         det_A=none,
         stiffness_lower=none,
         stiffness_upper=none,
-        flags=np.zeros(none.shape, dtype=np.uint16),
+        flags=flags,
     )

@@ -138,18 +138,25 @@ def _infeasible(joint: JointReport, worst: Worst) -> str:
     slack = f"; a tendon goes slack at {count(joint.steps['slack'])}" if joint.steps["slack"] else ""
     preload = "; the opposite preload would reach it" if joint.other_preload else ""
     hints = f"({steps}){slack}{preload}"
+    when = f"at t = {time_text(worst.time)}"
     if math.isnan(worst.bound):
-        when = f"at t = {time_text(worst.time)}"
         return f"its springs cannot carry the elastic torque {when} at any stiffness {hints}"
     value, bound = _apart(worst.value, worst.bound)
+    if "stiffness" not in _kind(joint).commanded:
+        relation = "below" if worst.value < worst.bound else "above"
+        load = f"elastic torque {value} {worst.unit} {when}"
+        return f"{load} is {relation} the {bound} that its spring carries {hints}"
     relation, remedy = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
     return (
-        f"stiffness {value} {worst.unit} at t = {time_text(worst.time)} is {relation} the {bound} "
+        f"stiffness {value} {worst.unit} {when} is {relation} the {bound} "
         f"its load allows, {remedy} it {hints}"
     )
 
 
 def _singular(joint: JointReport, worst: Worst) -> str:
+    if math.isnan(worst.bound):
+        when = f"at t = {time_text(worst.time)}"
+        return f"its spring is slack {when}: motor torques are undefined ({_steps(joint, 'singular')})"
     remedy = "lower" if worst.bound == joint.reachable[1] else "raise"
     return (
         f"stiffness {worst.value:.6g} {worst.unit} at t = {time_text(worst.time)} is singular: "

@@ -7,10 +7,12 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.json_records import Stored, named
+from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.inverse import compute_block
@@ -54,8 +56,11 @@ RUNGS = (
     Rung("phi", "dphi", "phi", 1),
     Rung("theta", "dtheta", "theta", 1),
     Rung("dtheta", "ddtheta", "theta", 2),
+    Rung("stiffness", "dstiffness", "stiffness", 1),
+    Rung("dstiffness", "ddstiffness", "stiffness", 2),
 )
-"""What is compared; the deflections by themselves, since the motion of the joint can hide them in theta."""
+"""What is compared; the deflections by themselves, since the motion of the joint can hide them in theta, the
+stiffness where it is not commanded."""
 
 PROBES = 200
 """About how many times are probed."""
@@ -108,7 +113,7 @@ def spring_residual(robot: Robot, block: Block) -> float:
     """Largest scaled residual of (14) on the regular steps, from the laws evaluated at phi.
 
     Scaled as |sum tau_k - tau_e| / sum |tau_k| and |sum sigma_k - sigma| / sigma. An elastic joint has one
-    linear law; a rigid one has none, and so no residual.
+    law; a rigid one has none, and so no residual.
     """
     errors = []
     for index, joint in enumerate(robot.joints):
@@ -160,8 +165,7 @@ def _ladder(
 
     def on_grid(name: str) -> FloatArray:
         values: FloatArray = getattr(block, name).reshape(*grid.shape, len(robot.joints), -1)
-        there = [joint.actuator.has(VARIABLES[name]) for joint in robot.joints]
-        return np.where(there, values, 0.0)
+        return np.where([_compared(joint.actuator, name) for joint in robot.joints], values, 0.0)
 
     errors = [
         _rung_error(
@@ -174,6 +178,12 @@ def _ladder(
         for rung in RUNGS
     ]
     return np.max(errors, axis=0), bool(smooth.any(axis=0).all())
+
+
+def _compared(actuator: Actuator, name: str) -> list[bool]:
+    """Which columns of a variable of joints or motors are computed, not commanded, at such an actuator."""
+    commanded = {name for key in actuator.commanded for name in COMMANDED[key].names}
+    return [False] if name in commanded else actuator.has(VARIABLES[name])
 
 
 def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:

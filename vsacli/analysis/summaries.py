@@ -35,7 +35,7 @@ class JointSummary:
         self._peaks = np.full(5, np.nan)
         self._start: FloatArray | None = None
         self._end = np.full((2, len(MOTORS)), np.nan)
-        self._other_preload = True
+        self._other_preload = "stiffness" in joint.actuator.commanded
 
     def add(self, block: Block) -> None:
         """Merge a block of steps."""
@@ -50,7 +50,10 @@ class JointSummary:
         self._record_not_finite(flags, block.time)
         self._add_bounded(block)
         least, most = self._stiffness
-        self._stiffness = np.fmin(least, stiffness.min()), np.fmax(most, stiffness.max())
+        self._stiffness = (
+            np.fmin(least, np.fmin.reduce(stiffness)),
+            np.fmax(most, np.fmax.reduce(stiffness)),
+        )
         rows = block.tau_e[:, index], *block.tau_motor[:, index].T, *block.dtheta[:, index].T
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(np.abs(row)) for row in rows])
 
@@ -64,6 +67,8 @@ class JointSummary:
         flags = block.flags[:, self._index]
         if "stiffness" in self._joint.actuator.commanded:
             self._add_reach(flags, block)
+        else:
+            self._record_without_stiffness(flags, block.time)
         self._record_limits(flags, block)
 
     def _add_reach(self, flags: FlagArray, block: Block) -> None:
@@ -165,6 +170,13 @@ class JointSummary:
             self._first_time[label] = first = float(time[hit.argmax()])
             unit = VARIABLES["tau_motor"].quantity.unit(self._joint.type)
             self._keep(0.0, Worst(label, first, math.nan, math.nan, unit))
+
+    def _record_without_stiffness(self, flags: FlagArray, time: FloatArray) -> None:
+        """The first singular step, where a spring whose stiffness is not commanded has none."""
+        hit = has(flags, Flag.SINGULAR)
+        if hit.any():
+            unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
+            self._keep(0.0, Worst("singular", float(time[hit.argmax()]), 0.0, math.nan, unit))
 
     def _record_limits(self, flags: FlagArray, block: Block) -> None:
         values = block.of_joint(self._index)

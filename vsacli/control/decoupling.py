@@ -16,7 +16,7 @@ from vsacli.trajectory.motion import Motion
 class LinkMotion(NamedTuple):
     """What the state says about the links, each ([samples,] joints).
 
-    The stiffness of an elastic joint is its constant, with derivative zero.
+    The stiffness of an elastic joint is that of its spring.
     """
 
     tau_e: FloatArray

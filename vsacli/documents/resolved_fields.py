@@ -45,7 +45,7 @@ def stacked(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[Re
 
 
 def _prototypes(members: Sequence[list[ResolvedField]]) -> dict[tuple[str, ...], ResolvedField]:
-    """Of each field the one with most dimensions: a motor may be one of a joint, or one of two."""
+    """Of each field the one with most dimensions: a joint may have one motor or spring, or two."""
     prototypes: dict[tuple[str, ...], ResolvedField] = {}
     for part in (part for member in reversed(members) for part in member):
         if part.path not in prototypes or len(part.dims) >= len(prototypes[part.path].dims):
@@ -54,9 +54,9 @@ def _prototypes(members: Sequence[list[ResolvedField]]) -> dict[tuple[str, ...],
 
 
 def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    """The values in the shape of those of two motors, if they are those of one: as of the first."""
+    """The values in the shape of those of two sides, if they are those of one: as of the first."""
     if values.shape == absent.shape:
         return values
     fitted = absent.copy()
-    fitted[0] = values
+    fitted[0] = values[()]
     return fitted

@@ -1,13 +1,14 @@
-"""The pairs of springs of several joints, at any state of these: all springs that obey one law at a time."""
+"""The pairs of springs of several joints, at any state of these."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
 from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.laws.rows import SpringRows
 from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.pairs.decoupling_matrix import beta, determinant, solve
 from vsacli.base.arrays import FloatArray
@@ -17,37 +18,22 @@ class PairElasticity(Elasticity):
     """Two springs at each joint, between either motor and the link; phi are their deflections."""
 
     def __init__(self, pairs: Sequence[tuple[SpringLaw, SpringLaw]]) -> None:
-        laws = [law for pair in pairs for law in pair]
-        self.domain = np.array([law.domain for law in laws]).T.reshape(2, len(pairs), 2)
-        self._alike = list(_alike(laws))
+        self._springs = SpringRows(pairs)
+        self.domain = self._springs.domain
 
     def torques(self, phi: FloatArray) -> Torques:
         """Each spring pulls the link and its motor alike."""
-        tau = self._each(phi, lambda law, part: (law.torque(part),))[0]
+        tau = self._springs.torque(phi)
         return Torques(tau[..., 0] + tau[..., 1], tau)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """The sum over both springs."""
-        energy = self._each(phi, lambda law, part: (law.energy(part),))[0]
+        energy = self._springs.energy(phi)
         return energy[..., 0] + energy[..., 1]
 
     def state(self, phi: FloatArray) -> ElasticState:
         """Both springs with their derivatives."""
-        return _PairStates(SpringState(*self._each(phi, lambda law, part: law.state(part))))
-
-    def _each(
-        self, phi: FloatArray, values: Callable[[SpringLaw, FloatArray], Sequence[FloatArray]]
-    ) -> Sequence[FloatArray]:
-        """What each spring's law makes of its deflection, (..., joints, 2)."""
-        if len(self._alike) == 1:
-            return values(self._alike[0][0], phi)
-        flat = phi.reshape(*phi.shape[:-2], -1)
-        parts = [(members, values(law, flat[..., members])) for law, members in self._alike]
-        merged = [np.empty_like(flat) for _ in parts[0][1]]
-        for members, of_law in parts:
-            for whole, part in zip(merged, of_law, strict=True):
-                whole[..., members] = part
-        return [whole.reshape(*phi.shape) for whole in merged]
+        return _PairStates(self._springs.state(phi))
 
 
 class _PairStates(ElasticState):
@@ -97,12 +83,3 @@ class _PairStates(ElasticState):
     def determinant(self) -> FloatArray:
         """Det A (67)."""
         return determinant(self._one, self._two)
-
-
-def _alike(laws: list[SpringLaw]) -> Iterator[tuple[SpringLaw, list[int]]]:
-    """Each distinct law, with the springs that obey it."""
-    distinct: list[SpringLaw] = []
-    for law in laws:
-        if law not in distinct:
-            distinct.append(law)
-            yield law, [index for index, other in enumerate(laws) if other == law]

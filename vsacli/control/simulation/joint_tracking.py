@@ -131,7 +131,7 @@ def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
     """The worst excess of each limit of a joint; of either motor."""
     worst: dict[str, Worst] = {}
     most: dict[str, float] = {}
-    checks = limit_checks(joint)
+    checks = [check for check in limit_checks(joint) if check.flag in LIMITS]
     names = {check.variable: _checked(check.variable) for check in checks}
     values = of_joint({variable: getattr(history, name) for variable, name in names.items()}, index)
     for check in checks:

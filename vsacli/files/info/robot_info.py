@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.documents.fields import declared
 from vsacli.files.info.extremes import Extremes, free_range, largest_sizes, unlimited
 from vsacli.robot.joint import Joint
@@ -25,7 +28,7 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     a prismatic joint without limits is held at zero. `static_load` is the torque of gravity alone.
     `stiffness_range` of an antagonistic joint is reachable while it carries no torque, `loaded` while it
     carries the static load in either direction; an end that nothing bounds is infinite, both are NaN if the
-    springs cannot carry the load.
+    springs cannot carry the load. Of an elastic joint it is the stiffness that its spring then has.
     """
     return {
         "kind": "robot",
@@ -76,17 +79,27 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
 def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[float]]:
     """The stiffness reachable `unloaded`, and `loaded` by a torque in either direction, N m/rad (N/m), at q.
 
-    Empty if its stiffness is not commanded.
+    Of a joint whose stiffness is not commanded, that which it has then; empty if it has no springs.
     """
-    if "stiffness" not in joint.actuator.commanded:
+    if not joint.actuator.sprung:
         return {}
     tau_e = np.array([0.0, load, -load])
     with np.errstate(all="ignore"):  # a load may be beyond all numbers
+        if "stiffness" not in joint.actuator.commanded:
+            unloaded, *loaded = _held(joint.actuator, tau_e, q).stiffness.tolist()
+            return {"unloaded": [unloaded, unloaded], "loaded": [min(loaded), max(loaded)]}
         solution = joint.actuator.solve(tau_e, np.ones(3), np.full(3, q))
     return {
         "unloaded": [float(solution.lower[0]), float(solution.upper[0])],
         "loaded": [float(solution.lower.max()), float(solution.upper.min())],
     }
+
+
+def _held(actuator: Actuator, tau_e: FloatArray, q: float) -> Transmission:
+    """What lies between joint and motors at rest, (samples,), of an actuator that takes no stiffness."""
+    rest = {name: np.zeros_like(tau_e) for name in Command.names()}
+    command = Command.of({**rest, "tau_e": tau_e, "q": np.full_like(tau_e, q)})
+    return actuator.transmit(command, NEAR_SINGULAR_MARGIN, None)
 
 
 def gravity_torques(robot: Robot, q: FloatArray) -> FloatArray:

@@ -65,11 +65,15 @@ def _drives(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
     for joint in joints:
         kind, actuator, ranges = joint["type"], joint["actuator"], joint["stiffness_range"]
         unit = STIFFNESS.unit(kind)
-        springs = " ".join(dict.fromkeys(spring["type"] for spring in actuator.get("spring", ())))
-        given = f"{_short(actuator['stiffness'])} {unit}" if "stiffness" in actuator else "-"
-        reachable = (_span(ranges[name], unit) if ranges else given for name in ("unloaded", "loaded"))
+        springs = " ".join(dict.fromkeys(spring["type"] for spring in _springs(actuator.get("spring"))))
+        reachable = (_span(ranges[name], unit) if ranges else "-" for name in ("unloaded", "loaded"))
         load = f"{_short(joint['static_load']['torque'])} {TORQUE.unit(kind)}"
         yield joint["name"], actuator["type"], springs or "-", load, *reachable
+
+
+def _springs(written: Any) -> Sequence[Description]:
+    """None, one, or those of both sides."""
+    return written if isinstance(written, list) else [written] if written else []
 
 
 def _trajectory(trajectory: Description) -> Iterator[str]:
@@ -176,6 +180,8 @@ def _span(ends: Sequence[float], unit: str) -> str:
         return "none"
     if math.isinf(low) and math.isinf(high):
         return "-"
+    if low == high:
+        return f"{_short(low)} {unit}"
     if math.isinf(high):
         return f"from {_short(low)} {unit}"
     return f"to {_short(high)} {unit}" if math.isinf(low) else f"{_short(low)} to {_short(high)} {unit}"

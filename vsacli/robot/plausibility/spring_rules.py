@@ -90,14 +90,17 @@ def _springs(facts: Facts) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
     """The springs with their joints, as they are written."""
     for number, joint in enumerate(() if facts.placeholder else facts.joints):
         path = joint_path(number, joint, "actuator", "spring")
-        for at, law in written_once(path, getattr(joint.actuator, "spring", ())):
+        for at, law in written_once(path, getattr(joint.actuator, "spring", None) or ()):
             yield joint, at, law
 
 
-def _hardening(facts: Facts, share: float) -> Iterator[Measured]:
-    """Stiffness at a share of half a turn (of the reach), or where the law ends before, over that at rest."""
+def _hardening(facts: Facts, share: float, *, of_pairs: bool = False) -> Iterator[Measured]:
+    """Stiffness at a share of half a turn (of the reach), or where the law ends before, over that at rest.
+
+    If asked for, only that of pairs, whose stiffness is chosen by it.
+    """
     for joint, path, law in _springs(facts):
-        if not law.is_linear:
+        if not law.is_linear and ("stiffness" in joint.actuator.commanded or not of_pairs):
             unit, full = ("rad", HALF_TURN) if joint.is_revolute else ("m", facts.sizes.extent)
             deflection = min(law.domain[1], share * full)
             rest, there = law.stiffness(np.array([0.0, deflection])).tolist()
@@ -173,7 +176,7 @@ SPRING_RULES: tuple[Rule[Facts], ...] = (
     Rule(
         name="hardening of springs",
         fields="`spring`",
-        measure=lambda facts: _hardening(facts, 1.0),
+        measure=lambda facts: _hardening(facts, 1.0, of_pairs=True),
         size="stiffness at a deflection of half a turn (of the reach), over that at rest",
         low=1.5,
         finding="is at {deflection} but {size} times as stiff as at rest",

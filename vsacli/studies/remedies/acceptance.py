@@ -137,7 +137,8 @@ def _corridor_reason(joint: Joint, time: float, asked: float, low: float, high: 
     """A step whose stiffness is not between the smallest and the largest that would be accepted."""
     when = f"at t = {time:.3f} s"
     if math.isnan(low):
-        return f"the springs of {joint.name} cannot carry its elastic torque {when} at any stiffness"
+        whatever = "" if math.isnan(asked) else " at any stiffness"
+        return f"the springs of {joint.name} cannot carry its elastic torque {when}{whatever}"
     side, bound = ("at least", low) if asked < low else ("at most", high)
     return f"{joint.name} needs {side} {stiffness_text(joint, bound)} {when} and is asked for {asked:.6g}"
 
