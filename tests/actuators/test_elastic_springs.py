@@ -40,7 +40,7 @@ def drive_of(name: str) -> Drive:
 
 def asked(tau_e: list[float], **rates: float) -> Command:
     """A command of torques, (samples,), whose derivatives are the same at all; nothing else moves."""
-    arrays = {name: np.full(len(tau_e), rates.get(name, 0.0)) for name in Command.names()}
+    arrays = {name: np.full(len(tau_e), rates.get(name, 0.0)) for name in Command.names(())}
     return Command.of({**arrays, "tau_e": np.array(tau_e)})
 
 

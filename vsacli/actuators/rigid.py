@@ -56,7 +56,7 @@ class Rigid(Actuator):
             dphi=still,
             ddtheta=command.ddq,
             tau_spring=command.tau_e,
-            elastic_energy=still * command.tau_e,
+            elastic_energy=still * command.tau_e / 2,
             flags=np.zeros(still.shape, dtype=np.uint16),
         )
 

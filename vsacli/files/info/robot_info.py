@@ -97,7 +97,7 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
 
 def _held(actuator: Actuator, tau_e: FloatArray, q: float) -> Transmission:
     """What lies between joint and motors at rest, (samples,), of an actuator that takes no stiffness."""
-    rest = {name: np.zeros_like(tau_e) for name in Command.names()}
+    rest = {name: np.zeros_like(tau_e) for name in Command.names(())}
     command = Command.of({**rest, "tau_e": tau_e, "q": np.full_like(tau_e, q)})
     return actuator.transmit(command, NEAR_SINGULAR_MARGIN, None)
 
