@@ -13,6 +13,7 @@ import sympy
 from samples.full_model import Drive, Potential, springs_of
 from vsacli.actuators.mechanisms.awas import Awas
 from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.serial import Serial
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -64,6 +65,14 @@ def _awas(k: float, lead: float) -> Potential:
     return lambda q, theta_1, theta_2: k * (lead * theta_2) ** 2 * sympy.sin(theta_1 - q) ** 2
 
 
+def _maccepa(k: float, b: float, c: float, r: float) -> Potential:
+    def energy(q: Any, theta_1: Any, theta_2: Any) -> Any:
+        distance = sympy.sqrt(b**2 + c**2 - 2 * b * c * sympy.cos(theta_1 - q))
+        return k * (distance - abs(c - b) + r * theta_2) ** 2 / 2
+
+    return energy
+
+
 DEVICES = {
     "awas": Device(
         mechanism=Awas(k=50000, arm=(0.02, 0.12), lead=0.01),
@@ -78,6 +87,20 @@ DEVICES = {
         stiffness=(600, 200),
         deflections=(-0.78, 0.78),
         settings=(-7.5, -1.5),
+    ),
+    "maccepa": Device(
+        mechanism=Maccepa(k=150000, b=0.04, c=0.12, r=0.01, pretension=(0.005, 0.05)),
+        potential=_maccepa(150000, 0.04, 0.12, 0.01),
+        stiffness=(200, 350),
+        deflections=(-0.2, 0.2),
+        settings=(0.5, 5),
+    ),
+    "maccepa, long lever, drum against the motor": Device(
+        mechanism=Maccepa(k=100000, b=0.13, c=0.05, r=-0.02, pretension=(0, 0.05)),
+        potential=_maccepa(100000, 0.13, 0.05, -0.02),
+        stiffness=(300, 180),
+        deflections=(-0.2, 0.2),
+        settings=(-2.5, -0.5),
     ),
 }
 """By the name of the mechanism, and what is special about the device."""

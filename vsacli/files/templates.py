@@ -188,7 +188,7 @@ def _stiffnesses(joint: Joint, load: float, q: float) -> tuple[float, float]:
     lower, upper = ranges["loaded"] if ranges["loaded"][0] < ranges["loaded"][1] else ranges["unloaded"]
     lower, upper = max(lower, joint.limits.stiffness[0]), min(upper, joint.limits.stiffness[1])
     soft, stiff = START_TO_LOWEST * lower, END_TO_LOWEST * lower
-    if stiff > upper:
+    if not 0 < stiff <= upper:
         soft, stiff = lower + (upper - lower) / 3, lower + (upper - lower) * 2 / 3
     return soft, stiff
 

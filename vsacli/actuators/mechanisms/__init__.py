@@ -10,6 +10,7 @@ from vsacli.base.lazy import LazyRegistry
 MECHANISMS = LazyRegistry(
     {
         "awas": "vsacli.actuators.mechanisms.awas:Awas",
+        "maccepa": "vsacli.actuators.mechanisms.preloaded_cams.maccepa:Maccepa",
     }
 )
 """Mechanisms by the name they have in a robot file."""

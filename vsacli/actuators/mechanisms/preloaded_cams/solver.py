@@ -1,0 +1,200 @@
+"""A preloaded cam solved: the deflection at which a torque meets a stiffness, between the ends of the branch.
+
+Torque and stiffness without the compression of the spring leave g(phi) = sigma l' - k l'^3 - tau_e l'' = 0,
+which is l' (sigma - G). Unlike G it is regular at rest; its root is simple within the branch, double at
+a fold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.mechanisms.preloaded_cams.branch import DOMAIN, FOLD, PEAK, PRETENSION, Branch
+from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift, LinearInTorque
+from vsacli.actuators.pairs.bracketing import bracketed_root
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.control_flow import Values, repeat, where_needed
+
+MAX_GUESS_ERROR = 1e-3
+"""Largest relative correction of an end; next to where a curve turns around a step leads anywhere."""
+
+STEP_RTOL = 3e-6
+"""Relative size of a step that leaves rounding only: it leaves the third power."""
+
+MAX_STEPS = 12
+"""Steps of third order. Two or three do; by trial with draws on many cams, seven at most."""
+
+LEAST_CURVATURE_SHARE = 1e-3
+"""Share of the lift's curvature at rest below which it makes no first guess."""
+
+
+class End(NamedTuple):
+    """An end of the branch: deflection from rest, and joint stiffness; arrays (samples,)."""
+
+    phi: FloatArray
+    stiffness: FloatArray
+
+
+class Piece(NamedTuple):
+    """The branch at given torques.
+
+    Attributes:
+        outer: at the largest pretension; the stiffness is NaN where the torque cannot be carried.
+        inner: the other end, likewise.
+        at_fold: whether that is a fold.
+        sign: 1 where the stiffness falls from the outer to the inner end, else -1.
+        curvature: second derivative of the lift at the inner end.
+    """
+
+    outer: End
+    inner: End
+    at_fold: BoolArray
+    sign: FloatArray
+    curvature: FloatArray
+
+
+@dataclass(frozen=True)
+class CamSolver:
+    """What solves a cam.
+
+    Attributes:
+        lift: over deflections from rest.
+        k: stiffness of the spring, N/m.
+        pretension: smallest and largest, m.
+        branch: over the torque.
+    """
+
+    lift: Callable[[FloatArray], Lift]
+    k: float
+    pretension: tuple[float, float]
+    branch: Branch
+
+    @cached_property
+    def _least_curvature(self) -> float:
+        return LEAST_CURVATURE_SHARE * float(self.lift(np.zeros(1)).l2[0])
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+        """Deflections from rest (phi_1) and pretensions (phi_2); arrays (samples,)."""
+        with np.errstate(all="ignore"):  # beyond what can be carried, steps lead anywhere
+            piece = self._piece(tau_e)
+            lower = np.minimum(piece.inner.stiffness, piece.outer.stiffness)
+            upper = np.maximum(piece.inner.stiffness, piece.outer.stiffness)
+            demand = np.minimum(np.maximum(stiffness, lower), upper)
+            phi, lift = self._deflection(piece, tau_e, demand)
+            x = self._compression(lift, tau_e, demand)
+        least, most = self.pretension
+        return PairSolution(
+            lower=lower,
+            upper=upper,
+            lower_critical=piece.at_fold & (piece.sign > 0),
+            upper_critical=piece.at_fold & (piece.sign < 0),
+            slack_below=np.zeros_like(piece.at_fold),
+            phi_1=np.where(np.isnan(demand), np.nan, phi),
+            phi_2=np.minimum(np.maximum(x - lift.l, least), most),
+        )
+
+    def _piece(self, tau_e: FloatArray) -> Piece:
+        """The branch between its ends."""
+        k, (least, most) = self.k, self.pretension
+        guess = self.branch.ends(tau_e)
+        held, fold, peak = guess.end == PRETENSION, guess.end == FOLD, guess.end == PEAK
+
+        def of_inner(lift: Lift) -> LinearInTorque:
+            each = zip(lift.held(k, least), lift.turning(k), lift.rising(k), strict=True)
+            return LinearInTorque(*(np.where(held, a, np.where(fold, b, c)) for a, b, c in each))
+
+        step, outer = _corrected(self.lift(guess.outer), guess.outer, tau_e, lambda lift: lift.held(k, most))
+        inner_step, inner = _corrected(self.lift(guess.inner), guess.inner, tau_e, of_inner)
+        inner_step = np.where(guess.end == DOMAIN, 0.0, inner_step)
+        low, high = self.branch.torque_range
+        carried = (tau_e >= low) & (tau_e <= high)
+        at_inner = np.where(held, inner.spring(k, least).sigma, inner.stiffness(k, tau_e))
+        return Piece(
+            End(guess.outer + step, np.where(carried, outer.spring(k, most).sigma, np.nan)),
+            End(guess.inner + inner_step, np.where(carried, np.where(peak, 0.0, at_inner), np.nan)),
+            fold,
+            guess.sign,
+            inner.l2,
+        )
+
+    def _deflection(self, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> tuple[FloatArray, Lift]:
+        """Deflection from rest at which the torque meets a stiffness between the ends, and the lift there."""
+        low = np.minimum(piece.outer.phi, piece.inner.phi)
+        high = np.maximum(piece.outer.phi, piece.inner.phi)
+        start = np.minimum(np.maximum(self._first_guess(piece, tau_e, demand), low), high)
+        known = (tau_e, demand, piece.sign)
+        phi, _, _, error, *lift = repeat(
+            self._step, (start, low, high, *[np.zeros_like(start)] * 6), known, MAX_STEPS
+        )
+        phi, *lift = where_needed(
+            ~(error <= STEP_RTOL) & ~np.isnan(demand),
+            self._bracketed,
+            (tau_e, demand, low, high),
+            (phi, *lift),
+        )
+        return phi, Lift(*lift)
+
+    def _first_guess(self, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
+        """The root if the lift were a parabola, whose curvature is that at the inner end."""
+        curvature = np.maximum(piece.curvature, self._least_curvature)
+        scale = np.sqrt(demand / (3 * self.k))
+        load = 1.5 * tau_e * curvature / (demand * scale)
+        slope = 2 * scale * np.sin(np.arcsin(np.minimum(np.maximum(load, -1), 1)) / 3)
+        return np.where(demand > 0, slope / curvature, piece.inner.phi)
+
+    def _step(self, state: Values, constants: Values) -> tuple[Values, BoolArray]:
+        """A step to the root of the parabola that touches g, between the ends; else half way between them."""
+        (phi, low, high, *_), (tau_e, demand, sign) = state, constants
+        lift = self.lift(phi)
+        squared, growth = self.k * lift.l1 * lift.l1, self.k * lift.l1 * lift.l2
+        missing = demand - 3 * squared
+        g = lift.l1 * (demand - squared) - tau_e * lift.l2
+        slope = lift.l2 * missing - tau_e * lift.l3
+        curvature = lift.l3 * missing - 6 * growth * lift.l2 - tau_e * lift.l4
+        low, high = np.where(sign * g <= 0, phi, low), np.where(sign * g >= 0, phi, high)
+        slope_sum = slope + sign * np.sqrt(np.maximum(slope * slope - 2 * g * curvature, 0))
+        target = phi - np.where(g == 0, 0.0, 2 * g / slope_sum)
+        short = STEP_RTOL * np.abs(phi)
+        inside = (target >= low - short) & (target <= high + short)
+        target = np.where(inside, np.minimum(np.maximum(target, low), high), (low + high) / 2)
+        step = target - phi
+        error = np.where(step == 0, 0.0, np.abs(step / phi))
+        return (target, low, high, error, *lift.after(step)), ~(error > STEP_RTOL)
+
+    def _bracketed(self, tau_e: FloatArray, demand: FloatArray, low: FloatArray, high: FloatArray) -> Values:
+        """The deflection, and the lift there, by bracketing."""
+
+        def g(phi: FloatArray, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
+            lift = self.lift(phi)
+            return lift.l1 * (demand - self.k * lift.l1 * lift.l1) - tau_e * lift.l2
+
+        phi = bracketed_root(g, low, high, (tau_e, demand))
+        return phi, *self.lift(phi)
+
+    def _compression(self, lift: Lift, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
+        """Compression of the spring: near rest, where the torque says little, from the stiffness."""
+        squared = self.k * lift.l1 * lift.l1
+        near_rest = 2 * squared <= demand
+        divisor = np.where(near_rest, self.k * lift.l2, self.k * lift.l1)
+        return np.where(near_rest, demand - squared, tau_e) / np.where(divisor == 0, 1.0, divisor)
+
+
+def _corrected(
+    lift: Lift, phi: FloatArray, tau_e: FloatArray, function: Callable[[Lift], LinearInTorque]
+) -> tuple[FloatArray, Lift]:
+    """Two Newton steps to where a function is zero, in all, and the lift after them."""
+    step = _newton_step(function(lift), phi, tau_e)
+    step = step + _newton_step(function(lift.after(step)), phi, tau_e)
+    return step, lift.after(step)
+
+
+def _newton_step(here: LinearInTorque, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
+    slope, most = here.slope(tau_e), MAX_GUESS_ERROR * np.abs(phi)
+    step = np.where(slope == 0, 0.0, -here.at(tau_e) / slope)
+    return np.minimum(np.maximum(step, -most), most)
