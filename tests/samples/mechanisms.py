@@ -35,6 +35,11 @@ class Device:
         deflections: phi from which states are drawn, rad.
         settings: theta_2 from which they are drawn.
         on_branch: which of the states with positive stiffness lie on the mechanism's branch; all by default.
+        anchor: the end of the settings at which the branch begins, 0 the first or -1 the last.
+        scanned: phi at which each setting carries any torque of these states; None if torques have a maximum
+            within `deflections`, which the largest one exceeds.
+        symmetric: whether U(-phi) = U(phi).
+        rest: phi without load.
     """
 
     mechanism: Mechanism
@@ -43,6 +48,10 @@ class Device:
     deflections: tuple[float, float]
     settings: tuple[float, float]
     on_branch: OnBranch = lambda phi, _: np.ones_like(phi, dtype=bool)
+    anchor: int = -1
+    scanned: tuple[float, float] | None = None
+    symmetric: bool = True
+    rest: float = 0.0
 
     @property
     def actuator(self) -> Serial:
@@ -87,6 +96,7 @@ DEVICES = {
         stiffness=(600, 200),
         deflections=(-0.78, 0.78),
         settings=(-7.5, -1.5),
+        anchor=0,
     ),
     "maccepa": Device(
         mechanism=Maccepa(k=150000, b=0.04, c=0.12, r=0.01, pretension=(0.005, 0.05)),

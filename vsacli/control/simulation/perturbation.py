@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.motor import Motor
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.documents.fields import Kind, Number, OneOf, Pair, Record, declared
 from vsacli.robot.joint import Inertia, Joint, Link
 from vsacli.robot.model import Robot
@@ -18,9 +17,9 @@ from vsacli.robot.model import Robot
 def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
     """The robot with every dynamic parameter wrong by a random relative error; itself if that is zero.
 
-    Masses, centres of mass, inertia tensors, dampings, motor inertias and the constants of the springs are
-    each multiplied by 1 + relative u with u uniform in [-1, 1]; a tensor as a whole, so that it remains one
-    of a body. Geometry, gravity, limits and measured tables stay as they are.
+    Masses, centres of mass, inertia tensors, dampings, motor inertias and the constants of springs and
+    mechanisms are each multiplied by 1 + relative u with u uniform in [-1, 1]; a tensor as a whole, so that
+    it remains one of a body. Geometry, gravity, limits and measured tables stay as they are.
 
     Args:
         robot: the true one.
@@ -48,7 +47,11 @@ class _Wrong:
         self._random = random
 
     def joint(self, joint: Joint) -> Joint:
-        actuator = self._actuator(joint.actuator)
+        try:
+            actuator = self._record(joint.actuator)
+        except InvalidRecordError as error:
+            reason = f"an error of up to {self._relative:g} makes an actuator that cannot be"
+            raise InputError.one(f"joint {joint.name}: {reason}: {error}; choose a smaller one") from error
         return replace(
             joint, link=self._link(joint.link), damping=self._number(joint.damping), actuator=actuator
         )
@@ -64,13 +67,14 @@ class _Wrong:
         factor = self._number(1.0)
         return replace(inertia, **{name: factor * getattr(inertia, name) for name in declared(Inertia)})
 
-    def _actuator(self, actuator: Any) -> Any:
-        """Motors, springs and numbers, in the order in which they are declared."""
+    def _record(self, record: Any) -> Any:
+        """Motors, springs, mechanisms and numbers but for limits, in the order in which they are declared."""
         wrong = {
-            name: self._value(field.kind, getattr(actuator, name))
-            for name, (field, _) in declared(type(actuator)).items()
+            name: self._value(field.kind, getattr(record, name))
+            for name, (field, _) in declared(type(record)).items()
+            if name != "max_deflection"
         }
-        return replace(actuator, **wrong)
+        return replace(record, **wrong)
 
     def _value(self, kind: Kind, value: Any) -> Any:
         match kind:
@@ -78,19 +82,11 @@ class _Wrong:
                 return tuple(self._value(item, side) for side in value)
             case Record(cls) if cls is Motor:
                 return self._motor(value)
-            case OneOf(variants) if variants is LAWS:
-                return self._spring(value)
+            case OneOf():
+                return self._record(value)
             case Number():
                 return self._number(value)
         return value
 
     def _motor(self, motor: Motor) -> Motor:
         return replace(motor, inertia=self._number(motor.inertia), damping=self._number(motor.damping))
-
-    def _spring(self, spring: SpringLaw) -> SpringLaw:
-        constants = [
-            name
-            for name, (field, _) in declared(type(spring)).items()
-            if isinstance(field.kind, Number) and name != "max_deflection"
-        ]
-        return replace(spring, **{name: self._number(getattr(spring, name)) for name in constants})

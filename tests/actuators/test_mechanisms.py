@@ -1,0 +1,149 @@
+"""Mechanisms of serial actuators: state, solution and corridor of each against its potential alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracles.mechanism_scan import Level, along, scanned_corridor
+from samples.marks import slow_but
+from samples.mechanisms import DEVICES, Device
+
+from vsacli.actuators.mechanisms import MECHANISMS
+from vsacli.actuators.reach import reach
+from vsacli.base.arrays import FloatArray
+
+DRAWS = 10_000
+
+
+@pytest.fixture(params=slow_but(MECHANISMS, DEVICES))
+def device(request: pytest.FixtureRequest) -> Device:
+    return DEVICES[request.param]
+
+
+def test_every_mechanism_has_a_device() -> None:
+    assert {name: MECHANISMS.name_of(type(DEVICES[name].mechanism)) for name in MECHANISMS} == dict(
+        zip(MECHANISMS, MECHANISMS, strict=True)
+    )
+
+
+def states(device: Device, samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """phi, theta_2 and q of states on the branch with positive stiffness."""
+    rng = np.random.default_rng(7)
+    phi, s = (rng.uniform(*ends, samples) for ends in (device.deflections, device.settings))
+    q = rng.uniform(-2, 2, samples)
+    on_branch = device.on_branch(phi, s) & (device.springs(q, q + phi, s).stiffness > 0)
+    return phi[on_branch], s[on_branch], q[on_branch]
+
+
+def coordinates(phi: FloatArray, s: FloatArray, q: FloatArray) -> FloatArray:
+    return np.stack((phi, s, q), axis=-1)
+
+
+def peak(values: FloatArray) -> float:
+    return float(np.abs(values).max())
+
+
+def test_the_state_is_that_of_the_potential(device: Device) -> None:
+    """Torques, stiffness and their rates along any motion, and the motion back from them."""
+    phi, s, q = states(device, 1000)
+    rng = np.random.default_rng(8)
+    motion = np.stack([(at, *rng.uniform(-5, 5, (2, len(at)))) for at in (q, q + phi, s)])
+    (tau_e, dtau_e, ddtau_e), (sigma, dsigma, ddsigma), *motors = along(device.potential, motion)
+    (_, dq, ddq), (_, dtheta_1, ddtheta_1), (_, ds, dds) = motion
+    state = device.mechanism.state(coordinates(phi, s, q))
+    rates = coordinates(dtheta_1 - dq, ds, dq)
+    found = {
+        "tau_e": (state.tau_e, tau_e),
+        "stiffness": (state.stiffness, sigma),
+        "tau_spring": (state.tau_spring.T, np.array([motor[0] for motor in motors])),
+        "torque_rate": (state.torque_rate(rates), dtau_e),
+        "stiffness_rate": (state.stiffness_rate(rates), dsigma),
+        "spring_rates": (state.spring_rates(rates).T, np.array([motor[1] for motor in motors])),
+    }
+    for name, (ours, theirs) in found.items():
+        # theta_1 - q rounds to 1e-16 of q, and both texts to a few more
+        np.testing.assert_allclose(ours, theirs, rtol=1e-11, atol=1e-12 * peak(theirs), err_msg=name)
+    determinant = state.determinant()
+    regular = np.abs(determinant) > 1e-3 * peak(determinant)
+    back = state.rates(dtau_e, dsigma, dq)
+    accelerations = state.motor_accelerations(rates, ddq, ddtau_e, ddsigma)
+    for ours, theirs in (
+        (back[..., 0], dtheta_1 - dq),
+        (back[..., 1], ds),
+        (accelerations[..., 0], ddtheta_1),
+        (accelerations[..., 1], dds),
+    ):
+        # where det A is a thousandth of its peak, rounding is a thousand times as large
+        np.testing.assert_allclose(ours[regular], theirs[regular], rtol=0, atol=1e-8 * peak(theirs))
+
+
+def test_the_energy_is_the_potential(device: Device) -> None:
+    phi, s, q = states(device, 50)
+    energy = [float(device.potential(*at)) for at in zip(q, q + phi, s, strict=True)]
+    np.testing.assert_allclose(device.mechanism.state(coordinates(phi, s, q)).energy, energy, rtol=1e-11)
+
+
+def test_there_and_back(device: Device) -> None:
+    phi, s, q = states(device, DRAWS)
+    springs = device.springs(q, q + phi, s)
+    tau_e, sigma = -springs.link, springs.stiffness
+    found = device.mechanism.solve(tau_e, sigma, q)
+    assert not reach(sigma, found).infeasible.any()
+    again = device.springs(q, q + found.phi_1, found.phi_2)
+    np.testing.assert_allclose(-again.link, tau_e, rtol=1e-11, atol=1e-12 * peak(tau_e))
+    np.testing.assert_allclose(again.stiffness, sigma, rtol=1e-11)
+    # next to a turning point of the stiffness the states differ by the root of rounding
+    determinant = device.mechanism.state(coordinates(phi, s, q)).determinant()
+    clear = np.abs(determinant) > 1e-2 * peak(determinant)
+    np.testing.assert_allclose(found.phi_1[clear], phi[clear], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(found.phi_2[clear], s[clear], rtol=1e-9)
+
+
+def test_the_corridor_is_that_of_a_scan_and_what_lies_outside_is_flagged(device: Device) -> None:
+    phi, s, q = states(device, 40)
+    largest, scanned = peak(device.springs(q, q + phi, s).link), device.scanned or device.deflections
+    rng = np.random.default_rng(9)
+    seen = set()
+    for share, at in zip((0, 1e-9, 0.03, -0.2, 0.4, -0.7, 0.9, -1.3), q, strict=False):
+        tau_e = share * largest
+        level = Level(device.springs, tau_e, scanned, device.mechanism.setting_range, at)
+        expected = scanned_corridor(level, device.anchor)
+        top = 2 * np.nan_to_num(expected.upper, nan=1000.0)
+        stiffness = rng.uniform(-0.1 * top, top, DRAWS // 10)
+        found = device.mechanism.solve(np.full_like(stiffness, tau_e), stiffness, np.full_like(stiffness, at))
+        # both solve for the ends to rounding; where the torque has its maximum the stiffness is its root
+        np.testing.assert_allclose(found.lower, expected.lower, rtol=1e-9, atol=1e-9 * top)
+        np.testing.assert_allclose(found.upper, expected.upper, rtol=1e-9)
+        critical = bool(found.lower_critical[0]), bool(found.upper_critical[0])
+        assert critical == (expected.lower_turns, expected.upper_turns)
+        inside = (stiffness > 0) & (stiffness >= expected.lower) & (stiffness <= expected.upper)
+        np.testing.assert_array_equal(reach(stiffness, found).infeasible, ~inside)
+        seen.add(np.isfinite(expected.lower))
+    assert seen == {True} | ({False} if device.scanned is None else set())
+
+
+def test_it_rests_without_load(device: Device) -> None:
+    unloaded = device.mechanism.solve(np.zeros(1), np.ones(1), np.zeros(1))
+    stiffness = np.linspace(1.001 * unloaded.lower[0], 0.999 * min(unloaded.upper[0], 1e6), 50)
+    for tau_e in (0.0, -0.0, 1e-300, -1e-300):
+        found = device.mechanism.solve(np.full(50, tau_e), stiffness, np.zeros(50))
+        np.testing.assert_allclose(found.phi_1, device.rest, rtol=0, atol=1e-15)
+        again = device.springs(np.zeros(50), found.phi_1, found.phi_2)
+        np.testing.assert_allclose(again.stiffness, stiffness, rtol=1e-11)
+
+
+def test_what_no_setting_carries_is_infeasible(device: Device) -> None:
+    phi, s, q = states(device, 200)
+    beyond = 1e3 * peak(device.springs(q, q + phi, s).link)
+    tau_e, stiffness = np.array([beyond, -beyond, np.nan, np.inf, 0.0]), np.full(5, 500.0)
+    stiffness[-1] = np.nan
+    assert reach(stiffness, device.mechanism.solve(tau_e, stiffness, np.zeros(5))).infeasible.all()
+
+
+def test_the_sides_of_symmetric_springs_change_with_the_sign_of_the_torque(device: Device) -> None:
+    phi, s, q = states(device, 500)
+    springs = device.springs(q, q + phi, s)
+    found, turned = (device.mechanism.solve(sign * -springs.link, springs.stiffness, q) for sign in (1, -1))
+    if device.symmetric:
+        np.testing.assert_array_equal(found.phi_1, -turned.phi_1)
+        np.testing.assert_array_equal(found.phi_2, turned.phi_2)
