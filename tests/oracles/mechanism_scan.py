@@ -23,6 +23,13 @@ NEWTON_STEPS = 8
 """From a cell of the scan four are enough."""
 
 
+RESOLUTION = 1e-9
+"""Relative difference of stiffness that a minimum found between the last two settings cannot be rounding."""
+
+NO_STIFFNESS = 1e-7
+"""Share of the other end below which a stiffness is the root of rounding, where no pretension is left."""
+
+
 class Corridor(NamedTuple):
     """Reachable stiffness, NaN if the torque cannot be carried, and which ends are turning points."""
 
@@ -84,9 +91,14 @@ def scanned_corridor(level: Level, anchor: int) -> Corridor:
     last = first + int(broken[0]) if broken.size else SETTINGS - 1
     # elsewhere than at an end of the settings the torque has its maximum, and there is no stiffness
     near, far = stiffness[first] * (first == 0), stiffness[last] * (last == SETTINGS - 1)
-    turns = last < SETTINGS - 1 and stiffness[last + 1] > 0
-    if turns:
-        far = _turning_point(level, *sorted((settings[last - 1], settings[last + 1])), slopes[0])
+    turns = False
+    if last == SETTINGS - 1 or stiffness[last + 1] > 0:
+        around = settings[last - 1], settings[min(last + 1, SETTINGS - 1)]
+        turning_point = _turning_point(level, *sorted(around), slopes[0])
+        turns = last < SETTINGS - 1 or bool(slopes[0] * (turning_point - far) > RESOLUTION * abs(far))
+        far = turning_point if turns else far
+    if far < NO_STIFFNESS * near:
+        far, turns = 0.0, False
     lower, upper = sorted((near, far))
     return Corridor(lower, upper, lower_turns=turns and far == lower, upper_turns=turns and far == upper)
 

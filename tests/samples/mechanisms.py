@@ -36,8 +36,7 @@ class Device:
         settings: theta_2 from which they are drawn.
         on_branch: which of the states with positive stiffness lie on the mechanism's branch; all by default.
         anchor: the end of the settings at which the branch begins, 0 the first or -1 the last.
-        scanned: phi at which each setting carries any torque of these states; None if torques have a maximum
-            within `deflections`, which the largest one exceeds.
+        scanned: phi within which each setting carries a torque or has its largest; `deflections` if None.
         symmetric: whether U(-phi) = U(phi).
         rest: phi without load.
     """
@@ -104,6 +103,7 @@ DEVICES = {
         stiffness=(200, 350),
         deflections=(-0.2, 0.2),
         settings=(0.5, 5),
+        scanned=(-1.6, 1.6),
     ),
     "maccepa, long lever, drum against the motor": Device(
         mechanism=Maccepa(k=100000, b=0.13, c=0.05, r=-0.02, pretension=(0, 0.05)),
@@ -111,6 +111,8 @@ DEVICES = {
         stiffness=(300, 180),
         deflections=(-0.2, 0.2),
         settings=(-2.5, -0.5),
+        anchor=0,
+        scanned=(-1.6, 1.6),
     ),
 }
 """By the name of the mechanism, and what is special about the device."""
