@@ -78,6 +78,8 @@ class _Wrong:
 
     def _value(self, kind: Kind, value: Any) -> Any:
         match kind:
+            case _ if value is None:
+                return None
             case Pair(item):
                 return tuple(self._value(item, side) for side in value)
             case Record(cls) if cls is Motor:
