@@ -57,6 +57,10 @@ class AdjustableArm(Actuator):
     def motors(self) -> tuple[JointMotor, ...]:
         return tuple(motor.at_joint for motor in self.motor)
 
+    @property
+    def phi_ranges(self) -> tuple[tuple[float, float], ...]:
+        return (-np.inf, np.inf), self.range
+
     def motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
         return np.stack((phi[0] + q, phi[1]))
 
@@ -104,17 +108,14 @@ class AdjustableArm(Actuator):
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        return ArmSprings(np.array([each.k for each in actuators]), [each.range for each in actuators])
+        return ArmSprings(np.array([each.k for each in actuators]))
 
 
 class ArmSprings(Elasticity):
     """phi is the deflection of the arm, and theta_2."""
 
-    def __init__(self, k: FloatArray, ranges: list[tuple[float, float]]) -> None:
+    def __init__(self, k: FloatArray) -> None:
         self._k = k
-        self.domain = np.array(
-            [[(-np.inf, low) for low, _ in ranges], [(np.inf, high) for _, high in ranges]]
-        )
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         return np.stack((theta[..., 0] - q, theta[..., 1]), axis=-1)

@@ -122,6 +122,11 @@ class Actuator(ABC):
         return (math.inf,) * self.motor_count
 
     @property
+    def phi_ranges(self) -> tuple[tuple[float, float], ...]:
+        """Lowest and highest phi for which the springs' laws hold, for each motor."""
+        return ((-math.inf, math.inf),) * self.motor_count
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What the user should know about its springs."""
         return ()

@@ -92,6 +92,11 @@ class Antagonistic(Actuator):
         return tuple(spring.max_deflection for spring in self.spring)
 
     @property
+    def phi_ranges(self) -> tuple[tuple[float, float], ...]:
+        """Those of the springs."""
+        return tuple(law.domain for law in self.laws)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Those of the springs, once if both are one."""
         return tuple(warning for law in self._distinct_springs for warning in law.warnings)

@@ -64,10 +64,8 @@ class Drivetrain:
         groups = dict.fromkeys(actuator.spring_group for actuator in actuators if actuator.sprung)
         self._groups = [self._group(group, actuators) for group in groups]
         self._alone = len(self._groups) == 1 and not self.rigid.any()
-        domains = [
-            np.broadcast_to(group.elasticity.domain, (2, *group.springs.shape)) for group in self._groups
-        ]
-        self.domain = self.of_springs(domains, np.empty((2, len(self.spring_joint))))
+        ranges = [each for actuator in actuators if actuator.sprung for each in actuator.phi_ranges]
+        self.domain = np.array(ranges).reshape(-1, 2).T
 
     def _group(self, group: Hashable, actuators: Sequence[Actuator]) -> _Group:
         indices = [

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
-from vsacli.actuators.elasticity import UNBOUNDED, Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.rows import SpringRows
 from vsacli.actuators.laws.state import SpringState
@@ -82,6 +82,11 @@ class Elastic(Actuator):
     def max_deflections(self) -> tuple[float, ...]:
         """That of the spring."""
         return (self.law.max_deflection,)
+
+    @property
+    def phi_ranges(self) -> tuple[tuple[float, float], ...]:
+        """That of the spring."""
+        return (self.law.domain,)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -176,8 +181,6 @@ class Elastic(Actuator):
 class _LinearRows:
     """Linear springs, one at each joint, all evaluated at a time; else as `SpringRows`."""
 
-    domain = UNBOUNDED
-
     def __init__(self, stiffness: Sequence[float]) -> None:
         self._stiffness = np.array(stiffness)[:, None]
 
@@ -201,7 +204,7 @@ class _Springs(Elasticity):
     """One spring at each joint."""
 
     def __init__(self, rows: SpringRows | _LinearRows) -> None:
-        self._rows, self.domain = rows, rows.domain
+        self._rows = rows
 
     def torques(self, phi: FloatArray) -> Torques:
         """The spring pulls link and motor alike."""

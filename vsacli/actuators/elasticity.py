@@ -13,8 +13,6 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 
-UNBOUNDED = np.array([-np.inf, np.inf]).reshape(2, 1, 1)
-
 
 class Torques(NamedTuple):
     """What springs exert: on the link of each joint (6), and against each motor (62)."""
@@ -28,12 +26,7 @@ class Elasticity(ABC):
 
     Springs are described by phi, one number for each motor, which depends linearly on q and theta. What else
     they depend on belongs to the coordinates that the methods below take.
-
-    Attributes:
-        domain: lowest and highest phi for which the laws hold, (2, joints, motors) or to be spread so.
     """
-
-    domain: FloatArray = UNBOUNDED
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Phi from positions, or its rates from velocities: theta - q unless the kind says otherwise."""

@@ -99,6 +99,11 @@ class Serial(Actuator):
         return self.coupled_inertia * first * second
 
     @property
+    def phi_ranges(self) -> tuple[tuple[float, float], ...]:
+        """Deflections and settings for which the mechanism works."""
+        return self.mechanism.deflection_range, self.mechanism.setting_range
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Those of the mechanism."""
         return self.mechanism.warnings
@@ -197,7 +202,6 @@ class _Springs(Elasticity):
 
     def __init__(self, mechanism: Mechanism) -> None:
         self._mechanism = mechanism
-        self.domain = np.array((mechanism.deflection_range, mechanism.setting_range)).T[:, None]
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Phi and theta_2."""

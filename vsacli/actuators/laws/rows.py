@@ -12,16 +12,10 @@ from vsacli.base.arrays import FloatArray
 
 
 class SpringRows:
-    """Equally many springs at each joint; deflections and what follows from them are (..., joints, springs).
-
-    Attributes:
-        domain: lowest and highest deflection for which the laws hold, (2, joints, springs).
-    """
+    """Equally many springs at each joint; deflections and their functions are (..., joints, springs)."""
 
     def __init__(self, laws: Sequence[Sequence[SpringLaw]]) -> None:
-        row = [law for of_joint in laws for law in of_joint]
-        self.domain = np.array([law.domain for law in row]).T.reshape(2, len(laws), -1)
-        self._alike = list(_alike(row))
+        self._alike = list(_alike([law for of_joint in laws for law in of_joint]))
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque of each spring."""

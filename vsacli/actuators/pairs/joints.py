@@ -19,7 +19,6 @@ class PairElasticity(Elasticity):
 
     def __init__(self, pairs: Sequence[tuple[SpringLaw, SpringLaw]]) -> None:
         self._springs = SpringRows(pairs)
-        self.domain = self._springs.domain
 
     def torques(self, phi: FloatArray) -> Torques:
         """Each spring pulls the link and its motor alike."""

@@ -77,6 +77,8 @@ class _Wrong:
         return replace(record, **wrong)
 
     def _value(self, kind: Kind, value: Any) -> Any:
+        if value is None:
+            return None
         match kind:
             case _ if value is None:
                 return None
