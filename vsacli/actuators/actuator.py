@@ -74,14 +74,12 @@ class Actuator(ABC):
         commanded: keys of the signals that a trajectory commands besides the motion of the joint.
         uncommanded: why a trajectory does not command others, by key of the signal, clauses.
         sprung: whether springs lie between its motors and the link; else its motor moves with the joint.
-        co_contracts: whether both motors carry the load, and so can work against each other.
     """
 
     motor_count: ClassVar[int] = 1
     commanded: ClassVar[tuple[str, ...]] = ()
     uncommanded: ClassVar[Mapping[str, str]] = {}
     sprung: ClassVar[bool] = True
-    co_contracts: ClassVar[bool] = False
 
     @classmethod
     def has(cls, variable: Variable) -> list[bool]:
@@ -115,6 +113,11 @@ class Actuator(ABC):
     def coupled_rotors(self) -> float:
         """B_12, by which either motor feels the acceleration of the other, joint side of the gears."""
         return 0.0
+
+    @property
+    def co_contracts(self) -> bool:
+        """Whether both motors exert nothing but shares of the load, and so can work against each other."""
+        return False
 
     @property
     def max_deflections(self) -> tuple[float, ...]:

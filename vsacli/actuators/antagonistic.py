@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -37,6 +38,11 @@ class Antagonistic(Actuator):
 
     motor: tuple[Motor, Motor] = value(Pair(Record(Motor)), "motors 1 and 2; one mapping serves both")
     spring: tuple[SpringLaw, SpringLaw] = value(Pair(OneOf(LAWS)), "springs 1 and 2; one mapping serves both")
+    coupling: SpringLaw | None = value(
+        OneOf(LAWS),
+        "spring between the motors, over theta_1 - theta_2; the link does not feel it",
+        default=None,
+    )
     preload: str = choice(
         ("positive", "negative"),
         "branch of the deflections: positive has phi_1 up and phi_2 down",
@@ -45,7 +51,6 @@ class Antagonistic(Actuator):
 
     motor_count = 2
     commanded = ("stiffness",)
-    co_contracts = True
     integrable = True
 
     def __post_init__(self) -> None:
@@ -59,7 +64,19 @@ class Antagonistic(Actuator):
             problems.append(
                 FieldProblem(("preload",), "must be positive: a spring that only pulls cannot push")
             )
-        check_fields(self, *problems)
+        check_fields(self, *problems, *self._coupling_problems())
+
+    def _coupling_problems(self) -> Iterator[FieldProblem]:
+        """How far the motors are apart is no variable of its own, so that a coupling must have no end."""
+        if self.coupling is None:
+            return
+        if self.coupling.domain != (-math.inf, math.inf):
+            low, high = self.coupling.domain
+            ends = f"holds from {low:.4g} to {high:.4g} only, but the motors may be any distance apart"
+            yield FieldProblem(("coupling",), f"{ends}; take a law without an end, as polynomial or sinh")
+        elif math.isfinite(self.coupling.max_deflection):
+            reason = "is not known of a spring between motors; bound the springs of both sides"
+            yield FieldProblem(("coupling", "max_deflection"), reason)
 
     @cached_property
     def laws(self) -> tuple[SpringLaw, SpringLaw]:
@@ -97,6 +114,11 @@ class Antagonistic(Actuator):
         return tuple(law.domain for law in self.laws)
 
     @property
+    def co_contracts(self) -> bool:
+        """Unless a spring between the motors takes a part of what they exert."""
+        return self.coupling is None
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Those of the springs, once if both are one."""
         return tuple(warning for law in self._distinct_springs for warning in law.warnings)
@@ -108,7 +130,8 @@ class Antagonistic(Actuator):
 
     @property
     def _distinct_springs(self) -> tuple[SpringLaw, ...]:
-        return tuple({id(law): law for law in self.spring}.values())
+        further = () if self.coupling is None else (self.coupling,)
+        return tuple({id(law): law for law in (*self.spring, *further)}.values())
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
         """Deflections on the actuator's branch, their rates, and motor accelerations."""
@@ -118,7 +141,8 @@ class Antagonistic(Actuator):
         if integrated is not None:
             phi = (integrated[0], integrated[1])
             reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
-        return self._moved(command, solution, reached, phi)
+        moved = self._moved(command, solution, reached, phi)
+        return moved if self.coupling is None else _coupled(moved, self.coupling)
 
     def _moved(
         self, command: Command, solution: PairSolution, reached: Reach, deflections: Sides
@@ -151,9 +175,14 @@ class Antagonistic(Actuator):
         )
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
-        """sigma_k phi_k'."""
+        """sigma_k phi_k', and of a coupling U_3'' (phi_1' - phi_2')."""
         sides = zip(self.laws, of_joint["phi"], of_joint["dphi"], strict=True)
-        return np.stack([law.stiffness(phi) * dphi for law, phi, dphi in sides])
+        rates = np.stack([law.stiffness(phi) * dphi for law, phi, dphi in sides])
+        if self.coupling is None:
+            return rates
+        apart, drifting = (of_joint[name][0] - of_joint[name][1] for name in ("phi", "dphi"))
+        rate: FloatArray = self.coupling.stiffness(apart) * drifting
+        return rates + np.stack((rate, -rate))
 
     def carried(self, of_joint: OfJoint) -> Carried:
         """Sums over both springs, (14)."""
@@ -162,12 +191,18 @@ class Antagonistic(Actuator):
         sigma = np.stack([law.stiffness(deflection) for law, deflection in sides])
         return Carried(tau.sum(axis=0), np.abs(tau).sum(axis=0), sigma.sum(axis=0))
 
+    @property
+    def spring_group(self) -> Hashable:
+        """Pairs with equal couplings are computed together."""
+        return type(self), self.coupling
+
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
-        """The springs of several joints."""
-        from vsacli.actuators.pairs.joints import PairElasticity
+        """The springs of joints whose couplings are equal."""
+        from vsacli.actuators.pairs.joints import CoupledPairs, PairElasticity
 
-        return PairElasticity([actuator.laws for actuator in actuators])
+        pairs, coupling = [actuator.laws for actuator in actuators], actuators[0].coupling
+        return PairElasticity(pairs) if coupling is None else CoupledPairs(pairs, coupling)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
         """Solve (14) on the branch that the actuator's preload names."""
@@ -203,3 +238,13 @@ class Antagonistic(Actuator):
     def _states(self, phi: FloatArray) -> tuple[SpringState, SpringState]:
         (first, second), (phi_1, phi_2) = self.laws, phi
         return first.state(phi_1), second.state(phi_2)
+
+
+def _coupled(moved: Transmission, coupling: SpringLaw) -> Transmission:
+    """The same with a spring between the motors, which changes what they feel, and stores energy."""
+    apart = moved.phi[0] - moved.phi[1]
+    torque = coupling.torque(apart)
+    return moved._replace(
+        tau_spring=moved.tau_spring + np.stack((torque, -torque)),
+        elastic_energy=moved.elastic_energy + coupling.energy(apart),
+    )

@@ -23,11 +23,14 @@ class JointEnergy(Stored):
     is the least with which two motors carry the load, half of it each. The second, co-contraction, moves
     nothing: it is what the stiffness takes.
 
+    With other springs between the motors and the link, or between the motors, they do not split like this.
+
     Attributes:
         elastic_peak: largest energy in the springs, J, over the steps where it exists.
         spent: integral of the positive part of each motor's power, summed over the motors, J.
         recovered: that of the negative part, J; spent - recovered is the work of the motors.
-        co_contraction: root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN with a single motor.
+        co_contraction: root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN where
+            torques do not split.
         load: that of tau_e/2, likewise.
     """
 

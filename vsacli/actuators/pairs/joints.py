@@ -35,11 +35,37 @@ class PairElasticity(Elasticity):
         return _PairStates(self._springs.state(phi))
 
 
-class _PairStates(ElasticState):
-    """Both springs of each joint, arrays (..., joints, 2)."""
+class CoupledPairs(PairElasticity):
+    """The same with a spring between the motors of each joint, whose deflection is theta_1 - theta_2."""
 
-    def __init__(self, springs: SpringState) -> None:
-        self._springs = springs
+    def __init__(self, pairs: Sequence[tuple[SpringLaw, SpringLaw]], coupling: SpringLaw) -> None:
+        super().__init__(pairs)
+        self._coupling = coupling
+
+    def torques(self, phi: FloatArray) -> Torques:
+        """The link does not feel the coupling, the motors feel it in opposite directions."""
+        tau_e, tau_spring = super().torques(phi)
+        return Torques(tau_e, tau_spring + self._between(phi))
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """The sum over all three springs."""
+        return super().energy(phi) + self._coupling.energy(phi[..., 0] - phi[..., 1])
+
+    def state(self, phi: FloatArray) -> ElasticState:
+        """Both springs with their derivatives, and what the coupling adds."""
+        return _PairStates(self._springs.state(phi), self._between(phi))
+
+    def _between(self, phi: FloatArray) -> FloatArray:
+        """Torque of the coupling against each motor."""
+        torque = self._coupling.torque(phi[..., 0] - phi[..., 1])
+        return np.stack((torque, -torque), axis=-1)
+
+
+class _PairStates(ElasticState):
+    """Both springs of each joint, arrays (..., joints, 2), and what a coupling exerts against the motors."""
+
+    def __init__(self, springs: SpringState, coupling: FloatArray | None = None) -> None:
+        self._springs, self._coupling = springs, coupling
         self._one, self._two = (SpringState(*(each[..., side] for each in springs)) for side in range(2))
 
     @property
@@ -54,8 +80,8 @@ class _PairStates(ElasticState):
 
     @property
     def tau_spring(self) -> FloatArray:
-        """Torque of each spring."""
-        return self._springs.tau
+        """Torque of each spring, and of the coupling."""
+        return self._springs.tau if self._coupling is None else self._springs.tau + self._coupling
 
     def torque_rate(self, dphi: FloatArray) -> FloatArray:
         """Sum of sigma_k phi_k'."""

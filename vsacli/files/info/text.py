@@ -66,6 +66,8 @@ def _drives(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
         kind, actuator, ranges = joint["type"], joint["actuator"], joint["stiffness_range"]
         unit = STIFFNESS.unit(kind)
         springs = " ".join(dict.fromkeys(spring["type"] for spring in _springs(actuator.get("spring"))))
+        if actuator.get("coupling"):
+            springs += f", coupling {actuator['coupling']['type']}"
         reachable = (_span(ranges[name], unit) if ranges else "-" for name in ("unloaded", "loaded"))
         load = f"{_short(joint['static_load']['torque'])} {TORQUE.unit(kind)}"
         yield joint["name"], actuator["type"], springs or "-", load, *reachable
