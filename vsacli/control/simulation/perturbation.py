@@ -80,8 +80,6 @@ class _Wrong:
         if value is None:
             return None
         match kind:
-            case _ if value is None:
-                return None
             case Pair(item):
                 return tuple(self._value(item, side) for side in value)
             case Record(cls) if cls is Motor:

@@ -86,8 +86,11 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
     tau_e = np.array([0.0, load, -load])
     with np.errstate(all="ignore"):  # a load may be beyond all numbers
         if "stiffness" not in joint.actuator.commanded:
-            unloaded, *loaded = _held(joint.actuator, tau_e, q).stiffness.tolist()
-            return {"unloaded": [unloaded, unloaded], "loaded": [min(loaded), max(loaded)]}
+            held = _held(joint.actuator, tau_e, q).stiffness
+            return {
+                "unloaded": [float(held[0])] * 2,
+                "loaded": [float(held[1:].min()), float(held[1:].max())],
+            }
         solution = joint.actuator.solve(tau_e, np.ones(3), np.full(3, q))
     return {
         "unloaded": [float(solution.lower[0]), float(solution.upper[0])],
