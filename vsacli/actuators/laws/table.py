@@ -10,8 +10,9 @@ import numpy as np
 
 from vsacli.actuators.laws.inversion import FirstGuess, inverse
 from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.spline_curve import SplineCurve
 from vsacli.actuators.laws.state import SpringState
-from vsacli.actuators.laws.table_curve import MeasuredCurve, fit_curve
+from vsacli.actuators.laws.table_curve import fit_curve
 from vsacli.actuators.laws.tendon import Mirrored
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
@@ -46,15 +47,13 @@ class MeasuredSpring(SpringLaw):
             raise InputError(problems)
 
     @cached_property
-    def _curve(self) -> MeasuredCurve:
+    def _curve(self) -> SplineCurve:
         return fit_curve(*self.file.values.T)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """How well the curve fits."""
-        share = 100 * self._curve.residual / np.ptp(self.file.values[:, 1])
-        misfit = f"{self._curve.residual:.2g} ({share:.2g} % of its range)"
-        return (f"the curve through {self.file.source.path} misses a measured torque by up to {misfit}",)
+        return (misfit_text(self.file, self._curve.residual),)
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -135,6 +134,25 @@ class MeasuredSpring(SpringLaw):
         return FirstGuess(self, np.unique(np.concatenate((low * shares, high * shares))))
 
 
+def misfit_text(table: Table, residual: float) -> str:
+    """How far a curve is from the points of a table: a warning."""
+    share = 100 * residual / np.ptp(table.values[:, 1])
+    misfit = f"{residual:.2g} ({share:.2g} % of its range)"
+    return f"the curve through {table.source.path} misses a measured {table.columns[1]} by up to {misfit}"
+
+
+def wrong_rows(table: Table) -> Iterator[Problem]:
+    """Why the rows are none of a curve over the deflection: too few, out of bounds or out of order."""
+    deflection, path = table.values[:, 0], table.source.path
+    if len(deflection) < MIN_ROWS:
+        yield Problem(path, 0, f"expected at least {MIN_ROWS} rows, found {len(deflection)}")
+    elif sizes := list(_wrong_sizes(table)):
+        yield from sizes
+    elif (steps := np.flatnonzero(np.diff(deflection) <= 0)).size:
+        message = "the deflection does not increase from the row before"
+        yield Problem(path, table.line_of(steps[0] + 1), message)
+
+
 def _problems(table: Table) -> Iterator[Problem]:
     """Why the rows are no hardening spring, with the lines."""
     deflection, torque = table.values.T
@@ -143,14 +161,10 @@ def _problems(table: Table) -> Iterator[Problem]:
     def at(row: int, message: str) -> Problem:
         return Problem(path, table.line_of(row), message)
 
-    if len(deflection) < MIN_ROWS:
-        yield Problem(path, 0, f"expected at least {MIN_ROWS} rows, found {len(deflection)}")
-    elif sizes := list(_wrong_sizes(deflection, torque)):
-        yield from (at(row, message) for row, message in sizes)
+    if rows := list(wrong_rows(table)):
+        yield from rows
     elif not deflection[0] <= 0 < deflection[-1]:
         yield at(0, "the deflections must go from zero (a spring that only pulls) or below to above zero")
-    elif (steps := np.flatnonzero(np.diff(deflection) <= 0)).size:
-        yield at(steps[0] + 1, "the deflection does not increase from the row before")
     elif (steps := np.flatnonzero(np.diff(torque) <= 0)).size:
         yield at(steps[0] + 1, "the torque does not increase from the row before, as a spring's does")
     elif (offset := abs(np.interp(0, deflection, torque))) > 10 * SHAPE_TOLERANCE * np.ptp(torque):
@@ -161,14 +175,17 @@ def _problems(table: Table) -> Iterator[Problem]:
         yield from (at(row, message) for row, message in _wrong_bends(deflection, torque))
 
 
-def _wrong_sizes(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
+def _wrong_sizes(table: Table) -> Iterator[Problem]:
     """Rows with numbers too large, or with an end of the curve too near to zero, as in declared fields."""
-    for name, column in (("deflection", deflection), ("torque", torque)):
+    for name, column in zip(table.columns, table.values.T, strict=True):
         for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:
-            yield int(row), f"the {name} {FINITE.problem(column[row])}"
+            yield Problem(
+                table.source.path, table.line_of(int(row)), f"the {name} {FINITE.problem(column[row])}"
+            )
         for row in (0, len(column) - 1):
             if 0 < abs(column[row]) < SMALLEST:
-                yield row, f"the {name} {NON_ZERO.problem(column[row])}"
+                message = f"the {name} {NON_ZERO.problem(column[row])}"
+                yield Problem(table.source.path, table.line_of(row), message)
 
 
 def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:

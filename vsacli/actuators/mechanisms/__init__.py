@@ -10,6 +10,7 @@ from vsacli.base.lazy import LazyRegistry
 MECHANISMS = LazyRegistry(
     {
         "awas": "vsacli.actuators.mechanisms.awas:Awas",
+        "cam": "vsacli.actuators.mechanisms.preloaded_cams.cam:Cam",
         "maccepa": "vsacli.actuators.mechanisms.preloaded_cams.maccepa:Maccepa",
     }
 )

@@ -94,5 +94,6 @@ class PreloadedCam(Mechanism):
 def _solver(cam: PreloadedCam) -> CamSolver:
     """What solves a cam; equal ones have the same, with the map of the branch that is made once."""
     low, high = cam.deflection_range
-    branch = map_branch(cam.lift, (low - cam.rest, high - cam.rest), cam.k, cam.pretension)
-    return CamSolver(cam.lift, cam.k, cam.pretension, branch)
+    domain = low - cam.rest, high - cam.rest
+    branch = map_branch(cam.lift, domain, cam.k, cam.pretension)
+    return CamSolver(cam.lift, domain, cam.k, cam.pretension, branch)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.mechanisms.preloaded_cams.branch import DOMAIN, FOLD, PEAK, PRETENSION, Branch
+from vsacli.actuators.mechanisms.preloaded_cams.branch import FOLD, PEAK, PRETENSION, Branch
 from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift, LinearInTorque
 from vsacli.actuators.pairs.bracketing import bracketed_root
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -65,12 +65,14 @@ class CamSolver:
 
     Attributes:
         lift: over deflections from rest.
+        domain: least and largest deflection from rest.
         k: stiffness of the spring, N/m.
         pretension: smallest and largest, m.
         branch: over the torque.
     """
 
     lift: Callable[[FloatArray], Lift]
+    domain: tuple[float, float]
     k: float
     pretension: tuple[float, float]
     branch: Branch
@@ -104,24 +106,46 @@ class CamSolver:
         k, (least, most) = self.k, self.pretension
         guess = self.branch.ends(tau_e)
         held, fold, peak = guess.end == PRETENSION, guess.end == FOLD, guess.end == PEAK
+        last = np.where(guess.inner < 0, *self.domain)
 
-        def of_inner(lift: Lift) -> LinearInTorque:
-            each = zip(lift.held(k, least), lift.turning(k), lift.rising(k), strict=True)
-            return LinearInTorque(*(np.where(held, a, np.where(fold, b, c)) for a, b, c in each))
+        def at_outer(lift: Lift, _: FloatArray) -> LinearInTorque:
+            return lift.held(k, most)
 
-        step, outer = _corrected(self.lift(guess.outer), guess.outer, tau_e, lambda lift: lift.held(k, most))
-        inner_step, inner = _corrected(self.lift(guess.inner), guess.inner, tau_e, of_inner)
-        inner_step = np.where(guess.end == DOMAIN, 0.0, inner_step)
+        def at_inner(lift: Lift, phi: FloatArray) -> LinearInTorque:
+            return LinearInTorque(
+                *(
+                    np.where(held, a, np.where(fold, b, np.where(peak, c, d)))
+                    for a, b, c, d in zip(
+                        lift.held(k, least),
+                        lift.turning(k),
+                        lift.rising(k),
+                        _distance(phi, last),
+                        strict=True,
+                    )
+                )
+            )
+
+        outer, of_outer = self._corrected(guess.outer, tau_e, at_outer)
+        inner, of_inner = self._corrected(guess.inner, tau_e, at_inner)
         low, high = self.branch.torque_range
         carried = (tau_e >= low) & (tau_e <= high)
-        at_inner = np.where(held, inner.spring(k, least).sigma, inner.stiffness(k, tau_e))
+        stiffness = np.where(held, of_inner.spring(k, least).sigma, of_inner.stiffness(k, tau_e))
         return Piece(
-            End(guess.outer + step, np.where(carried, outer.spring(k, most).sigma, np.nan)),
-            End(guess.inner + inner_step, np.where(carried, np.where(peak, 0.0, at_inner), np.nan)),
+            End(outer, np.where(carried, of_outer.spring(k, most).sigma, np.nan)),
+            End(inner, np.where(carried, np.where(peak, 0.0, stiffness), np.nan)),
             fold,
             guess.sign,
-            inner.l2,
+            of_inner.l2,
         )
+
+    def _corrected(
+        self, phi: FloatArray, tau_e: FloatArray, function: Callable[[Lift, FloatArray], LinearInTorque]
+    ) -> tuple[FloatArray, Lift]:
+        """Where a function is zero, by two Newton steps, and the lift there."""
+        lift = self.lift(phi)
+        step = _newton_step(function(lift, phi), phi, tau_e)
+        step = step + _newton_step(function(lift.after(step), phi + step), phi, tau_e)
+        return phi + step, lift.after(step)
 
     def _deflection(self, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> tuple[FloatArray, Lift]:
         """Deflection from rest at which the torque meets a stiffness between the ends, and the lift there."""
@@ -185,13 +209,10 @@ class CamSolver:
         return np.where(near_rest, demand - squared, tau_e) / np.where(divisor == 0, 1.0, divisor)
 
 
-def _corrected(
-    lift: Lift, phi: FloatArray, tau_e: FloatArray, function: Callable[[Lift], LinearInTorque]
-) -> tuple[FloatArray, Lift]:
-    """Two Newton steps to where a function is zero, in all, and the lift after them."""
-    step = _newton_step(function(lift), phi, tau_e)
-    step = step + _newton_step(function(lift.after(step)), phi, tau_e)
-    return step, lift.after(step)
+def _distance(phi: FloatArray, last: FloatArray) -> LinearInTorque:
+    """Zero at the end of the domain, whatever the torque."""
+    zero = np.zeros_like(phi)
+    return LinearInTorque(phi - last, np.ones_like(phi), zero, zero)
 
 
 def _newton_step(here: LinearInTorque, phi: FloatArray, tau_e: FloatArray) -> FloatArray:

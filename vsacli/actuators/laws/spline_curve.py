@@ -1,0 +1,137 @@
+"""Smooth curves on either side of zero: potentials that are polynomials in pieces, made from a B-spline.
+
+The spline g stands for what must not change its sign: a slope over the deflection, say. Whoever makes a curve
+says how the potential follows from it by integration.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.compute.control_flow import Values, cell_of, look_up
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+Integrate = Callable[["PPoly"], "PPoly"]
+"""The potential over the size of the deflection from the spline over that."""
+
+
+@dataclass(frozen=True)
+class SplineCurve:
+    """A potential made of a half on either side of zero, over the size of the deflection.
+
+    Attributes:
+        domain: deflections at the ends.
+        pieces: how many polynomials there are below zero, and above; in either half equally wide.
+        origins: sizes of deflection from which the polynomials count, (pieces,); zero next to zero, so that
+            nothing cancels there.
+        coefficients: of the potential, from the constant on, (powers, pieces).
+        residual: the largest misfit of what was measured.
+    """
+
+    domain: tuple[float, float]
+    pieces: tuple[int, int]
+    origins: FloatArray
+    coefficients: FloatArray
+    residual: float
+
+    def __call__(self, phi: FloatArray, first: int, last: int) -> tuple[FloatArray, ...]:
+        """Derivatives of the potential from one order, 0 or 1, to another, 4 at most."""
+        origin, *coefficients = look_up(self._tables[first], self._piece(phi))
+        sizes = _with_derivatives(coefficients, np.abs(phi) - origin, last - first)
+        side = np.copysign(1.0, phi)
+        return tuple(side * size if order % 2 else size for order, size in enumerate(sizes, first))
+
+    def _piece(self, phi: FloatArray) -> IndexArray:
+        """The polynomial that holds; at an edge rounding may choose its neighbour, which is as good there."""
+        (low, high), (below, above) = self.domain, self.pieces
+        position = phi * (above / high)
+        if below:
+            steeper = below / -low > above / high
+            position = below + (np.minimum if steeper else np.maximum)(position, phi * (below / -low))
+        return cell_of(position, below + above)
+
+    @cached_property
+    def _tables(self) -> tuple[Values, Values]:
+        """Origins with the coefficients of the potential, and of its derivative, each over the pieces."""
+        return (self.origins, *self._derivative(0)), (self.origins, *self._derivative(1))
+
+    def _derivative(self, order: int) -> FloatArray:
+        """Coefficients of a derivative of the potential, from the constant on, (powers, pieces)."""
+        powers = range(order, len(self.coefficients))
+        factors = np.array([math.perm(power, order) for power in powers], dtype=float)
+        return factors[:, None] * self.coefficients[order:]
+
+
+def _with_derivatives(coefficients: Sequence[FloatArray], x: FloatArray, order: int) -> list[FloatArray]:
+    """A polynomial and its derivatives up to an order, by Horner's scheme repeated on the quotients."""
+    *lower, highest = coefficients
+    values = [highest]
+    for coefficient in reversed(lower):
+        top = values[-1]
+        for power in range(len(values) - 1, 0, -1):
+            values[power] = values[power] * x + values[power - 1]
+        values[0] = values[0] * x + coefficient
+        if len(values) <= order:
+            values.append(top)
+    return [math.factorial(power) * value if power > 1 else value for power, value in enumerate(values)]
+
+
+def spline_knots(low: float, high: float, pieces: int, degree: int) -> FloatArray:
+    """Knots of a spline from `low` at or below zero to `high` above, one of them at zero."""
+    above = max(1, round(pieces * high / (high - low)))
+    below = max(1, pieces - above) if low < 0 else 0
+    breaks = np.concatenate((np.linspace(low, 0, below, endpoint=False), np.linspace(0, high, above + 1)))
+    return np.concatenate((np.full(degree, breaks[0]), breaks, np.full(degree, breaks[-1])))
+
+
+def spline_curve(knots: FloatArray, weights: FloatArray, degree: int, integrate: Integrate) -> SplineCurve:
+    """The curve of a spline with such knots, weights and degree."""
+    origins, coefficients = _half(knots, weights, degree, integrate)
+    above = origins.size
+    if knots[0] < 0:
+        down, turned = _half(-knots[::-1], weights[::-1], degree, integrate)
+        origins = np.concatenate((down[::-1], origins))
+        coefficients = np.hstack((turned[:, ::-1], coefficients))
+    return SplineCurve(
+        domain=(float(knots[0]), float(knots[-1])),
+        pieces=(origins.size - above, above),
+        origins=origins,
+        coefficients=coefficients,
+        residual=math.nan,
+    )
+
+
+def _half(
+    knots: FloatArray, weights: FloatArray, degree: int, integrate: Integrate
+) -> tuple[FloatArray, FloatArray]:
+    """Origins of the potential's polynomials above zero, and their coefficients from the constant on."""
+    potential = integrate(_above_zero(knots, weights, degree))
+    return potential.x[:-1], potential.c[::-1]
+
+
+def _above_zero(knots: FloatArray, weights: FloatArray, degree: int) -> PPoly:
+    """The spline from its knot at zero to the last; the other knots there enclose nothing."""
+    from scipy.interpolate import PPoly
+
+    whole = PPoly.from_spline((knots, weights, degree))
+    first = int(np.searchsorted(whole.x, 0.0, side="right")) - 1
+    return PPoly(whole.c[:, first:-degree], whole.x[first:-degree])
+
+
+def times_deflection(curve: PPoly) -> PPoly:
+    """The product phi curve(phi); each piece has its own origin."""
+    from scipy.interpolate import PPoly
+
+    coefficients = np.zeros((curve.c.shape[0] + 1, curve.c.shape[1]))
+    coefficients[:-1] += curve.c
+    coefficients[1:] += curve.c * curve.x[:-1]
+    return PPoly(coefficients, curve.x)
