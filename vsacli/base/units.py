@@ -51,6 +51,7 @@ INERTIA = constant("kg m^2")
 ACCELERATION = constant("m/s^2")
 RATE = constant("1/s")
 DIMENSIONLESS = constant("1")
+ANY_SI_UNIT = constant("SI units")
 
 POSITION = Quantity("rad", "m")
 VELOCITY = Quantity("rad/s", "m/s")

@@ -1,125 +1,227 @@
-"""Numbers in documents: decimal numbers, short expressions of them with `pi`, and angles in degrees."""
+"""Expressions in documents: numbers, words and functions, + - * / and powers, parsed into steps.
+
+Whoever reads a document says which words there are. A text is never given to Python, and neither its length
+nor its nesting can exhaust anything.
+"""
 
 from __future__ import annotations
 
-import ast
-import math
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Hashable, Mapping
+from typing import Any, NamedTuple, NoReturn
 
-MAX_LENGTH = 200
-ANGLES = ("rad", "rad/s")
-"""Units in which `90 deg` may be written."""
+from vsacli.base.did_you_mean import did_you_mean
 
-BOOLEANS = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false"})
-"""Words that YAML 1.1 takes for booleans, in lower case."""
+NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+"""A decimal number without sign."""
 
-_NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_DECIMAL = re.compile(rf"[+-]?(?!0\d){_NUMBER}", re.ASCII)
+MAX_NESTING = 200
+"""Parentheses, signs and powers inside each other; each takes two calls of Python, which stops at 1000."""
+
 _TOKEN = re.compile(
-    rf"(?P<space>[ \t]+)|(?P<number>{_NUMBER})|(?P<name>[^\W\d]\w*)|(?P<symbol>[-+*/()])", re.ASCII
+    rf"(?P<space>[ \t]+)|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)|(?P<symbol>\*\*|[-+*/^()])", re.ASCII
 )
-_DEGREES = re.compile(rf"(?P<sign>[+-]?)\s*(?P<value>{_NUMBER}|\(.*\))\s*deg", re.ASCII)
+_POWER = 3
+_BINDING = {"+": 1, "-": 1, "*": 2, "/": 2, "^": _POWER, "**": _POWER}
+"""How tightly operators bind; powers are taken from right to left."""
 
-_REFUSED_FORMS = {
-    r"[+-]?\.?(nan|inf|infinity)": "only finite numbers can be used",
-    r"[+-]?\d+(:\d+)+(\.\d*)?": "base 60 is not read; write the number in decimal",
-    r"[+-]?0[xob]\w*": "write the number in decimal",
-    r"[+-]?\d+(_\d+)+(\.\d*)?": "write the number without underscores",
-    r"[+-]?\d+,\d+": "write a decimal point, not a comma",
+_OPERATORS: dict[str, Callable[..., Any]] = {
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": operator.truediv,
+    "^": operator.pow,
+    "**": operator.pow,
+    "negative": operator.neg,
 }
-"""What to advise for forms that are no expressions."""
-
-_BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-}
-_UNARY: dict[type[ast.unaryop], Callable[[float], float]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
 
 
 class ExpressionError(ValueError):
-    """A text is no number; the message says why and what would be one."""
+    """A text is no expression.
+
+    Attributes:
+        reason: what is wrong.
+        place: number of the character where it is, from 1; 0 if it is everywhere.
+        remedy: a clause on what would do, beginning with `;`, or nothing.
+    """
+
+    def __init__(self, reason: str, place: int = 0, remedy: str = "") -> None:
+        self.reason, self.place, self.remedy = reason, place, remedy
+        where = f" at character {place}" if place else ""
+        super().__init__(f"{reason}{where}{remedy}")
 
 
-def evaluate(text: str, unit: str) -> float:
-    """The number a text stands for.
+class Grammar(NamedTuple):
+    """What may stand in an expression besides numbers, + - * / and parentheses.
 
-    Args:
-        text: e.g. `1e-5`, `-(pi/2 + 0.1)`, `90 deg`.
-        unit: of the number; degrees, converted to radians, are admitted for ANGLES only.
+    Attributes:
+        names: words that stand for a value.
+        functions: words that take one argument in parentheses.
+        powers: whether `^`, which may be written `**`, is there.
+        max_length: of the text.
+    """
+
+    names: Collection[str]
+    functions: Collection[str]
+    powers: bool
+    max_length: int
+
+
+class Step(NamedTuple):
+    """One operation.
+
+    Attributes:
+        operation: an operator, `negative`, a function, `name` or `number`.
+        operands: numbers of the steps whose results it takes; of the last two the word, or the number.
+    """
+
+    operation: str
+    operands: tuple[Any, ...]
+
+
+class Expression(NamedTuple):
+    """An expression as steps, each after those that it needs; the last one gives the value.
+
+    What stands in the text several times is one step.
+    """
+
+    steps: tuple[Step, ...]
+
+    @property
+    def names(self) -> set[str]:
+        """The words that stand for a value."""
+        return {step.operands[0] for step in self.steps if step.operation == "name"}
+
+    def value(
+        self,
+        names: Mapping[str, Any],
+        functions: Mapping[str, Callable[[Any], Any]],
+        number: Callable[[float], Any] = float,
+    ) -> Any:
+        """The value for anything that has the operators.
+
+        Args:
+            names: their values.
+            functions: by their words.
+            number: makes such a thing of a number that stands in the text.
+        """
+        results: list[Any] = []
+        for operation, operands in self.steps:
+            if operation == "number":
+                results.append(number(operands[0]))
+            elif operation == "name":
+                results.append(names[operands[0]])
+            else:
+                function = _OPERATORS.get(operation) or functions[operation]
+                results.append(function(*(results[operand] for operand in operands)))
+        return results[-1]
+
+
+def parse(text: str, grammar: Grammar) -> Expression:
+    """The steps of an expression.
 
     Raises:
-        ExpressionError: anything else, or a value that is not finite.
+        ExpressionError: it is none, with the reason and the place.
     """
-    if len(text) > MAX_LENGTH:
-        raise ExpressionError(f"longer than {MAX_LENGTH} characters")
-    text = text.strip()
-    if text.lower() in BOOLEANS:
-        raise ExpressionError("YAML takes this word for a boolean")
-    try:
-        value = _degrees(text, unit) if text.endswith("deg") else _expression(text)
-    except ExpressionError:
-        for form, advice in _REFUSED_FORMS.items():
-            if re.fullmatch(form, text, re.IGNORECASE):
-                raise ExpressionError(advice) from None
-        raise
-    if not math.isfinite(value):
-        raise ExpressionError("the value is too large for a floating-point number")
-    return value
+    if len(text) > grammar.max_length:
+        raise ExpressionError(f"longer than {grammar.max_length} characters")
+    return _Parser(_tokens(text), grammar).parsed()
 
 
-def _degrees(text: str, unit: str) -> float:
-    if unit not in ANGLES:
-        raise ExpressionError(f"degrees are for angles only, and the unit here is {unit}")
-    parts = _DEGREES.fullmatch(text)
-    if not parts:
-        raise ExpressionError(
-            "before `deg`, write one number, or an expression in parentheses as in `(90/2) deg`"
-        )
-    inner = parts["value"].removeprefix("(").removesuffix(")")
-    return math.radians(float(parts["sign"] + "1") * _expression(inner))
+class _Token(NamedTuple):
+    kind: str
+    text: str
+    place: int
 
 
-def _expression(text: str) -> float:
-    if _DECIMAL.fullmatch(text):
-        return float(text)
-    _check_tokens(text)
-    try:
-        return _value(ast.parse(text.strip(), mode="eval").body)
-    except SyntaxError:
-        raise ExpressionError("write a number, or an expression with + - * /, parentheses and pi") from None
-    except ZeroDivisionError:
-        raise ExpressionError("division by zero") from None
-
-
-def _check_tokens(text: str) -> None:
-    """Let pass only numbers, `pi` and operators; what follows then never sees any other Python."""
-    position = 0
+def _tokens(text: str) -> list[_Token]:
+    tokens, position = [], 0
     while position < len(text):
-        token = _TOKEN.match(text, position)
-        if not token:
-            hint = "; degrees are written as in `90 deg`" if text[position] == "°" else ""
-            raise ExpressionError(f"unexpected character {text[position]!r}{hint}")
-        if token["name"] and token["name"] != "pi":
-            raise ExpressionError(f"unknown word {token['name']!r}; only `pi` may stand in an expression")
-        if token["number"] and re.match(r"0\d", token["number"]):
-            raise ExpressionError(
-                "a leading zero would mean an octal number elsewhere; write the number without it"
-            )
-        position = token.end()
+        found = _TOKEN.match(text, position)
+        if not found:
+            raise ExpressionError(f"unexpected character {text[position]!r}", position + 1)
+        if found["number"] and re.match(r"0\d", found["number"]):
+            reason = "a leading zero, which would mean an octal number elsewhere"
+            raise ExpressionError(reason, position + 1)
+        if found.lastgroup and not found["space"]:
+            tokens.append(_Token(found.lastgroup, found[0], position + 1))
+        position = found.end()
+    return [*tokens, _Token("end", "", len(text) + 1)]
 
 
-def _value(node: ast.expr) -> float:
-    match node:
-        case ast.Constant(value=int() | float() as number):
-            return float(number)
-        case ast.Name():
-            return math.pi
-        case ast.UnaryOp(op=sign, operand=operand):
-            return _UNARY[type(sign)](_value(operand))
-        case ast.BinOp(op=sign, left=left, right=right) if type(sign) in _BINARY:
-            return _BINARY[type(sign)](_value(left), _value(right))
-    raise ExpressionError("only + - * / and parentheses may join numbers")
+class _Parser:
+    """Operator precedence, one token after the other (V. R. Pratt, Top down operator precedence, 1973)."""
+
+    def __init__(self, tokens: list[_Token], grammar: Grammar) -> None:
+        self._tokens = iter(tokens)
+        self._next = next(self._tokens)
+        self._grammar = grammar
+        self._nesting = 0
+        self._steps: dict[Hashable, int] = {}
+
+    def parsed(self) -> Expression:
+        """All of it."""
+        self._expression(binding=1)
+        if self._next.kind != "end":
+            self._refuse("an operator")
+        return Expression(tuple(self._steps))  # type: ignore[arg-type]
+
+    def _expression(self, binding: int) -> int:
+        """The step of what operators join that bind at least as tightly."""
+        self._nesting += 1
+        if self._nesting > MAX_NESTING:
+            raise ExpressionError(f"nested deeper than {MAX_NESTING} levels", self._next.place)
+        left = self._operand()
+        while (tightness := _BINDING.get(self._next.text, 0)) >= binding:
+            if tightness == _POWER and not self._grammar.powers:
+                self._refuse("another operator")
+            symbol = self._take().text
+            left = self._step(symbol, left, self._expression(tightness + (tightness != _POWER)))
+        self._nesting -= 1
+        return left
+
+    def _operand(self) -> int:
+        """The step of a number, a name, a function, what is in parentheses, or one of these with signs."""
+        negative = signed = False
+        while self._next.text in ("+", "-"):
+            negative, signed = negative ^ (self._take().text == "-"), True
+        if signed:
+            inner = self._expression(_POWER)
+            return self._step("negative", inner) if negative else inner
+        if self._next.kind == "number":
+            return self._step("number", float(self._take().text))
+        if self._next.kind == "name":
+            return self._word()
+        return self._parentheses("a number, a word or (")
+
+    def _word(self) -> int:
+        _, word, place = self._take()
+        if word in self._grammar.functions:
+            return self._step(word, self._parentheses(f"( behind {word!r}"))
+        if word not in self._grammar.names:
+            known = (*self._grammar.names, *self._grammar.functions)
+            raise ExpressionError(f"unknown word {word!r}", place, did_you_mean(word, known))
+        return self._step("name", word)
+
+    def _parentheses(self, otherwise: str) -> int:
+        if self._next.text != "(":
+            self._refuse(otherwise)
+        self._take()
+        inner = self._expression(binding=1)
+        if self._next.text != ")":
+            self._refuse("an operator or )")
+        self._take()
+        return inner
+
+    def _step(self, operation: str, *operands: Any) -> int:
+        """The number of a step, which is there once."""
+        return self._steps.setdefault(Step(operation, operands), len(self._steps))
+
+    def _take(self) -> _Token:
+        token, self._next = self._next, next(self._tokens, self._next)
+        return token
+
+    def _refuse(self, expected: str) -> NoReturn:
+        _, text, place = self._next
+        raise ExpressionError(f"expected {expected}, found {repr(text) if text else 'the end'}", place)

@@ -14,7 +14,7 @@ from vsacli.base.units import Quantity
 from vsacli.documents.kinds.lists import Items, Pair
 from vsacli.documents.kinds.nested import OneOf, Record
 from vsacli.documents.kinds.single import IDENTIFIER, Boolean, Choice, Integer, Name, Number, TableFile, Text
-from vsacli.documents.kinds.vectors import Interval, PerJoint, Vector
+from vsacli.documents.kinds.vectors import Interval, NamedNumbers, PerJoint, Vector
 from vsacli.documents.records import LARGEST, REQUIRED, SMALLEST, Check, Field, Kind, check_fields, declared
 
 __all__ = [
@@ -35,6 +35,7 @@ __all__ = [
     "Items",
     "Kind",
     "Name",
+    "NamedNumbers",
     "Number",
     "OneOf",
     "Pair",

@@ -19,8 +19,9 @@ import numpy as np
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
-from vsacli.documents.expression import ANGLES, ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
 from vsacli.documents.kinds.lists import Pair
+from vsacli.documents.number import ANGLES, evaluate
 from vsacli.documents.records import Kind, declared
 from vsacli.documents.source import Problems, Source
 from vsacli.documents.yaml_tree import parse_yaml

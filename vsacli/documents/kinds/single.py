@@ -11,7 +11,8 @@ from typing import Any
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.units import DIMENSIONLESS, Quantity
-from vsacli.documents.expression import ANGLES, BOOLEANS, MAX_LENGTH, ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import ANGLES, BOOLEANS, MAX_LENGTH, evaluate
 from vsacli.documents.records import (
     LARGEST,
     ArraysOfRecord,

@@ -9,7 +9,7 @@ from typing import Any
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem
-from vsacli.base.units import Quantity
+from vsacli.base.units import ANY_SI_UNIT, Quantity
 from vsacli.documents import tree
 from vsacli.documents.kinds.single import IDENTIFIER, Number, read_number, unit_words
 from vsacli.documents.records import ArraysOfRecord, Check, FieldPath, JsonOfRecord, Kind, Refer, Schema
@@ -111,6 +111,41 @@ class Interval(_Numbers):
     def arrays(self, content: Any, _of_record: ArraysOfRecord, /) -> Iterator[ResolvedField]:
         """Both bounds."""
         yield single(("bound",), self.unit, content)
+
+
+@dataclass(eq=False)
+class NamedNumbers(Kind):
+    """A mapping from names of one's own to numbers in SI units, read as pairs; angles may be in degrees."""
+
+    words = "mapping from names to numbers in SI units"
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Pairs of a name and a number."""
+        if not isinstance(node, tree.Mapping):
+            return scope.unexpected(node, "a mapping from names to numbers", label)
+        numbers = all_valid(
+            read_number(entry, str(ANY_SI_UNIT), f"{label}.{name}", scope)
+            for name, entry in node.entries.items()
+        )
+        return numbers if numbers is INVALID else tuple(zip(node.entries, numbers, strict=True))
+
+    def problems(self, path: FieldPath, check: Check | None, content: Any, /) -> Iterator[FieldProblem]:
+        """What is wrong with one of the numbers."""
+        for name, entry in content:
+            yield from super().problems((*path, name), check, entry)
+
+    def schema(self, check: Check | None, refer: Refer, /) -> Schema:
+        """A mapping with a number at each key."""
+        return {"type": "object", "additionalProperties": Number(ANY_SI_UNIT).schema(check, refer)}
+
+    def arrays(self, content: Any, _of_record: ArraysOfRecord, /) -> Iterator[ResolvedField]:
+        """Each number by its name."""
+        for name, entry in content:
+            yield single((), ANY_SI_UNIT, entry)._replace(path=(name,))
+
+    def json_value(self, content: Any, _of_record: JsonOfRecord, /) -> Any:
+        """The mapping."""
+        return dict(content)
 
 
 @dataclass(eq=False)

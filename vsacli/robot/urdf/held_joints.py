@@ -6,7 +6,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
-from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import evaluate
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
 from vsacli.robot.urdf.link_tree import LARGEST_NUMBER, MOVING, Urdf, UrdfJoint
