@@ -1,0 +1,233 @@
+"""Derivatives of functions of several variables: truncated power series, computed along with the values.
+
+A jet holds the Taylor coefficients of a function at a point, up to those that are asked for. Coefficients are
+numbers, NumPy arrays or arrays of symbols, so that one text gives values or leaves a program; those that are
+zero whatever the point is are not there and cost nothing. A. Griewank & A. Walther, Evaluating Derivatives,
+2nd ed. (2008), chapter 13.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import count, cycle, islice
+from math import factorial, prod
+from typing import Any
+
+import numpy as np
+
+from vsacli.compute.vector import Scalar, add, mul, sub
+
+Order = tuple[int, ...]
+"""How often a function is differentiated over each variable."""
+
+Terms = Mapping[Order, Scalar]
+
+
+class Truncation:
+    """Which derivatives jets hold; with each also those of fewer differentiations.
+
+    Attributes:
+        variables: number of variables.
+        orders: of the derivatives, the lower ones first.
+        degree: most differentiations.
+        zeroth: the order of the function itself.
+    """
+
+    def __init__(self, orders: Iterable[Order]) -> None:
+        self.orders = tuple(sorted(set(orders), key=lambda order: (sum(order), order)))
+        kept = frozenset(self.orders)
+        self.variables = len(self.orders[0])
+        self.zeroth = (0,) * self.variables
+        self.degree = max(map(sum, kept))
+        self._products = {
+            (a, b): total for a in kept for b in kept if (total := _total(a, b)) in frozenset(kept)
+        }
+
+    def product(self, first: Terms, second: Terms) -> dict[Order, Scalar]:
+        """The coefficients of a product."""
+        terms: dict[Order, Scalar] = {}
+        for a, left in first.items():
+            for b, right in second.items():
+                order = self._products.get((a, b))
+                if order is not None:
+                    terms[order] = add(terms.get(order, 0), mul(left, right))
+        return terms
+
+    def linear(self, value: Scalar, slopes: Sequence[int]) -> Jet:
+        """A linear function of the variables, such as one of them, by its value and its slopes."""
+        units = [
+            tuple(int(axis == other) for other in range(self.variables)) for axis in range(self.variables)
+        ]
+        return Jet(self, {self.zeroth: value, **dict(zip(units, slopes, strict=True))})
+
+
+def _total(a: Order, b: Order) -> Order:
+    return tuple(map(sum, zip(a, b, strict=True)))
+
+
+class Jet:
+    """A function at a point, with its derivatives; has + - * / and powers among its kind and with numbers."""
+
+    __slots__ = ("_terms", "_truncation")
+    __array_ufunc__ = None  # so that a number of NumPy leaves its operators to those below
+
+    def __init__(self, truncation: Truncation, terms: Terms) -> None:
+        self._truncation = truncation
+        self._terms = {order: term for order, term in terms.items() if not _is_zero(term)}
+
+    @property
+    def value(self) -> Scalar:
+        """The function."""
+        return self._terms.get(self._truncation.zeroth, 0)
+
+    def derivative(self, order: Order) -> Scalar:
+        """A derivative; the number zero where it vanishes whatever the point is."""
+        return mul(prod(map(factorial, order)), self._terms.get(order, 0))
+
+    def _joined(self, other: Any, join: Callable[[Scalar, Scalar], Scalar]) -> Jet:
+        theirs = self._lifted(other)
+        orders = dict.fromkeys((*self._terms, *theirs))
+        terms = {order: join(self._terms.get(order, 0), theirs.get(order, 0)) for order in orders}
+        return Jet(self._truncation, terms)
+
+    def _lifted(self, other: Any) -> Terms:
+        return other._terms if isinstance(other, Jet) else {self._truncation.zeroth: other}
+
+    def __add__(self, other: Any) -> Jet:
+        return self._joined(other, add)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Jet:
+        return self._joined(other, sub)
+
+    def __rsub__(self, other: Any) -> Jet:
+        return self._joined(other, lambda a, b: sub(b, a))
+
+    def __neg__(self) -> Jet:
+        return Jet(self._truncation, {order: mul(-1, term) for order, term in self._terms.items()})
+
+    def __mul__(self, other: Any) -> Jet:
+        return Jet(self._truncation, self._truncation.product(self._terms, self._lifted(other)))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Jet:
+        if isinstance(other, Jet):
+            quotient: Jet = self * _reciprocal(other)
+            return quotient
+        return Jet(self._truncation, {order: term / other for order, term in self._terms.items()})
+
+    def __rtruediv__(self, other: Any) -> Jet:
+        return Jet(
+            self._truncation, {order: mul(term, other) for order, term in _reciprocal(self)._terms.items()}
+        )
+
+    def __pow__(self, exponent: Any) -> Jet:
+        if isinstance(exponent, Jet):
+            return _compose(_exponential, _compose(_logarithmic, self) * exponent)
+        if not float(exponent).is_integer():
+            return _power(self, exponent)
+        power = _whole_power(self, abs(int(exponent)))
+        return power if exponent >= 0 else _reciprocal(power)
+
+    def __rpow__(self, base: Any) -> Jet:
+        return _compose(_exponential, self * np.log(base))
+
+    def composed(self, outer: Iterator[Scalar]) -> Jet:
+        """Another function of this one, from the Taylor coefficients of that at the value of this."""
+        zeroth = self._truncation.zeroth
+        inner = Jet(self._truncation, {order: term for order, term in self._terms.items() if order != zeroth})
+        result, power = Jet(self._truncation, {zeroth: next(outer)}), inner
+        for coefficient in islice(outer, self._truncation.degree - 1):
+            result, power = result + power * coefficient, power * inner
+        last: Jet = power * next(outer)
+        return result._joined(last, add)
+
+
+def _is_zero(term: Scalar) -> bool:
+    return isinstance(term, int | float) and term == 0
+
+
+def _whole_power(base: Jet, exponent: int) -> Jet:
+    """By squaring, so that it holds at zero too."""
+    result, square = base * 0 + 1, base
+    while exponent:
+        if exponent % 2:
+            result = result * square
+        exponent //= 2
+        square = square * square if exponent else square
+    return result
+
+
+def _power(base: Jet, exponent: float) -> Jet:
+    return base.composed(_binomial(np.power(base.value, exponent), base.value, exponent))
+
+
+def _reciprocal(base: Jet) -> Jet:
+    return base.composed(_binomial(np.divide(1.0, base.value), base.value, -1))
+
+
+def _binomial(first: Scalar, value: Scalar, exponent: float) -> Iterator[Scalar]:
+    """Taylor coefficients of a power of the value, from the power itself; without end, as those below are."""
+    coefficient = first
+    for number in count():
+        yield coefficient
+        coefficient = coefficient * ((exponent - number) / (number + 1)) / value
+
+
+def _exponential(value: Scalar) -> Iterator[Scalar]:
+    first = np.exp(value)
+    return (first / factorial(number) for number in count())
+
+
+def _logarithmic(value: Scalar) -> Iterator[Scalar]:
+    yield np.log(value)
+    power = np.float64(-1)
+    for number in count(1):
+        power = power / -value
+        yield power / number
+
+
+def _sine(value: Scalar) -> Iterator[Scalar]:
+    sine, cosine = np.sin(value), np.cos(value)
+    derivatives = cycle((sine, cosine, -sine, -cosine))
+    return (derivative / factorial(number) for number, derivative in enumerate(derivatives))
+
+
+def _cosine(value: Scalar) -> Iterator[Scalar]:
+    sine, cosine = np.sin(value), np.cos(value)
+    derivatives = cycle((cosine, -sine, -cosine, sine))
+    return (derivative / factorial(number) for number, derivative in enumerate(derivatives))
+
+
+def _tangent(value: Scalar) -> Iterator[Scalar]:
+    """From tan' = 1 + tan^2."""
+    known = [np.tan(value)]
+    for number in count(1):
+        yield known[-1]
+        squared = sum(a * b for a, b in zip(known, reversed(known), strict=True))
+        known.append((squared + (number == 1)) / number)
+
+
+def _square_root(value: Scalar) -> Iterator[Scalar]:
+    return _binomial(np.sqrt(value), value, 0.5)
+
+
+def _compose(function: Callable[[Scalar], Iterator[Scalar]], argument: Jet) -> Jet:
+    return argument.composed(function(argument.value))
+
+
+def _of_either(of_number: np.ufunc, function: Callable[[Scalar], Iterator[Scalar]]) -> Callable[[Any], Any]:
+    return lambda argument: _compose(function, argument) if isinstance(argument, Jet) else of_number(argument)
+
+
+FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
+    "sin": _of_either(np.sin, _sine),
+    "cos": _of_either(np.cos, _cosine),
+    "tan": _of_either(np.tan, _tangent),
+    "sqrt": _of_either(np.sqrt, _square_root),
+    "exp": _of_either(np.exp, _exponential),
+    "log": _of_either(np.log, _logarithmic),
+}
+"""Functions of jets, and of numbers, by their words in expressions."""
