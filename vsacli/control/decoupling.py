@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from vsacli.actuators.drivetrain import DrivetrainState
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.wrench import Wrench
+from vsacli.compute.vector import add
 from vsacli.control.gains import Gains, Integral, linear_control
 from vsacli.dynamics.forward import Plant
 from vsacli.trajectory.motion import Motion
@@ -49,7 +52,7 @@ class Decoupling:
         """Motor torques, (..., motors); NaN at a joint whose A is singular."""
         drivetrain = self._plant.drivetrain
         springs = drivetrain.state(q, theta, dq, dtheta)
-        link = self._link_motion(q, dq, springs, reference.wrench)
+        link = self._link_motion(q, dq, springs, reference.wrench, reference.commanded)
         v_q = linear_control(  # (32a)
             (reference.q, reference.dq, reference.ddq, reference.d3q, reference.d4q),
             (q, dq, link.ddq, link.d3q),
@@ -63,21 +66,37 @@ class Decoupling:
         ddtau_e = self._plant.chain.torque_acceleration(  # (60)
             q, dq, link.ddq, link.d3q, v_q, reference.wrench
         )
+        dampers = self._plant.dampers.of_links(reference.commanded, dq, link.ddq, link.d3q)
+        ddtau_e = add(ddtau_e, dampers.ddtau)
         ddtheta = springs.motor_accelerations(link.ddq, ddtau_e, v_sigma)
         of_rotors = drivetrain.rotors.torques(ddtheta)
         return of_rotors + drivetrain.damping * dtheta + springs.tau_spring  # (73)-(74)
 
     def link_motion(
-        self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray, wrench: Wrench | None
+        self,
+        q: FloatArray,
+        dq: FloatArray,
+        theta: FloatArray,
+        dtheta: FloatArray,
+        wrench: Wrench | None,
+        commanded: Mapping[str, FloatArray] = MappingProxyType({}),
     ) -> LinkMotion:
-        """What the state says about the links."""
-        return self._link_motion(q, dq, self._plant.drivetrain.state(q, theta, dq, dtheta), wrench)
+        """What the state says about the links, under a wrench and the damping that is commanded."""
+        return self._link_motion(q, dq, self._plant.drivetrain.state(q, theta, dq, dtheta), wrench, commanded)
 
     def _link_motion(
-        self, q: FloatArray, dq: FloatArray, springs: DrivetrainState, wrench: Wrench | None
+        self,
+        q: FloatArray,
+        dq: FloatArray,
+        springs: DrivetrainState,
+        wrench: Wrench | None,
+        commanded: Mapping[str, FloatArray],
     ) -> LinkMotion:
         chain, tau_e, dtau_e = self._plant.chain, springs.tau_e, springs.dtau_e
         matrix = chain.mass_matrix(q)
-        ddq = chain.solve(matrix, tau_e - chain.bias(q, dq, wrench))  # (34)
-        d3q = chain.solve(matrix, dtau_e - chain.torque_rate(q, dq, ddq, wrench))  # (35)
+        dampers = self._plant.dampers
+        bias = add(chain.bias(q, dq, wrench), dampers.of_links(commanded, dq).tau)
+        ddq = chain.solve(matrix, tau_e - bias)  # (34)
+        rate = add(chain.torque_rate(q, dq, ddq, wrench), dampers.of_links(commanded, dq, ddq).dtau)
+        d3q = chain.solve(matrix, dtau_e - rate)  # (35)
         return LinkMotion(tau_e, dtau_e, ddq, d3q, springs.stiffness, springs.dstiffness)

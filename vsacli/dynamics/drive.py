@@ -76,7 +76,7 @@ def drive(
     driven = driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
     of_joint = {**command.arrays(), **driven._asdict()}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
-    unexplained = not_finite_flags(_not_finite(actuator, of_joint))
+    unexplained = not_finite_flags(_not_finite(joint, of_joint))
     return driven._replace(flags=driven.flags | exceeded | unexplained)
 
 
@@ -87,18 +87,19 @@ def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
     return own + coupling * ddtheta[::-1] if coupling else own
 
 
-def _not_finite(actuator: Actuator, of_joint: OfJoint) -> BoolArray:
+def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
     """Where something of the motors is no finite number, and neither infeasible nor singular says why.
 
     Of a demand that is no finite number itself, neither can be said. By (69) and (73)-(74) everything of a
     motor goes into its position or its power; singular steps have no power.
     """
     theta, tau_spring, power = (
-        finite(of_joint[name][: actuator.motor_count]) for name in ("theta", "tau_spring", "motor_power")
+        finite(of_joint[name][: joint.actuator.motor_count])
+        for name in ("theta", "tau_spring", "motor_power")
     )
     infeasible, singular = (has(of_joint["flags"], flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
     explained = infeasible | (theta & tau_spring & (singular | power))
-    demand = finite([of_joint["tau_e"], *(of_joint[key] for key in actuator.commanded)])
+    demand = finite([of_joint["tau_e"], *(of_joint[key] for key in joint.commanded)])
     return ~(demand & explained)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, by_joint, checked_shape, over_time
 from vsacli.base.errors import InputError
-from vsacli.base.signals import POSITION
+from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
 from vsacli.compute.engine import Engine, choose
 from vsacli.compute.rows import RowKernel, RowLayout
@@ -23,6 +23,7 @@ from vsacli.compute.vector import (
     exact,
     trigonometric,
 )
+from vsacli.dynamics.dampers import damper_torque
 from vsacli.dynamics.recursion import JointState, LinkConstants, TipLoad, recursion
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
@@ -75,7 +76,8 @@ def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> Ti
 class LinkTorques(RowKernel):
     """The recursion over rows of samples, for an engine.
 
-    Inputs are q, dq, ddq, d3q, d4q of the joints, then the wrench and its two derivatives if there is one;
+    Inputs are q, dq, ddq, d3q, d4q of the joints, the damping and its two derivatives if there are dampers
+    between the links, then the wrench and its two derivatives if there is one;
     outputs are tau_e, dtau_e, ddtau_e of the joints.
 
     Attributes:
@@ -90,7 +92,8 @@ class LinkTorques(RowKernel):
     def arguments(self) -> RowLayout:
         """Rows that the recursion takes."""
         joints, names = (len(self.robot.joints),), () if self.frame is None else WRENCH_NAMES
-        return RowLayout(dict.fromkeys(POSITION.names, joints) | dict.fromkeys(names, (len(WRENCH_AXES),)))
+        of_joints = (*POSITION.names, *(DAMPING.names if link_damped(self.robot) else ()))
+        return RowLayout(dict.fromkeys(of_joints, joints) | dict.fromkeys(names, (len(WRENCH_AXES),)))
 
     @property
     def results(self) -> RowLayout:
@@ -100,10 +103,12 @@ class LinkTorques(RowKernel):
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(60)."""
         given, joints = self.arguments.unpack(rows), self.robot.joints
+        none = [0] * len(joints)
+        dampings = zip(*(given.get(name, none) for name in DAMPING.names), strict=True)
         states = [
-            joint_state(joint, q, (dq, ddq, d3q, d4q))
-            for joint, q, dq, ddq, d3q, d4q in zip(
-                joints, *(given[name] for name in POSITION.names), strict=True
+            joint_state(joint, q, (dq, ddq, d3q, d4q), damping)
+            for joint, damping, q, dq, ddq, d3q, d4q in zip(
+                joints, dampings, *(given[name] for name in POSITION.names), strict=True
             )
         ]
         wrench = [given[name] for name in WRENCH_NAMES if name in given]
@@ -135,6 +140,9 @@ def link_torques(
     d4q: ArrayLike | None = None,
     wrench: Wrench | None = None,
     *,
+    damping: ArrayLike | None = None,
+    ddamping: ArrayLike | None = None,
+    dddamping: ArrayLike | None = None,
     engine: str | Engine = "numpy",
 ) -> ElasticTorques:
     """Torques that the links demand of the joints, and their first two derivatives, (36)-(60).
@@ -150,6 +158,9 @@ def link_torques(
         d3q: their third derivative.
         d4q: their fourth derivative.
         wrench: what the environment exerts on the end effector, arrays ([samples,] 6); nothing if None.
+        damping: of the dampers between the links, of the shape of q; the least of their ranges if None.
+        ddamping: its first derivative; zero if None.
+        dddamping: its second derivative; zero if None.
         engine: what computes, one of `vsacli.compute.engine.NAMES`, or one that was chosen before.
 
     Returns:
@@ -169,7 +180,9 @@ def link_torques(
     motion += [np.zeros_like(motion[0])] * (len(POSITION.names) - len(motion))
 
     kernel = LinkTorques(robot, None if wrench is None else wrench.frame)
-    rows = dict(zip(kernel.arguments.shapes, (*motion, *_wrench_rows(wrench, shape[:-1])), strict=True))
+    dampings = _damping_rows(robot, shape, (damping, ddamping, dddamping))
+    every = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
+    rows = dict(zip(kernel.arguments.shapes, every, strict=True))
     chosen = choose(engine, kernel, motion[0].shape[1]).engine if isinstance(engine, str) else engine
     computed = kernel.results.arrays(chosen.run(kernel, kernel.arguments.pack(rows)))
     tau_e, dtau_e, ddtau_e = (over_time(computed[name]).reshape(shape) for name in TORQUES)
@@ -194,6 +207,20 @@ def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatAr
     return given
 
 
+def _damping_rows(
+    robot: Robot, shape: tuple[int, ...], given: Sequence[ArrayLike | None]
+) -> Iterator[FloatArray]:
+    """The damping and its derivatives, if there are dampers between the links."""
+    if not link_damped(robot):
+        return
+    least = [joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints]
+    for name, array, default in zip(DAMPING.names, given, (least, 0.0, 0.0), strict=True):
+        values = np.broadcast_to(default, shape) if array is None else np.asarray(array, dtype=np.float64)
+        if values.shape != shape:
+            raise InputError.one(f"{name} must have the shape {shape} of q, not {values.shape}")
+        yield by_joint(np.atleast_2d(values))
+
+
 def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[FloatArray]:
     """The components, and each of their derivatives; `samples` is the shape before the last axis."""
     if wrench is None:
@@ -205,10 +232,29 @@ def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[Fl
         yield by_joint(np.atleast_2d(array))
 
 
-def joint_state(joint: Joint, q: Scalar, rates: tuple[Scalar, Scalar, Scalar, Scalar]) -> JointState:
-    """Pose and motion of a joint for the recursion, from its position and four derivatives."""
+def joint_state(
+    joint: Joint,
+    q: Scalar,
+    rates: tuple[Scalar, Scalar, Scalar, Scalar],
+    damping: tuple[Scalar, Scalar, Scalar] = (0, 0, 0),
+) -> JointState:
+    """Pose and motion of a joint for the recursion.
+
+    Args:
+        joint: the joint.
+        q: its position.
+        rates: the four derivatives of that.
+        damping: of its damper, with two derivatives; counts if that lies between the links.
+    """
     dh = joint.dh
+    resistance = damper_torque(damping if joint.damper_at("link") else (0, 0, 0), rates[:3])
     if joint.is_revolute:
         angle = q + dh.theta
-        return JointState(np.cos(angle), np.sin(angle), exact(dh.d), rates)
-    return JointState(trigonometric(math.cos, dh.theta), trigonometric(math.sin, dh.theta), q + dh.d, rates)
+        return JointState(np.cos(angle), np.sin(angle), exact(dh.d), rates, resistance)
+    cos, sin = (trigonometric(function, dh.theta) for function in (math.cos, math.sin))
+    return JointState(cos, sin, q + dh.d, rates, resistance)
+
+
+def link_damped(robot: Robot) -> bool:
+    """Whether a joint has a damper between its links."""
+    return any(joint.damper_at("link") for joint in robot.joints)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,7 +12,10 @@ import numpy.typing as npt
 from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray, checked_shape
 from vsacli.base.errors import InputError, check_type
+from vsacli.base.signals import DAMPING
 from vsacli.base.wrench import Wrench, check_wrench
+from vsacli.compute.vector import add
+from vsacli.dynamics.dampers import Dampers
 from vsacli.dynamics.rigid_body import chain_of
 from vsacli.robot.model import Robot, check_robot
 
@@ -57,7 +61,12 @@ def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
 
 
 def state_derivative(
-    robot: Robot, state: State, tau_motor: npt.ArrayLike, wrench: Wrench | None = None
+    robot: Robot,
+    state: State,
+    tau_motor: npt.ArrayLike,
+    wrench: Wrench | None = None,
+    *,
+    damping: npt.ArrayLike | None = None,
 ) -> Rates:
     """Time derivative of the full state under motor torques: (5) solved for q'' and theta''.
 
@@ -66,6 +75,7 @@ def state_derivative(
         state: its state, at one instant or over samples.
         tau_motor: torque of each motor, ([samples,] joints, 2), N m (N), joint side of the gear.
         wrench: what the environment exerts on the end effector meanwhile, arrays ([samples,] 6).
+        damping: of the dampers of the joints, ([samples,] joints); the least of their ranges if None.
 
     Raises:
         InputError: shapes that do not fit, or a mass matrix that is not positive definite.
@@ -77,7 +87,12 @@ def state_derivative(
     plant = Plant(robot, None if wrench is None else wrench.frame)
     q, dq, theta, dtheta = plant.unpacked(state)
     torque = plant.drivetrain.of_motors(checked_shape("tau_motor", tau_motor, len(robot.joints), 2))
-    ddq, ddtheta = plant.accelerations(q, dq, theta, dtheta, torque, wrench)
+    least = [joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints]
+    commanded = {name: np.zeros_like(q) for name in DAMPING.names}
+    commanded[DAMPING.key] = checked_shape(
+        DAMPING.key, np.broadcast_to(least, q.shape) if damping is None else damping, len(robot.joints)
+    )
+    ddq, ddtheta = plant.accelerations(q, dq, theta, dtheta, torque, wrench, commanded)
     merged = plant.drivetrain.merged
     return Rates(dq, ddq, merged(dtheta, dq), merged(ddtheta, ddq))
 
@@ -92,11 +107,13 @@ class Plant:
     Attributes:
         chain: its links and joints.
         drivetrain: its motors and springs.
+        dampers: those whose damping is commanded.
     """
 
     def __init__(self, robot: Robot, frame: str | None = None) -> None:
         self.drivetrain = Drivetrain(robot.actuators)
         self.chain = chain_of(robot, frame)
+        self.dampers = Dampers(robot, self.drivetrain)
         self._rigid_inertia = self.drivetrain.direct(self.drivetrain.inertia)
         self._rigid_matrix = np.diag(self._rigid_inertia)
         self._rigid_damping = self.drivetrain.direct(self.drivetrain.damping)
@@ -129,6 +146,7 @@ class Plant:
         dtheta: FloatArray,
         torque: FloatArray,
         wrench: Wrench | None,
+        commanded: Mapping[str, FloatArray],
     ) -> tuple[FloatArray, FloatArray]:
         """Accelerations of the joints (..., joints) and of the motors with springs (..., springs), by (5).
 
@@ -139,12 +157,15 @@ class Plant:
             dtheta: their velocity.
             torque: of all motors, (..., motors).
             wrench: what the environment exerts, if the plant was made for one.
+            commanded: the damping, by name, (..., joints); counts if there are dampers.
         """
         tau_e, spring = self.drivetrain.torques(q, theta)
+        damper = self.dampers.passed(commanded, dq, dtheta)
+        resistance = add(self.chain.bias(q, dq, wrench), self.dampers.of_links(commanded, dq).tau)
         matrix = self.chain.mass_matrix(q) + self._rigid_matrix
-        drive = tau_e + self.drivetrain.direct(torque)
-        ddq = self.chain.solve(matrix, drive - self.chain.bias(q, dq, wrench) - self._rigid_damping * dq)
-        left = torque[..., self.drivetrain.sprung] - self._damping * dtheta - spring
+        drive = add(tau_e, damper.links) + self.drivetrain.direct(torque)
+        ddq = self.chain.solve(matrix, drive - resistance - self._rigid_damping * dq)
+        left = torque[..., self.drivetrain.sprung] - self._damping * dtheta - add(spring, damper.motors)
         return ddq, self.drivetrain.rotors.accelerations(left)
 
     def link_torque(

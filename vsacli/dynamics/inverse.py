@@ -14,7 +14,7 @@ from vsacli.base.arrays import AnyArray, FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.base.json_records import Stored
-from vsacli.base.signals import COMMANDED, POSITION
+from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
 from vsacli.compute.rows import RowKernel, RowLayout
@@ -155,8 +155,9 @@ def _rows(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
 
 def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
     """tau_e, dtau_e and ddtau_e, (58)-(60), by name, each (samples, joints); the stiffness plays no part."""
+    damping = {name: motion.commanded[name] for name in DAMPING.names if name in motion.commanded}
     return link_torques(
-        robot, motion.q, motion.dq, motion.ddq, motion.d3q, motion.d4q, motion.wrench
+        robot, motion.q, motion.dq, motion.ddq, motion.d3q, motion.d4q, motion.wrench, **damping
     )._asdict()
 
 

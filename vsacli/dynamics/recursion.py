@@ -40,21 +40,30 @@ class LinkConstants(NamedTuple):
     damping: Scalar
 
 
-class JointState(NamedTuple):
-    """Pose and motion of a joint: cos and sin of its angle, its offset d, and q', q'', q''', q''''."""
-
-    cos: Scalar
-    sin: Scalar
-    d: Scalar
-    rates: tuple[Scalar, Scalar, Scalar, Scalar]
-
-
 class TorqueDerivatives(NamedTuple):
     """Torque (force) of a joint, and its first and second time derivative."""
 
     tau: Scalar
     dtau: Scalar
     ddtau: Scalar
+
+
+class JointState(NamedTuple):
+    """Pose and motion of a joint.
+
+    Attributes:
+        cos: of its angle.
+        sin: of its angle.
+        d: its offset.
+        rates: first to fourth derivative of q.
+        resistance: what it takes beside what moves the links and beside D q'.
+    """
+
+    cos: Scalar
+    sin: Scalar
+    d: Scalar
+    rates: tuple[Scalar, Scalar, Scalar, Scalar]
+    resistance: TorqueDerivatives = TorqueDerivatives(0, 0, 0)
 
 
 class TipLoad(NamedTuple):
@@ -304,13 +313,11 @@ def _project(link: LinkConstants, state: JointState, body: _Body, reaction: _Rea
     x, dx, ddx = reaction.n if link.revolute else reaction.f
     x_w = cross(x, w)
     q1, q2, q3, _ = state.rates
-    return TorqueDerivatives(
-        tau=add(x.dot(body.z), mul(link.damping, q1)),  # (58)
-        dtau=add((dx + x_w).dot(body.z), mul(link.damping, q2)),  # (59)
-        ddtau=add(  # (60)
-            (ddx + cross(dx, w) * 2 + cross(x, g) + cross(x_w, w)).dot(body.z), mul(link.damping, q3)
-        ),
-    )
+    tau = add(x.dot(body.z), mul(link.damping, q1))  # (58)
+    dtau = add((dx + x_w).dot(body.z), mul(link.damping, q2))  # (59)
+    ddx_turned = ddx + cross(dx, w) * 2 + cross(x, g) + cross(x_w, w)
+    ddtau = add(ddx_turned.dot(body.z), mul(link.damping, q3))  # (60)
+    return TorqueDerivatives(*map(add, (tau, dtau, ddtau), state.resistance))
 
 
 def _in_previous_frame(rotation: Rotation, reaction: _Reaction) -> _Reaction:

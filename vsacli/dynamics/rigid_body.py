@@ -165,10 +165,12 @@ def chain_of(robot: Robot, frame: str | None = None) -> Chain:
     """The programs of a robot's links and joints; recorded once for equal chains.
 
     Args:
-        robot: whose base and tool count, but not its actuators.
+        robot: whose base and tool count, but neither its actuators nor its dampers.
         frame: of the wrench at the end effector, as in `Wrench`; None if there is none.
     """
-    joints = tuple(replace(joint, actuator=_ANY_DRIVE, limits=Limits()) for joint in robot.joints)
+    joints = tuple(
+        replace(joint, actuator=_ANY_DRIVE, damper=None, limits=Limits()) for joint in robot.joints
+    )
     return _recorded(
         Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints), frame
     )

@@ -180,6 +180,10 @@ class Joint:
         """The key of its actuator in `ACTUATORS`."""
         return ACTUATORS.name_of(type(self.actuator))
 
+    def damper_at(self, location: str) -> Damper | None:
+        """Its damper if that is there."""
+        return self.damper if self.damper is not None and self.damper.location == location else None
+
     @property
     def commanded(self) -> tuple[str, ...]:
         """Keys of the signals that a trajectory commands besides its motion."""

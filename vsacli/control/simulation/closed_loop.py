@@ -18,7 +18,7 @@ class ClosedLoop:
     Args:
         robot: the robot as it is.
         controller: what computes the torques; a motor gives at most its `max_torque`.
-        reference: gives the wrench that acts.
+        reference: gives the wrench that acts, and the damping.
 
     Attributes:
         plant: the robot's equations of motion.
@@ -55,5 +55,5 @@ class ClosedLoop:
         self, time: float | FloatArray, phase: Phase, demand: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Of the joints and of the motors with springs, under torques asked of the motors."""
-        wrench = self.reference.wrench(time)
-        return self.plant.accelerations(*phase[:4], self.applied(demand), wrench)
+        wrench, damping = self.reference.wrench(time), self.reference.damping(time)
+        return self.plant.accelerations(*phase[:4], self.applied(demand), wrench, damping)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import COMMANDED, POSITION
+from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.control.simulation.tabulated import tabulate
 from vsacli.trajectory.motion import Motion
@@ -28,10 +28,16 @@ class Reference:
         signals = (POSITION, *(COMMANDED[key] for key in trajectory.commanded))
         self._commands = _tabulated(trajectory, [name for signal in signals for name in signal.names])
         self._wrench = _tabulated(trajectory, WRENCH_NAMES) if self.frame else None
+        damped = DAMPING.key in trajectory.commanded
+        self._damping = _tabulated(trajectory, DAMPING.names) if damped else None
 
     def __call__(self, time: float | FloatArray) -> Motion:
         """Motion, stiffness and wrench."""
         return Motion.of(np.asarray(time), self._commands(time), self.wrench(time))
+
+    def damping(self, time: float | FloatArray) -> dict[str, FloatArray]:
+        """The damping with its derivatives, by name; nothing if none is commanded."""
+        return {} if self._damping is None else self._damping(time)
 
     def wrench(self, time: float | FloatArray) -> Wrench | None:
         """The wrench alone."""

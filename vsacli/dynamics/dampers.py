@@ -1,0 +1,76 @@
+"""Dampers whose damping is commanded, in the equations of motion of links and motors.
+
+Between the links a damper takes d q' of the joint's torque. Beside the springs it passes d (theta_k' - q')
+from each motor that a spring lies behind to the link, as the springs pass their torques.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import Drivetrain
+from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import DAMPING
+from vsacli.compute.vector import Scalar, add, mul
+from vsacli.dynamics.recursion import TorqueDerivatives
+from vsacli.robot.model import Robot
+
+
+def damper_torque(
+    damping: tuple[Scalar, Scalar, Scalar], rates: tuple[Scalar, Scalar, Scalar]
+) -> TorqueDerivatives:
+    """D v and its first two derivatives.
+
+    Args:
+        damping: d, d', d''.
+        rates: the velocity v of the damper, v', v''; scalars of any kind.
+    """
+    (d, d_d, dd_d), (v, dv, ddv) = damping, rates
+    return TorqueDerivatives(
+        tau=mul(d, v),
+        dtau=add(mul(d_d, v), mul(d, dv)),
+        ddtau=add(add(mul(dd_d, v), mul(2, mul(d_d, dv))), mul(d, ddv)),
+    )
+
+
+class Passed(NamedTuple):
+    """What dampers exert on the links, (..., joints), and against the motors with springs, (..., springs)."""
+
+    links: Scalar
+    motors: Scalar
+
+
+class Dampers:
+    """The dampers of a robot's joints; commanded signals are (..., joints), by name."""
+
+    def __init__(self, robot: Robot, drivetrain: Drivetrain) -> None:
+        locations = [joint.damper and joint.damper.location for joint in robot.joints]
+        self._between_links = np.array([location == "link" for location in locations])
+        beside = np.array([location == "transmission" for location in locations])
+        behind_spring = drivetrain.of_motors(drivetrain.deflected)[drivetrain.sprung]
+        self._joint = drivetrain.spring_joint
+        self._beside = behind_spring & beside[self._joint]
+        self._share = np.equal.outer(self._joint, np.arange(len(locations))).astype(np.float64)
+
+    def of_links(
+        self, commanded: Mapping[str, FloatArray], dq: FloatArray, ddq: Scalar = 0, d3q: Scalar = 0
+    ) -> TorqueDerivatives:
+        """What those between the links take, with its derivatives; exact zeros if there is none."""
+        if not self._between_links.any():
+            return TorqueDerivatives(0, 0, 0)
+        d, d_d, dd_d = (np.where(self._between_links, commanded[name], 0.0) for name in DAMPING.names)
+        return damper_torque((d, d_d, dd_d), (dq, ddq, d3q))
+
+    def passed(self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray) -> Passed:
+        """What those beside the springs exert at velocities of joints, and of motors with springs.
+
+        Exact zeros if there is none.
+        """
+        if not self._beside.any():
+            return Passed(0, 0)
+        damping = np.where(self._beside, commanded[DAMPING.key][..., self._joint], 0.0)
+        motors: FloatArray = damping * (dtheta - dq[..., self._joint])
+        return Passed(motors @ self._share, motors)
