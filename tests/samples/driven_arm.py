@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from samples.full_model import Drive, FullModel, PlanarArm
 from vsacli import inverse_dynamics
 from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.damper import Damper
 from vsacli.analysis.result import Result
-from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
@@ -34,9 +37,10 @@ DURATION, RATE = 0.5, 2000
 """s and 1/s; so short that a plant that falls away from the motion does not fall far."""
 
 
-def robot_of(arm: PlanarArm, actuators: list[Actuator]) -> Robot:
+def robot_of(arm: PlanarArm, actuators: list[Actuator], dampers: Sequence[Damper | None] = ()) -> Robot:
     """The arm as a robot."""
-    links = zip(arm.lengths, arm.masses, arm.centres, arm.inertias, arm.damping, actuators, strict=True)
+    devices = zip(actuators, dampers or [None] * len(actuators), strict=True)
+    links = zip(arm.lengths, arm.masses, arm.centres, arm.inertias, arm.damping, devices, strict=True)
     joints = tuple(
         Joint(
             name=f"joint_{number}",
@@ -49,16 +53,19 @@ def robot_of(arm: PlanarArm, actuators: list[Actuator]) -> Robot:
             ),
             damping=damping,
             actuator=actuator,
+            damper=damper,
         )
-        for number, (length, mass, centre, inertia, damping, actuator) in enumerate(links, 1)
+        for number, (length, mass, centre, inertia, damping, (actuator, damper)) in enumerate(links, 1)
     )
     return Robot(name="arm", gravity=(0, -arm.gravity, 0), joints=joints)
 
 
-def motion_of(stiffness: list[tuple[float, float]]) -> Trajectory:
-    """Rest to rest; the stiffness of each joint from one to another, NaN where none is commanded."""
+def motion_of(
+    stiffness: list[tuple[float, float]], damping: Sequence[tuple[float, float]] = ()
+) -> Trajectory:
+    """Rest to rest; stiffness and damping of each joint from one to another, NaN where none is commanded."""
     span, joints = (0.0, DURATION), len(stiffness)
-    start, end = zip(*stiffness, strict=True)
+    commanded = {STIFFNESS: stiffness, DAMPING: damping}
     position = RestToRest(
         signal=POSITION,
         span=span,
@@ -66,18 +73,33 @@ def motion_of(stiffness: list[tuple[float, float]]) -> Trajectory:
         start=tuple(START[:joints]),
         end=tuple((START + MOVE)[:joints]),
     )
-    profile = RestToRest(signal=STIFFNESS, span=span, degree=7, start=start, end=end)
-    return Trajectory(UniformTimes(DURATION, RATE), position, {"stiffness": profile}, name="move")
+    profiles = {
+        signal.key: RestToRest(
+            signal=signal,
+            span=span,
+            degree=7,
+            start=tuple(start for start, _ in ends),
+            end=tuple(end for _, end in ends),
+        )
+        for signal, ends in commanded.items()
+        if ends
+    }
+    return Trajectory(UniformTimes(DURATION, RATE), position, profiles, name="move")
 
 
 def assert_follows(
-    arm: PlanarArm, actuators: list[Actuator], drives: list[Drive], stiffness: list[tuple[float, float]]
+    arm: PlanarArm,
+    actuators: list[Actuator],
+    drives: list[Drive],
+    stiffness: list[tuple[float, float]],
+    dampers: Sequence[Damper | None] = (),
+    damping: Sequence[tuple[float, float]] = (),
 ) -> Result:
     """The computed torques move the full model along the command: 1e-9 rad, and 1e-9 of each stiffness.
 
     The integration is good to some 1e-12; the spline through the torques to some 1e-11.
     """
-    result = inverse_dynamics(robot_of(arm, actuators), motion_of(stiffness))
+    result = inverse_dynamics(robot_of(arm, actuators, dampers), motion_of(stiffness, damping))
     assert not result.flags.any(), result
     start = result.q[0], result.theta[0], result.dq[0], result.dtheta[0]
     followed = FullModel(arm, drives).follow(result.time, result.tau_motor, *start)

@@ -10,14 +10,14 @@ from vsacli.base import units
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import check_fields, choice, interval
 
-LOCATIONS = ("link", "transmission")
+LOCATIONS = ("link",)
 
 
 @dataclass(frozen=True)
 class Damper:
     """A damper whose damping a trajectory commands as it does a stiffness."""
 
-    location: str = choice(LOCATIONS, "between the links of the joint, or parallel to its springs")
+    location: str = choice(LOCATIONS, "between the links of the joint", not_yet=("transmission",))
     range: tuple[float, float] = interval(
         units.DAMPING, "damping that it can have, from zero or above; flagged beyond"
     )

@@ -13,6 +13,7 @@ ACTUAL = (
     *TRACKED,
     *("tau_e", "phi", "dphi", "theta", "dtheta", "tau_spring", "tau_motor"),
     *("elastic_energy", "motor_power", "motor_energy", "det_A"),
+    *("damping", "tau_damper"),
 )
 ERRORS = ("q", "dq", "stiffness", "dstiffness")
 

@@ -12,7 +12,7 @@ from vsacli.base import units
 from vsacli.base.arrays import AnyArray, of_joint
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
+from vsacli.base.signals import COMMANDED, DAMPING, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import wrench_columns
 
@@ -82,6 +82,14 @@ _COMPUTED = (
     Variable("tau_spring", _MOTOR, units.TORQUE, "torque of each transmission", "(62)"),
     Variable(
         "tau_motor", _MOTOR, units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)", geared=-1
+    ),
+    Variable(
+        "tau_damper",
+        _JOINT,
+        units.TORQUE,
+        "torque of the joint's damper, part of tau_e",
+        "damping * velocity of the damper",
+        DAMPING.key,
     ),
     Variable(
         "elastic_energy", _JOINT, units.ENERGY, "energy in the springs of the joint", "integral of (62)"

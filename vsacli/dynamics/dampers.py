@@ -53,6 +53,7 @@ class Dampers:
         behind_spring = drivetrain.of_motors(drivetrain.deflected)[drivetrain.sprung]
         self._joint = drivetrain.spring_joint
         self._beside = behind_spring & beside[self._joint]
+        self._absent = np.array([location is None for location in locations])
         self._share = np.equal.outer(self._joint, np.arange(len(locations))).astype(np.float64)
 
     def of_links(
@@ -74,3 +75,13 @@ class Dampers:
         damping = np.where(self._beside, commanded[DAMPING.key][..., self._joint], 0.0)
         motors: FloatArray = damping * (dtheta - dq[..., self._joint])
         return Passed(motors @ self._share, motors)
+
+    def variables(
+        self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Result variables of the dampers by name, (..., joints); none if there are no dampers."""
+        if self._absent.all():
+            return {}
+        damping = commanded[DAMPING.key]
+        torque = add(self.of_links(commanded, dq).tau, self.passed(commanded, dq, dtheta).links)
+        return {"damping": damping, "tau_damper": np.where(self._absent, np.nan, torque)}

@@ -11,8 +11,9 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, finite, has, not_finite_flags
+from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
@@ -23,7 +24,7 @@ class Drive(NamedTuple):
 
     The names are those of the result variables. Where a step is infeasible everything of the motors is NaN,
     where it is singular what needs the inverse of the decoupling matrix is. What the actuator does not have
-    is NaN throughout.
+    is NaN throughout; what belongs to devices that the joint does not have is None.
     """
 
     stiffness: FloatArray
@@ -42,6 +43,11 @@ class Drive(NamedTuple):
     stiffness_lower: FloatArray
     stiffness_upper: FloatArray
     flags: FlagArray
+    tau_damper: FloatArray | None = None
+
+    def arrays(self) -> dict[str, AnyArray]:
+        """Those there are, by name."""
+        return {name: values for name, values in self._asdict().items() if values is not None}
 
 
 def drive(
@@ -72,9 +78,10 @@ def drive(
         dtheta=dtheta,
         tau_motor=tau_motor,
         motor_power=tau_motor * dtheta,
+        tau_damper=command.commanded[DAMPING.key] * command.dq if joint.damper else None,
     )
     driven = driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
-    of_joint = {**command.arrays(), **driven._asdict()}
+    of_joint = {**command.arrays(), **driven.arrays()}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
     unexplained = not_finite_flags(_not_finite(joint, of_joint))
     return driven._replace(flags=driven.flags | exceeded | unexplained)

@@ -213,8 +213,8 @@ def _damping_rows(
     """The damping and its derivatives, if there are dampers between the links."""
     if not link_damped(robot):
         return
-    least = [joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints]
-    for name, array, default in zip(DAMPING.names, given, (least, 0.0, 0.0), strict=True):
+    least = np.array([joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints])
+    for name, array, default in zip(DAMPING.names, given, (least, 0 * least, 0 * least), strict=True):
         values = np.broadcast_to(default, shape) if array is None else np.asarray(array, dtype=np.float64)
         if values.shape != shape:
             raise InputError.one(f"{name} must have the shape {shape} of q, not {values.shape}")

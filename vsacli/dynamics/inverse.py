@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
 COMPUTED = (*TORQUES, *Drive._fields)
-"""The variables that inverse dynamics computes."""
+"""The variables that inverse dynamics computes, where the robot has them."""
 
 
 def usual_block(joints: int) -> int:
@@ -88,9 +89,13 @@ class InverseDynamics(RowKernel):
     @property
     def results(self) -> RowLayout:
         """Rows that inverse dynamics gives."""
-        joints = len(self.robot.joints)
-        of_motors = {name for name in COMPUTED if "motor" in VARIABLES[name].dims}
-        return RowLayout({name: (joints, SIDES) if name in of_motors else (joints,) for name in COMPUTED})
+        joints, declared = len(self.robot.joints), [VARIABLES[name] for name in COMPUTED]
+        shapes = {
+            variable.name: (joints, SIDES) if "motor" in variable.dims else (joints,)
+            for variable in declared
+            if self.robot.has(variable)
+        }
+        return RowLayout(shapes)
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74)."""
@@ -109,7 +114,12 @@ class InverseDynamics(RowKernel):
             for index, joint in enumerate(self.robot.joints)
         ]
         driven = {name: [getattr(each, name) for each in drives] for name in Drive._fields}
-        return self.results.pack({**torques, **{name: _rows(of_all) for name, of_all in driven.items()}})
+        absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(drives[0].dtheta, np.nan)}
+        computed: dict[str, Iterable[Scalar]] = {
+            name: _rows(absent[len(VARIABLES[name].dims)] if array is None else array for array in of_all)
+            for name, of_all in driven.items()
+        }
+        return self.results.pack({**torques, **computed})
 
 
 def _as_row(torque: Scalar, row: Scalar) -> Scalar:
@@ -155,7 +165,9 @@ def _rows(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
 
 def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
     """tau_e, dtau_e and ddtau_e, (58)-(60), by name, each (samples, joints); the stiffness plays no part."""
-    damping = {name: motion.commanded[name] for name in DAMPING.names if name in motion.commanded}
+    damping: dict[str, Any] = {
+        name: motion.commanded[name] for name in DAMPING.names if name in motion.commanded
+    }
     return link_torques(
         robot, motion.q, motion.dq, motion.ddq, motion.d3q, motion.d4q, motion.wrench, **damping
     )._asdict()

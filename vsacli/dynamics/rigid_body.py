@@ -168,9 +168,8 @@ def chain_of(robot: Robot, frame: str | None = None) -> Chain:
         robot: whose base and tool count, but neither its actuators nor its dampers.
         frame: of the wrench at the end effector, as in `Wrench`; None if there is none.
     """
-    joints = tuple(
-        replace(joint, actuator=_ANY_DRIVE, damper=None, limits=Limits()) for joint in robot.joints
-    )
+    bare: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
+    joints = tuple(replace(joint, **bare) for joint in robot.joints)
     return _recorded(
         Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints), frame
     )

@@ -120,8 +120,10 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
     }
     if stiffness:
         values["stiffness"] = {"type": "polynomial", "degree": STIFFNESS_DEGREE, **stiffness}
-    further = [] if robot is None else sorted(CommandedJoints.of(robot).taken - {"stiffness"})
+    further = [] if robot is None else sorted(CommandedJoints.of(robot).taken - {"stiffness", "damping"})
     values |= {key: {"type": "constant", "value": 1} for key in further}
+    if robot is not None and (damping := _damping(robot)):
+        values["damping"] = {"type": "constant", "value": damping}
     if robot is None:
         return _trajectory_document(values)
     from vsacli.files.starter import possible_duration
@@ -191,6 +193,11 @@ def _stiffnesses(joint: Joint, load: float, q: float) -> tuple[float, float]:
     if not 0 < stiff <= upper:
         soft, stiff = lower + (upper - lower) / 3, lower + (upper - lower) * 2 / 3
     return soft, stiff
+
+
+def _damping(robot: Robot) -> Values:
+    """In the middle of what each damper can have."""
+    return {joint.name: sum(joint.damper.range) / 2 for joint in robot.joints if joint.damper is not None}
 
 
 def _rounded(value: float) -> float:

@@ -25,8 +25,10 @@ DRIVE_NAMES = (
 
 
 def motion_structure(robot: Robot) -> Structure:
-    """Position and its derivatives."""
-    return Structure("motion", "Motion of the joints.", _arrays(robot, POSITION.names))
+    """Position and its derivatives; damping between the links, if there is any."""
+    return Structure(
+        "motion", "Motion of the joints.", _arrays(robot, tuple(LinkTorques(robot).arguments.shapes))
+    )
 
 
 def command_structure(robot: Robot) -> Structure:

@@ -12,6 +12,7 @@ from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.interface import Array, Function
 from vsacli.control.codegen.scalar import included
 from vsacli.control.gains import STIFFNESS_ORDER
+from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
@@ -39,7 +40,7 @@ class Reference:
         self._rng = np.random.default_rng(1)
         command = self._command()
         self._inputs = {
-            "motion": {name: command[name] for name in POSITION.names},
+            "motion": {name: command[name] for name in LinkTorques(robot).arguments.shapes},
             "command": command,
             "state": self._state(command),
             "integral": {name: self._drawn(scale) for name, scale in (("q", 1e-3), ("stiffness", 1.0))},

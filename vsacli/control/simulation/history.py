@@ -69,6 +69,7 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
         "motor_power": tau_motor * dtheta,
         "motor_energy": _work(theta, tau_motor, held=integrated.held),
         "det_A": drivetrain.determinant(phase.q, phase.theta),
+        **plant.dampers.variables(loop.reference.damping(integrated.time), phase.dq, phase.dtheta),
     }
 
 
