@@ -232,7 +232,8 @@ def test_perturbation_touches_every_dynamic_parameter_and_nothing_else():
 
 def test_every_declared_variable_is_in_the_history():
     past = simulate(vsa_3r(), short_motion(3)).history
-    assert list(past.arrays()) == list(SIMULATION_VARIABLES)
+    has = vsa_3r().has
+    assert list(past.arrays()) == [name for name, each in SIMULATION_VARIABLES.items() if has(each)]
 
 
 def test_the_report_is_plain_json():
