@@ -13,6 +13,8 @@ import sympy
 from samples.full_model import Drive, Potential, springs_of
 from vsacli.actuators.mechanisms.awas import Awas
 from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.mechanisms.potential import Potential as OwnPotential
+from vsacli.actuators.mechanisms.potential import Ranges, Start
 from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.serial import Serial
@@ -81,6 +83,17 @@ def _maccepa(k: float, b: float, c: float, r: float) -> Potential:
     return energy
 
 
+def _bowed(k: float, lead: float, bow: float) -> Potential:
+    """A spring whose arm of the link changes with the position of the joint."""
+    return lambda q, theta_1, theta_2: (
+        k / 2 * (lead * theta_2) ** 2 * (theta_1 - q - bow * sympy.sin(2 * q)) ** 2
+    )
+
+
+def _two_springs(k: float, k_c: float) -> Potential:
+    return lambda q, *theta: sum(k / 2 * (each - q) ** 2 + k_c / 4 * (each - q) ** 4 for each in theta)
+
+
 DEVICES = {
     "awas": Device(
         mechanism=Awas(k=50000, arm=(0.02, 0.12), lead=0.01),
@@ -113,6 +126,30 @@ DEVICES = {
         settings=(-2.5, -0.5),
         anchor=0,
         scanned=(-1.6, 1.6),
+    ),
+    "potential, the arm of the link changes with q": Device(
+        mechanism=OwnPotential(
+            energy="k/2*(r*theta_2)^2 * (phi - bow*sin(2*q))^2",
+            constants=(("k", 50000), ("r", 0.01), ("bow", 0.1)),
+            start=Start(theta_1=0, theta_2=10),
+            range=Ranges(phi=(-0.8, 0.8), theta_2=(4, 20)),
+        ),
+        potential=_bowed(50000, 0.01, 0.1),
+        stiffness=(300, 500),
+        deflections=(-0.2, 0.2),
+        settings=(5, 15),
+    ),
+    "potential, two springs": Device(
+        mechanism=OwnPotential(
+            energy="k/2*((theta_1 - q)^2 + (theta_2 - q)^2) + k_c/4*((theta_1 - q)^4 + (theta_2 - q)^4)",
+            constants=(("k", 400), ("k_c", 2000)),
+            start=Start(theta_1=0.2, theta_2=-0.2),
+            range=Ranges(phi=(-1, 1), theta_2=(-5, 5)),
+        ),
+        potential=_two_springs(400, 2000),
+        stiffness=(900, 1200),
+        deflections=(0.1, 0.3),
+        settings=(-0.3, -0.1),
     ),
 }
 """By the name of the mechanism, and what is special about the device."""

@@ -12,6 +12,7 @@ MECHANISMS = LazyRegistry(
         "awas": "vsacli.actuators.mechanisms.awas:Awas",
         "cam": "vsacli.actuators.mechanisms.preloaded_cams.cam:Cam",
         "maccepa": "vsacli.actuators.mechanisms.preloaded_cams.maccepa:Maccepa",
+        "potential": "vsacli.actuators.mechanisms.potential:Potential",
     }
 )
 """Mechanisms by the name they have in a robot file."""

@@ -1,0 +1,313 @@
+"""Where a potential has a torque and a stiffness: on the branch that belongs to a start.
+
+At a given torque and position of the joint, the points (phi, theta_2) with that torque form a level curve.
+Along it the stiffness changes with the sine of the angle between the gradients of torque and stiffness, whose
+zeros are those of det A; so it is monotone on the piece between two of them. From the start on, torque and
+position are moved to those of the sample, by steps that stay on such a piece; then the piece is followed to
+both ends, and to the stiffness that is asked for. A step that might leave it is not taken.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.mechanisms.potential_energy import ROWS, PotentialEnergy
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.control_flow import Values, repeat
+
+MAX_STEP = 0.1
+"""Longest step, as a part of the ranges."""
+
+LEAST_STEP = 1e-13
+"""Length at which a step is none."""
+
+LEAST_COSINE = 0.95
+"""Of the angle by which the level curve may turn in a step."""
+
+LEAST_SHARE = 0.25
+"""Part of the stiffness, and of the sine, that a step must leave; so it passes no zero."""
+
+SHORT = 1e-3
+"""Step, as a part of the ranges, in which the stiffness is not looked at; of the motion from the start it is
+none along the level curve."""
+
+MOST_UNEXPLAINED = 0.1
+"""Part of the change of stiffness that its slopes at both ends of a step need not explain; where the slope
+changes its sign twice in between, they explain little."""
+
+LEVEL_ERROR = 1e-5
+"""Distance from the level curve, as a part of the ranges, that the next step makes up for."""
+
+CONTRACTION = 0.1
+"""Part of a correction of Newton's method that the next one may be, for the method to converge."""
+
+LEAST_SINE = 1e-8
+"""Sine that is zero; the stiffness then differs from that of the critical point by the square of this."""
+
+LEAST_STIFFNESS = 1e-9
+"""Part of the stiffness at the start that is none."""
+
+MAX_STEPS = 400
+"""Some 60 do; more only where the level curve winds."""
+
+RESIDUAL = 1e-10
+"""Largest error of a solution: of the stiffness; of the torque, as a part of its change over the ranges."""
+
+
+class Spot(NamedTuple):
+    """A point (phi, theta_2); arrays (samples,).
+
+    Attributes:
+        phi: deflection.
+        s: theta_2.
+        tau_e: elastic torque.
+        stiffness: of the joint.
+        torque_1: change of the torque with phi, over the range of phi.
+        torque_2: the same with theta_2.
+        stiffness_1: change of the stiffness with phi, over the range of phi.
+        stiffness_2: the same with theta_2.
+    """
+
+    phi: FloatArray
+    s: FloatArray
+    tau_e: FloatArray
+    stiffness: FloatArray
+    torque_1: FloatArray
+    torque_2: FloatArray
+    stiffness_1: FloatArray
+    stiffness_2: FloatArray
+
+    @property
+    def steepness(self) -> FloatArray:
+        """Length of the torque's gradient."""
+        return _length(self.torque_1, self.torque_2)
+
+    @property
+    def sine(self) -> FloatArray:
+        """Of the angle from the torque's gradient to that of the stiffness: zero where A is singular."""
+        determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
+        return determinant / (self.steepness * _length(self.stiffness_1, self.stiffness_2))
+
+    @property
+    def slope(self) -> FloatArray:
+        """Of the stiffness along the level curve."""
+        return (self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1) / self.steepness
+
+    @property
+    def along(self) -> tuple[FloatArray, FloatArray]:
+        """Direction of the level curve, as a part of the ranges; the stiffness grows with the sine."""
+        return -self.torque_2 / self.steepness, self.torque_1 / self.steepness
+
+    def onto(self, tau_e: FloatArray, width: tuple[float, float]) -> Spot:
+        """Where the level curve of a torque close by is, and the stiffness there, to first order."""
+        share = (tau_e - self.tau_e) / (self.torque_1 * self.torque_1 + self.torque_2 * self.torque_2)
+        by_torque = self.stiffness_1 * self.torque_1 + self.stiffness_2 * self.torque_2
+        return self._replace(
+            phi=self.phi + width[0] * self.torque_1 * share,
+            s=self.s + width[1] * self.torque_2 * share,
+            stiffness=self.stiffness + by_torque * share,
+        )
+
+    def chosen(self, mask: BoolArray, other: Spot) -> Spot:
+        """This one where the mask holds, else the other."""
+        return Spot(*(np.where(mask, *pair) for pair in zip(self, other, strict=True)))
+
+
+def _length(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Of a vector; `numpy.hypot` takes ten times as long to spare numbers that no joint has."""
+    return np.sqrt(a * a + b * b)
+
+
+class Branch:
+    """Solutions that are continued from a start.
+
+    Attributes:
+        start: the start, arrays (1,).
+        orientation: sign of the sine on the branch.
+    """
+
+    def __init__(
+        self,
+        potential: PotentialEnergy,
+        start: tuple[float, float],
+        phi_range: tuple[float, float],
+        setting_range: tuple[float, float],
+    ) -> None:
+        self._potential = potential
+        self._low = phi_range[0], setting_range[0]
+        self._width = phi_range[1] - phi_range[0], setting_range[1] - setting_range[0]
+        with np.errstate(all="ignore"):
+            self.start = self._spot(np.array([start[0]]), np.array([start[1]]), np.zeros(1))
+            self.orientation = float(np.sign(self.start.sine[0]))
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
+        """The reachable stiffness, and phi and theta_2 for the one in it; see `Mechanism.solve`."""
+        with np.errstate(all="ignore"):  # trial steps may lead anywhere, and are refused there
+            seed = self._seed(tau_e, q)
+            low = self._walk(seed, -1.0, np.full_like(tau_e, -np.inf), tau_e, q)
+            high = self._walk(seed, 1.0, np.full_like(tau_e, np.inf), tau_e, q)
+            none = low.stiffness <= LEAST_STIFFNESS * self.start.stiffness
+            lower = np.where(none, 0.0, low.stiffness)
+            inside = (stiffness > lower) & (stiffness < high.stiffness)
+            found = self._met(seed, np.where(inside, stiffness, seed.stiffness), tau_e, q)
+            failed = inside & ~self._is_met(found, stiffness, tau_e)
+            end = high.chosen(stiffness >= high.stiffness, low)
+        return PairSolution(
+            lower=np.where(failed, np.nan, lower),
+            upper=np.where(failed, np.nan, high.stiffness),
+            lower_critical=~none & self._is_critical(low),
+            upper_critical=self._is_critical(high),
+            slack_below=np.zeros_like(failed),
+            phi_1=np.where(inside, found.phi, end.phi),
+            phi_2=np.where(inside, found.s, end.s),
+        )
+
+    def _spot(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> Spot:
+        u = self._potential.derivatives(np.stack((phi, s, q), axis=-1), ROWS)
+        rows, (by_phi, by_s) = u.rows, self._width
+        return Spot(
+            phi,
+            s,
+            -u(0),
+            u(0, 0),
+            rows.torque_1 * by_phi,
+            rows.torque_2 * by_s,
+            rows.stiffness_1 * by_phi,
+            rows.stiffness_2 * by_s,
+        )
+
+    def _moved(self, spot: Spot, step: tuple[FloatArray, FloatArray], q: FloatArray) -> Spot:
+        return self._spot(spot.phi + self._width[0] * step[0], spot.s + self._width[1] * step[1], q)
+
+    def _distance(self, spot: Spot) -> FloatArray:
+        """To the nearest end of a range, as a part of it; negative outside."""
+        phi, s = (
+            (value - low) / width for value, low, width in zip(spot[:2], self._low, self._width, strict=True)
+        )
+        return np.minimum(np.minimum(phi, 1 - phi), np.minimum(s, 1 - s))
+
+    def _is_critical(self, spot: Spot) -> BoolArray:
+        critical: BoolArray = np.abs(spot.sine) <= 10 * LEAST_SINE
+        return critical
+
+    def _step(
+        self, spot: Spot, h: FloatArray, tau_e: FloatArray, q: FloatArray, dq: FloatArray | float = 0.0
+    ) -> tuple[Spot, BoolArray]:
+        """A step of length h along a level curve and onto that of tau_e, and whether it stays on the piece.
+
+        Args:
+            spot: where to begin.
+            h: length, as a part of the ranges; the stiffness grows with it if the sine is positive.
+            tau_e: torque wanted.
+            q: position of the joint.
+            dq: how far that is from the position at which the spot was found.
+        """
+        first, second = spot.along
+        by_q = spot.torque_1 / self._width[0] - spot.stiffness  # of the torque, at constant phi and theta_2
+        onto = (tau_e - spot.tau_e - by_q * dq) / (spot.steepness * spot.steepness)
+        step = h * first + onto * spot.torque_1, h * second + onto * spot.torque_2
+        predicted = self._moved(spot, step, q)
+        onto = (tau_e - predicted.tau_e) / (predicted.steepness * predicted.steepness)
+        correction = onto * predicted.torque_1, onto * predicted.torque_2
+        reached = self._moved(spot, (step[0] + correction[0], step[1] + correction[1]), q)
+        size, left = _length(*correction), np.abs(tau_e - reached.tau_e) / reached.steepness
+        explained = h * (spot.slope + reached.slope) / 2
+        change = reached.onto(tau_e, self._width).stiffness - spot.onto(tau_e, self._width).stiffness
+        turned = first * reached.along[0] + second * reached.along[1]
+        stays = (
+            (_length(step[0], step[1]) + size <= 2 * MAX_STEP)
+            & (left <= np.minimum(CONTRACTION * size + LEAST_STEP, LEVEL_ERROR))
+            & (turned >= LEAST_COSINE)
+            & ((np.abs(h) < SHORT) | (np.abs(change - explained) <= MOST_UNEXPLAINED * np.abs(explained)))
+            & (reached.stiffness >= LEAST_SHARE * spot.stiffness)
+            & (reached.sine * self.orientation >= LEAST_SHARE * spot.sine * self.orientation)
+        )
+        return reached, stays
+
+    def _seed(self, tau_e: FloatArray, q: FloatArray) -> Spot:
+        """A point of the branch at torques and positions, NaN where there is none.
+
+        While these move to their values in proportion, the point moves along the level curve towards where it
+        has room on all sides, so that it goes on where the piece becomes short.
+        """
+
+        def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+            share, gain, h, *values = state
+            spot, (tau_e, q) = Spot(*values), constants
+            start = self.start.tau_e + np.zeros_like(tau_e)
+            target = np.minimum(share + gain, 1.0)
+            reached, stays = self._step(
+                spot, np.zeros_like(h), start + target * (tau_e - start), target * q, (target - share) * q
+            )
+            stays = stays & (self._distance(reached) >= 0)
+            spot, share = reached.chosen(stays, spot), np.where(stays, target, share)
+            aside, better = self._step(spot, h, start + share * (tau_e - start), share * q)
+            better = better & (self._room(aside) > self._room(spot)) & (self._distance(aside) >= 0)
+            h = np.where(better, 1.5 * h, -h / 2)
+            h = np.where(np.abs(h) > MAX_STEP, MAX_STEP, h)
+            gain = np.where(stays, 2 * gain, gain / 3)
+            return (share, gain, h, *aside.chosen(better, spot)), (share == 1) | ~(gain > LEAST_STEP)
+
+        like = np.zeros_like(tau_e)
+        begin = (like, like + 0.25, like + 0.02, *(like + each for each in self.start))
+        share, _, _, *values = repeat(step, begin, (tau_e, q), MAX_STEPS)
+        return Spot(*(np.where(share == 1, each, np.nan) for each in values))
+
+    def _room(self, spot: Spot) -> FloatArray:
+        """How far a point is from all ends of the piece."""
+        room: FloatArray = np.abs(spot.sine) * spot.stiffness
+        for value, low, width in zip(spot[:2], self._low, self._width, strict=True):
+            part = (value - low) / width
+            room = room * part * (1 - part)
+        return room
+
+    def _walk(
+        self, seed: Spot, direction: FloatArray | float, goal: FloatArray, tau_e: FloatArray, q: FloatArray
+    ) -> Spot:
+        """Where the piece ends or meets the goal; direction 1 is that of growing, -1 of falling stiffness."""
+
+        def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+            h, *values = state
+            spot, (direction, goal, tau_e, q) = Spot(*values), constants
+            reached, stays = self._step(spot, h * direction * self.orientation, tau_e, q)
+            here, there = (
+                np.minimum(self._distance(each), direction * (goal - each.stiffness) / spot.stiffness)
+                for each in (spot.onto(tau_e, self._width), reached.onto(tau_e, self._width))
+            )
+            inside = stays & (there >= 0)
+            share = np.where(stays, np.minimum(np.maximum(here / (here - there), 0.02), 0.98), 1 / 3)
+            over = ~inside & ((h * share <= LEAST_STEP) | (here <= LEAST_STEP))
+            spot = reached.chosen(inside, spot)
+            none = spot.stiffness <= LEAST_STIFFNESS * self.start.stiffness
+            h = np.where(inside, np.minimum(1.5 * h, MAX_STEP), h * share)
+            return (h, *spot), over | none | ~(spot.sine * self.orientation > LEAST_SINE)
+
+        like = np.zeros_like(tau_e)
+        begin = (like + MAX_STEP / 4, *seed)
+        _, *values = repeat(step, begin, (like + direction, goal, tau_e, q), MAX_STEPS)
+        end = Spot(*values).onto(tau_e, self._width)
+        return self._spot(end.phi, end.s, q)
+
+    def _met(self, seed: Spot, demand: FloatArray, tau_e: FloatArray, q: FloatArray) -> Spot:
+        """The point of the piece with a stiffness; near it, by Newton's method for torque and stiffness."""
+        direction = np.where(demand >= seed.stiffness, 1.0, -1.0)
+        spot = self._walk(seed, direction, demand, tau_e, q)
+        for _ in range(2):
+            missing = tau_e - spot.tau_e, demand - spot.stiffness
+            determinant = spot.torque_1 * spot.stiffness_2 - spot.torque_2 * spot.stiffness_1
+            step = (
+                (spot.stiffness_2 * missing[0] - spot.torque_2 * missing[1]) / determinant,
+                (spot.torque_1 * missing[1] - spot.stiffness_1 * missing[0]) / determinant,
+            )
+            small = _length(*step) <= np.abs(spot.sine) * CONTRACTION
+            spot = self._moved(spot, (np.where(small, step[0], 0.0), np.where(small, step[1], 0.0)), q)
+        return spot
+
+    def _is_met(self, spot: Spot, demand: FloatArray, tau_e: FloatArray) -> BoolArray:
+        met: BoolArray = (np.abs(tau_e - spot.tau_e) <= RESIDUAL * spot.steepness) & (
+            np.abs(demand - spot.stiffness) <= RESIDUAL * self.start.stiffness + RESIDUAL * demand
+        )
+        return met

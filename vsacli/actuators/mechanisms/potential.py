@@ -1,0 +1,191 @@
+"""A mechanism of one's own: its potential is written in the robot file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.mechanisms.level_curve import Branch
+from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.mechanisms.potential_energy import (
+    ACCELERATIONS,
+    RESERVED,
+    PotentialEnergy,
+    PotentialState,
+    read_energy,
+)
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import FieldProblem
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.fields import (
+    FINITE,
+    NamedNumbers,
+    Record,
+    check_fields,
+    interval,
+    number,
+    text,
+    value,
+)
+
+_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+LEAST_START_SINE = 1e-6
+"""Sine of the angle between the gradients of torque and stiffness at the start, relative to the ranges, below
+which A is taken for singular."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """A state of the springs that names the branch."""
+
+    theta_1: float = number(units.POSITION, "position of motor 1")
+    theta_2: float = number(units.POSITION, "position of motor 2")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class Ranges:
+    """Where the potential holds."""
+
+    phi: tuple[float, float] = interval(units.POSITION, "deflection theta_1 - q")
+    theta_2: tuple[float, float] = interval(units.POSITION, "position of motor 2")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True)
+class Potential(Mechanism):
+    """Springs of any kind, by the energy that they store."""
+
+    energy: str = text(
+        "energy of the springs, J: an expression of `q`, `theta_1`, `theta_2`, `phi` (which is theta_1 - q), "
+        "`pi` and the constants, with + - * / ^, parentheses, sin, cos, tan, sqrt, exp and log"
+    )
+    constants: tuple[tuple[str, float], ...] = value(
+        NamedNumbers(), "constants of the energy by name", check=FINITE, default=()
+    )
+    start: Start = value(Record(Start), "where q = 0: motor positions that name the branch")
+    range: Ranges = value(Record(Ranges), "where the energy holds; its ends bound the stiffness")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        check_fields(self, *self._problems())
+
+    @classmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
+        """A spring on an arm whose length motor 2 sets."""
+        return {
+            "energy": "k/2 * (r*theta_2)^2 * sin(phi)^2",
+            "constants": {"k": 100000, "r": 0.01},
+            "start": {"theta_1": 0, "theta_2": 8},
+            "range": {"phi": [-0.7, 0.7], "theta_2": [5, 12]},
+        }
+
+    @property
+    def deflection_range(self) -> tuple[float, float]:
+        """That of phi."""
+        return self.range.phi
+
+    @property
+    def setting_range(self) -> tuple[float, float]:
+        """That of theta_2."""
+        return self.range.theta_2
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
+        """On the branch of the start."""
+        return self._branch.solve(tau_e, stiffness, q)
+
+    def state(self, coordinates: FloatArray) -> PotentialState:
+        """The potential with its derivatives."""
+        return PotentialState(self._potential, coordinates)
+
+    @cached_property
+    def _potential(self) -> PotentialEnergy:
+        constants = dict(self.constants)
+        return PotentialEnergy(read_energy(self.energy, constants), constants)
+
+    @cached_property
+    def _branch(self) -> Branch:
+        start = self.start.theta_1, self.start.theta_2
+        return Branch(self._potential, start, self.range.phi, self.range.theta_2)
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        """What is wrong with the energy; and with the branch, once the rest is right."""
+        found = [*self._word_problems(), *self._range_problems()]
+        yield from found or self._branch_problems()
+
+    def _word_problems(self) -> Iterator[FieldProblem]:
+        constants = dict(self.constants)
+        for name in constants:
+            if not _WORD.fullmatch(name):
+                yield FieldProblem(
+                    ("constants", name), "must be made of letters, digits and _, not beginning with a digit"
+                )
+            elif name in RESERVED:
+                yield FieldProblem(
+                    ("constants", name), "has a meaning of its own in the energy; choose another name"
+                )
+        if RESERVED.intersection(constants):
+            return
+        try:
+            names = read_energy(self.energy, constants).names
+        except ExpressionError as error:
+            yield FieldProblem(("energy",), str(error))
+            return
+        yield from (
+            FieldProblem(("constants", name), "does not occur in the energy")
+            for name in constants
+            if name not in names
+        )
+        for needed in (("theta_2",), ("theta_1", "phi"), ("q", "phi")):
+            if names.isdisjoint(needed):
+                yield FieldProblem(("energy",), f"does not depend on {needed[0]}")
+
+    def _range_problems(self) -> Iterator[FieldProblem]:
+        at_start = {"phi": self.start.theta_1, "theta_2": self.start.theta_2}
+        for name, position in at_start.items():
+            low, high = getattr(self.range, name)
+            if not low < high:
+                yield FieldProblem(("range", name), "must have two ends, the lower one first")
+            elif not low < position < high:
+                motor = "theta_1" if name == "phi" else name
+                reason = f"must lie within the range of {name}, {low:g} to {high:g}, not at {position:g}"
+                yield FieldProblem(("start", motor), reason)
+
+    def _branch_problems(self) -> Iterator[FieldProblem]:
+        """The state at the start, and whether the stiffness can be followed from there to both its ends."""
+        start = self._branch.start
+        with np.errstate(all="ignore"):
+            (sine,), (stiffness,) = np.abs(start.sine), start.stiffness
+            at_start = np.array([[self.start.theta_1, self.start.theta_2, 0.0]])
+            known = self._potential.derivatives(at_start, ACCELERATIONS).finite
+        if not known.all():
+            reason = (
+                "the energy or one of its derivatives, of which four are needed, is no finite number here"
+            )
+        elif stiffness <= 0:
+            reason = f"the stiffness, the second derivative over q, must be positive here, not {stiffness:g}"
+        elif not sine > LEAST_START_SINE:
+            reason = "the matrix A is singular here: motors that keep the torque cannot change the stiffness"
+        elif not self._is_followed:
+            reason = "the stiffness cannot be followed from here to its least and its largest value"
+        else:
+            return
+        yield FieldProblem(("start",), f"{reason}; choose another state")
+
+    @property
+    def _is_followed(self) -> bool:
+        start = self._branch.start
+        solution = self.solve(start.tau_e, start.stiffness, np.zeros(1))
+        return bool((solution.lower < solution.upper)[0])

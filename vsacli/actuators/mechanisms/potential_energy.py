@@ -1,0 +1,210 @@
+"""An elastic potential U(q, theta_1, theta_2) that a file states as an expression, with its derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from vsacli.actuators.mechanisms.state import DecouplingRows, MechanismState
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.jets import FUNCTIONS, Order, Truncation
+from vsacli.documents.expression import Expression, Grammar, parse
+
+if TYPE_CHECKING:
+    from vsacli.compute.tracing.python_code import RowFunction
+
+VARIABLES = ("q", "theta_1", "theta_2", "phi")
+"""Words for positions; phi is theta_1 - q."""
+
+MAX_LENGTH = 2000
+"""Characters of an expression; a MACCEPA takes 80."""
+
+RESERVED = frozenset({*VARIABLES, "pi", *FUNCTIONS})
+"""Words that no constant may have."""
+
+
+def read_energy(text: str, constants: Mapping[str, float]) -> Expression:
+    """The expression of a potential.
+
+    Raises:
+        ExpressionError: the text is none.
+    """
+    names = (*VARIABLES, "pi", *constants)
+    return parse(
+        text.replace("\n", " "), Grammar(names, tuple(FUNCTIONS), powers=True, max_length=MAX_LENGTH)
+    )
+
+
+def _truncation(of_q: int, of_motors: int, degree: int) -> Truncation:
+    """Derivatives over (q, theta_1, theta_2), at most so many over q, over both motors, and in all."""
+    return Truncation(
+        (a, b, c)
+        for a in range(of_q + 1)
+        for b in range(of_motors + 1)
+        for c in range(of_motors + 1 - b)
+        if a + b + c <= degree
+    )
+
+
+TORQUES, ROWS, ACCELERATIONS = _truncation(1, 1, 1), _truncation(2, 1, 3), _truncation(4, 2, 4)
+"""Derivatives of the potential for the torques; for the stiffness and the matrix A; for the accelerations."""
+
+
+class PotentialEnergy:
+    """A potential with values of its constants."""
+
+    def __init__(self, expression: Expression, constants: Mapping[str, float]) -> None:
+        self._expression = expression
+        self._constants = {name: np.float64(number) for name, number in constants.items()}
+        self._row_functions: dict[Truncation, RowFunction] = {}
+
+    def derivatives(self, coordinates: FloatArray, truncation: Truncation) -> Derivatives:
+        """Its derivatives over q, theta_1 and theta_2 at coordinates (..., 3): phi, theta_2 and q.
+
+        Numbers are computed by the program of the series: NumPy without it would take ten times as long, to
+        find its way through the orders.
+        """
+        rows = [coordinates[..., number] for number in range(3)]
+        if not isinstance(coordinates, np.ndarray):
+            return Derivatives(dict(zip(truncation.orders, self._series(rows, truncation), strict=True)))
+        if truncation not in self._row_functions:
+            self._row_functions[truncation] = self._traced(truncation)
+        function, shape = self._row_functions[truncation], coordinates.shape[:-1]
+        flat = [row.ravel() for row in rows]
+        values = np.empty((len(truncation.orders), flat[0].size))
+        function(flat, values, function.workspace(flat[0].size))
+        return Derivatives(dict(zip(truncation.orders, values.reshape(-1, *shape), strict=True)))
+
+    def _traced(self, truncation: Truncation) -> RowFunction:
+        from vsacli.compute.tracing import Kind, trace
+        from vsacli.compute.tracing.python_code import RowFunction
+
+        return RowFunction(trace(lambda rows: self._series(rows, truncation), [Kind.REAL] * 3))
+
+    def _series(self, coordinates: Sequence[FloatArray], truncation: Truncation) -> list[FloatArray]:
+        """The derivatives in the truncation's order, from rows of phi, theta_2 and q."""
+        phi, s, q = coordinates
+        names = {
+            "q": truncation.linear(q, (1, 0, 0)),
+            "theta_1": truncation.linear(phi + q, (0, 1, 0)),
+            "theta_2": truncation.linear(s, (0, 0, 1)),
+            "phi": truncation.linear(phi, (-1, 1, 0)),
+            "pi": np.float64(np.pi),
+            **self._constants,
+        }
+        zero = np.zeros_like(phi)
+        energy = self._expression.value(names, FUNCTIONS, np.float64) + truncation.linear(zero, (0, 0, 0))
+        return [energy.derivative(order) + zero for order in truncation.orders]
+
+
+class Derivatives:
+    """Derivatives of a potential over q, theta_1 and theta_2, by how often it is differentiated over each."""
+
+    def __init__(self, by_order: Mapping[Order, FloatArray]) -> None:
+        self._by_order = by_order
+
+    def __call__(self, *variables: int) -> FloatArray:
+        """The derivative over variables, each by its number 0, 1 or 2."""
+        return self._by_order[variables.count(0), variables.count(1), variables.count(2)]
+
+    @property
+    def finite(self) -> BoolArray:
+        """Where all of them are finite."""
+        return np.asarray(np.isfinite(list(self._by_order.values())).all(axis=0))
+
+    @property
+    def rows(self) -> DecouplingRows:
+        """The matrix A of tau_e = -U_q and the stiffness U_qq over theta_1 and theta_2."""
+        return DecouplingRows(-self(0, 1), -self(0, 2), self(0, 0, 1), self(0, 0, 2))
+
+
+class PotentialState(MechanismState):
+    """The springs of a potential that depends on q, theta_1 and theta_2 in any way.
+
+    With x = (q, theta_1, theta_2) and y = (tau_e, sigma) = (-U_q, U_qq),
+
+        A theta'  = y'  - y_q q'
+        A theta'' = y'' - y_q q'' - (x'^T H x' of either), H the second derivatives of y over x.
+    """
+
+    def __init__(self, potential: PotentialEnergy, coordinates: FloatArray) -> None:
+        self._potential, self._coordinates = potential, coordinates
+
+    @cached_property
+    def _first(self) -> Derivatives:
+        return self._potential.derivatives(self._coordinates, TORQUES)
+
+    @cached_property
+    def _all(self) -> Derivatives:
+        return self._potential.derivatives(self._coordinates, ACCELERATIONS)
+
+    @property
+    def energy(self) -> FloatArray:
+        """U."""
+        return self._first()
+
+    @property
+    def tau_e(self) -> FloatArray:
+        """-U_q."""
+        return -self._first(0)
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """U_qq."""
+        return self._all(0, 0)
+
+    @property
+    def tau_spring(self) -> FloatArray:
+        """Derivatives of U over theta_1 and theta_2."""
+        return np.stack((self._first(1), self._first(2)), axis=-1)
+
+    @property
+    def rows(self) -> DecouplingRows:
+        """Derivatives of tau_e and the stiffness over theta_1 and theta_2."""
+        return self._all.rows
+
+    def torque_rate(self, rates: FloatArray) -> FloatArray:
+        """Of -U_q."""
+        return -self._rate((0,), rates)
+
+    def stiffness_rate(self, rates: FloatArray) -> FloatArray:
+        """Of U_qq."""
+        return self._rate((0, 0), rates)
+
+    def spring_rates(self, rates: FloatArray) -> FloatArray:
+        """Of the derivatives over theta_1 and theta_2."""
+        return np.stack((self._rate((1,), rates), self._rate((2,), rates)), axis=-1)
+
+    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
+        """A^-1 (y' - y_q q'), with phi' = theta_1' - q'."""
+        u = self._all
+        dtheta_1, dtheta_2 = self.rows.solve(dtau_e + u(0, 0) * dq, dstiffness - u(0, 0, 0) * dq)
+        return np.stack((dtheta_1 - dq, dtheta_2, dq), axis=-1)
+
+    def motor_accelerations(
+        self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> FloatArray:
+        """A^-1 (y'' - y_q q'' - what is quadratic in the rates)."""
+        u = self._all
+        torque_row = ddtau_e + u(0, 0) * ddq + self._curvature((0,), rates)
+        stiffness_row = ddstiffness - u(0, 0, 0) * ddq - self._curvature((0, 0), rates)
+        return np.stack(self.rows.solve(torque_row, stiffness_row), axis=-1)
+
+    def _rate(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
+        """Rate of a derivative of the potential."""
+        return sum((self._all(*of, i) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0]))
+
+    def _curvature(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:
+        """What is quadratic in the rates in the second time derivative of a derivative of the potential."""
+        return sum(
+            (self._rate((*of, i), rates) * each for i, each in _motion(rates)), np.zeros_like(rates[..., 0])
+        )
+
+
+def _motion(rates: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+    """Rates of q, theta_1 and theta_2 with their numbers, from those of the coordinates."""
+    dphi, ds, dq = (rates[..., number] for number in range(3))
+    return enumerate((dq, dphi + dq, ds))
