@@ -78,7 +78,7 @@ def compare(samples: int, repeats: int) -> list[Recorder]:
         seconds = medians(ways, repeats)
         own = sum(path.stat().st_size for path in Path(vsacli.compute.tracing.__path__[0]).glob("*.py"))
         theirs = sum(Path(file.locate()).stat().st_size for file in files("casadi") or ())
-        operations = {OURS: len(function.program().operations), CASADI: casadi.operations}
+        operations = {OURS: len(function.program.operations), CASADI: casadi.operations}
         sizes = {OURS: own, CASADI: theirs}
         sources = {OURS: folder / "arm.c", CASADI: folder / "peer.c"}
         return [

@@ -10,6 +10,7 @@ import time
 import h5py
 import pytest
 from samples.command_line import COMMAND, ROBOT, SEVEN_JOINTS, contents, installed, seven_joint_motion
+from samples.disturbed import allow_interrupts
 
 PATIENCE = 60
 """Seconds until a run that should have started writing counts as broken."""
@@ -21,12 +22,6 @@ ENDINGS = {
     signal.SIGHUP: (129, "ended from outside by SIGHUP"),
 }
 """Exit code and message of a run that a signal ends; the codes are those of shells, 128 and the number."""
-
-
-def allow_interrupts():
-    """In a child process: undo that a parent may ignore signals, as shells do for background jobs."""
-    for number in ENDINGS:
-        signal.signal(number, signal.SIG_DFL)
 
 
 def started(*command, folder, before=allow_interrupts, **options):

@@ -18,8 +18,10 @@ from samples.robots import random_robot
 from samples.shipped import shipped_robot
 from samples.springs import SPRINGS
 
+from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.variables import VARIABLES
+from vsacli.control.codegen import interface
 from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
 from vsacli.dynamics.inverse import compute_block
@@ -241,3 +243,20 @@ def test_files_of_two_robots_do_not_go_together(tmp_path: Path) -> None:
         done = subprocess.run(command, cwd=tmp_path / "new", capture_output=True, text=True, check=False)
         assert done.returncode != 0
         assert "this file and vsa_3r.h were not written together: generate both again" in done.stderr
+
+
+def test_a_function_of_too_many_operations_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The limit is not reached by any arm; the recursion of this one takes 4300, feedback 6300."""
+    monkeypatch.setattr(interface, "MOST_RECORDED", 5800)
+    made = generate(shipped_robot("lwr_7r_vsa"))
+    assert made.omitted == ["no feedback_linearization: a step takes more than 5800 operations"]
+    assert "feedback_linearization" not in made.files["lwr_7r_vsa.h"]
+    readme = made.files["README.md"]
+    assert "There is no feedback\\_linearization: a step takes more than 5800 operations.\n" in readme
+
+
+def test_a_robot_of_too_many_operations_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interface, "MOST_RECORDED", 1000)
+    match = "no C code can be made of lwr-7r-vsa: link_torques: a step takes more than 1000 operations"
+    with pytest.raises(InputError, match=match):
+        generate(shipped_robot("lwr_7r_vsa"))

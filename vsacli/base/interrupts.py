@@ -6,6 +6,7 @@ import contextlib
 import signal
 import threading
 from collections.abc import Iterator
+from typing import Any
 
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Ctrl-C, the end of a batch job or its preemption, a terminal that is closed."""
@@ -27,40 +28,61 @@ class Interrupted(BaseException):
 def unwinding_when_ended() -> Iterator[None]:
     """Within this context signals that end a process raise `Interrupted`; after it they end it at once.
 
-    A signal that the parent set to be ignored, as `nohup` does, stays ignored.
+    A signal that the parent set to be ignored, as `nohup` does, stays ignored, and so do those that come once
+    all is written (`Deferred.disregard`).
     """
-    numbers = [number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN]
-    for number in numbers:
-        signal.signal(number, _unwind)
+    for number in ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, _unwind)
     try:
         yield
     finally:
-        for number in numbers:
-            signal.signal(number, signal.SIG_DFL)
+        for number in ENDING:
+            if signal.getsignal(number) is _unwind:
+                signal.signal(number, signal.SIG_DFL)
 
 
 def _unwind(number: int, _frame: object) -> None:
     raise Interrupted(number)
 
 
+class Deferred:
+    """Signals that wait.
+
+    Attributes:
+        handlers: what they do afterwards.
+        arrived: those that came meanwhile.
+    """
+
+    def __init__(self) -> None:
+        handlers = {number: signal.getsignal(number) for number in ENDING}
+        self.handlers: dict[int, Any] = {each: how for each, how in handlers.items() if callable(how)}
+        self.arrived: list[int] = []
+
+    def disregard(self) -> None:
+        """Ignore those that would unwind the run, now and later: what it is to do is done."""
+        for number, handler in self.handlers.items():
+            if handler is _unwind:
+                self.handlers[number] = signal.SIG_IGN
+                self.arrived = [each for each in self.arrived if each != number]
+
+
 @contextlib.contextmanager
-def interrupts_deferred() -> Iterator[None]:
+def interrupts_deferred() -> Iterator[Deferred]:
     """Let signals that come during the enclosed statements, and would unwind them, take effect after them.
 
     In a thread other than the main one, where no signal handler ever runs, this does nothing.
     """
+    deferred = Deferred()
     if threading.current_thread() is not threading.main_thread():
-        yield
+        yield deferred
         return
-    arrived: list[int] = []
-    handlers = {number: signal.getsignal(number) for number in ENDING}
-    deferred = {number: handler for number, handler in handlers.items() if callable(handler)}
-    for number in deferred:
-        signal.signal(number, lambda came, _: arrived.append(came))
     try:
-        yield
+        for number in deferred.handlers:
+            signal.signal(number, lambda came, _: deferred.arrived.append(came))
+        yield deferred
     finally:
-        for number, handler in deferred.items():
+        for number, handler in deferred.handlers.items():
             signal.signal(number, handler)
-        if arrived:
-            signal.raise_signal(arrived[0])
+        if deferred.arrived:
+            signal.raise_signal(deferred.arrived[0])

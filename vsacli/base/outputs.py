@@ -75,8 +75,9 @@ class Outputs:
 
     They are checked and staged when they are named, before anything is computed, and get their names when the
     context is left without an exception: all of them, or none if one cannot. A folder that is new appears
-    whole. A process that is killed leaves hidden files at most, which the next one in that folder removes;
-    and while files get their names in a folder that was there, some of them before the others.
+    whole. With that the run counts as done, and signals no longer end it: whoever is told that it was ended
+    finds nothing new. A process that is killed leaves hidden files at most, which the next one in that folder
+    removes; and while files get their names in a folder that was there, some of them before the others.
 
     Args:
         overwrite: whether files that exist may be replaced.
@@ -185,7 +186,7 @@ class Outputs:
         for file in self._files:
             with reporting_storage_errors(file.path):
                 _sync(file.temporary, os.O_RDWR)
-        with interrupts_deferred(), contextlib.ExitStack() as undo:
+        with interrupts_deferred() as interrupts, contextlib.ExitStack() as undo:
             for folder, staged in self._folders.items():
                 with reporting_storage_errors(folder):
                     staged.rename(folder)
@@ -195,6 +196,8 @@ class Outputs:
                     with reporting_storage_errors(file.path):
                         self._name(file, undo)
             undo.pop_all()
+            if self._files:
+                interrupts.disregard()
         for parent in {path.parent for path in self._temporaries}:
             with contextlib.suppress(OSError):  # some file systems cannot sync a folder
                 _sync(parent, os.O_RDONLY)

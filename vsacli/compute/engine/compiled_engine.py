@@ -33,6 +33,9 @@ LONG_SECONDS = 5.0
 MOST_OPERATIONS = 40_000
 """Of a program that is compiled, those of 50 joints with cubic springs: gcc takes 40 s for it and 0.6 GB."""
 
+MOST_RECORDED = 50_000
+"""Operations after which recording ends; some of them, less than a tenth in chains, no output needs."""
+
 
 class Loaded(NamedTuple):
     """A library, and whether it had to be compiled for this process."""
@@ -127,7 +130,7 @@ _loaded: dict[str, Loaded] = {}
 @lru_cache(maxsize=32)
 def _source(kernel: Kernel) -> tuple[str, int]:
     """The code of a kernel, and how many operations it has."""
-    program = kernel_program(kernel)
+    program = kernel_program(kernel, MOST_RECORDED)
     return batch_source(program), operation_count(program)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
@@ -130,8 +131,8 @@ def _row_function(kernel: Kernel) -> RowFunction | None:
         return None
 
 
-def kernel_program(kernel: Kernel) -> Program:
-    """What a kernel does to one sample."""
+def kernel_program(kernel: Kernel, most: int = sys.maxsize) -> Program:
+    """What a kernel does to one sample; arguments and errors as of `trace`."""
     from vsacli.compute.tracing import Kind, trace
 
-    return trace(kernel, [Kind.REAL] * kernel.inputs)
+    return trace(kernel, [Kind.REAL] * kernel.inputs, most)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -146,13 +147,19 @@ def _known(index: Any) -> Any:
     return index.cells.astype(bool)
 
 
-def trace(function: Callable[[Sequence[Any]], Sequence[Any]], kinds: Sequence[Kind]) -> Program:
+def trace(
+    function: Callable[[Sequence[Any]], Sequence[Any]], kinds: Sequence[Kind], most: int = sys.maxsize
+) -> Program:
     """The program of a function of rows of samples: what it does to one sample.
 
     Args:
         function: from rows of samples to rows of results; each sample is computed by itself.
         kinds: of the rows that it takes.
+        most: operations that are recorded.
+
+    Raises:
+        NotImplementedError: it has no such program, or one of more operations.
     """
-    tape = Tape()
+    tape = Tape(most)
     rows = [TracedArray(tape, [tape.input(kind)]) for kind in kinds]
     return tape.program([cells_of(result).item() for result in function(rows)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Hashable, Sequence
 from typing import Any
 
@@ -22,9 +23,14 @@ from vsacli.compute.tracing.program import (
 
 
 class Tape:
-    """Operations in the order in which they were carried out; a common subexpression is there once."""
+    """Operations in the order in which they were carried out; a common subexpression is there once.
 
-    def __init__(self) -> None:
+    Args:
+        most: how many there may be; with one more it raises NotImplementedError.
+    """
+
+    def __init__(self, most: int = sys.maxsize) -> None:
+        self._most = most
         self._symbols: dict[Hashable, Symbol] = {}
         self._inputs: list[Symbol] = []
 
@@ -73,6 +79,8 @@ class Tape:
     def _new(self, operation: str, operands: tuple[Any, ...], kind: Kind) -> Symbol:
         if any(isinstance(operand, Symbol) and operand.tape is not self for operand in operands):
             raise ValueError("a value of another program is none of this one; pass it as an argument")
+        if len(self._symbols) >= self._most:
+            raise NotImplementedError(f"a step takes more than {self._most} operations")
         symbol = Symbol(self, len(self._symbols), operation, operands, kind)
         fresh = operation in {"input", "loop", "branch"}
         self._symbols[symbol if fresh else _key(operation, operands)] = symbol

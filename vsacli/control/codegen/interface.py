@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any
 
+from vsacli.compute.engine.compiled_engine import MOST_RECORDED
 from vsacli.compute.rows import RowLayout
 from vsacli.compute.tracing import Kind, Program, trace
 
@@ -80,8 +82,15 @@ class Function:
     result: Structure
     compute: Callable[[Rows], Rows]
 
+    @cached_property
     def program(self) -> Program:
-        """What the function does to one sample."""
-        return trace(
-            self.compute, [Kind.REAL] * sum(structure.layout.size for _, structure in self.arguments)
-        )
+        """What the function does to one sample.
+
+        Raises:
+            NotImplementedError: it has no evaluation in a bounded number of operations, or one of too many.
+        """
+        inputs = sum(structure.layout.size for _, structure in self.arguments)
+        try:
+            return trace(self.compute, [Kind.REAL] * inputs, MOST_RECORDED)
+        except NotImplementedError as error:
+            raise NotImplementedError(f"{self.name}: {error}") from error

@@ -99,8 +99,8 @@ def readme_text(
         functions="\n".join(
             f"- `{signature(prefix, function)}`: {function.meaning}" for function in functions
         ),
-        joints=", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names)),
-        omitted="".join(f"There is {sentence(reason)}\n" for reason in omitted),
+        joints=for_markdown(", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names))),
+        omitted="".join(f"There is {for_markdown(sentence(reason))}\n" for reason in omitted),
     )
 
 
@@ -126,13 +126,13 @@ def generate(robot: Robot, precision: str = "double") -> Project:
         precision: type of the numbers, one of `vsacli.control.codegen.scalar.PRECISIONS`.
 
     Raises:
-        InputError: something of the robot has no evaluation in a bounded number of operations.
+        InputError: something of the robot has no evaluation in a bounded number of operations, or too many.
     """
-    functions, omitted = _functions(robot)
     prefix = prefix_of(robot)
     title = f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
     head = comment(" ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)]))
     try:
+        functions, omitted = _functions(robot)
         files = {
             f"{prefix}.h": header_text(prefix, robot, functions, precision, head),
             f"{prefix}.c": source_text(prefix, functions, precision, head),
@@ -152,12 +152,33 @@ def _sealed(files: dict[str, str]) -> dict[str, str]:
 
 
 def _functions(robot: Robot) -> tuple[list[Function], list[str]]:
-    functions, omitted = [link_torques_function(robot), inverse_dynamics_function(robot)], []
+    """Those that there are, and why there are not more.
+
+    The last one grows with the third power of the number of joints, so it is looked at if the others were not
+    too long.
+
+    Raises:
+        NotImplementedError: not even the first two.
+    """
+    makers = (link_torques_function, inverse_dynamics_function)
+    functions, omitted = [_recorded(make(robot)) for make in makers], []
     try:
-        functions.append(feedback_linearization_function(robot))
+        functions.append(_recorded(feedback_linearization_function(robot)))
     except InputError as error:
         omitted.append(f"no feedback_linearization: {error}")
+    except NotImplementedError as error:
+        omitted.append(f"no {error}")
     return functions, omitted
+
+
+def _recorded(function: Function) -> Function:
+    """A function that is known to have a program.
+
+    Raises:
+        NotImplementedError: as of `Function.program`.
+    """
+    _ = function.program
+    return function
 
 
 def prefix_of(robot: Robot) -> str:

@@ -140,7 +140,7 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
         head: the comment at its beginning.
     """
     dialect = Scalar(precision)
-    programs = [function.program() for function in functions]
+    programs = [function.program for function in functions]
     tables = table_names(programs)
     writer = Writer(dialect, tables)
     bodies = [
