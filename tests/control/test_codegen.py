@@ -192,7 +192,7 @@ def test_what_cannot_be_generated_is_left_out_with_the_reason() -> None:
     assert omitted.startswith(
         "no feedback_linearization: feedback linearization needs springs at all joints or at none"
     )
-    assert omitted in mixed.files["README.md"]
+    assert omitted in re.sub(r"\\(.)", r"\1", mixed.files["README.md"])
 
 
 FLOAT_BOUND = {
