@@ -125,7 +125,8 @@ def test_it_rests_without_load(device: Device) -> None:
     stiffness = lower + np.linspace(0.001, 0.999, 50) * (upper - lower)
     for tau_e in (0.0, -0.0, 1e-300, -1e-300):
         found = device.mechanism.solve(np.full(50, tau_e), stiffness, np.zeros(50))
-        np.testing.assert_allclose(found.phi_1, device.rest, rtol=0, atol=1e-15)
+        # where a profile rests is fitted, to 1e-14
+        np.testing.assert_allclose(found.phi_1, device.rest, rtol=0, atol=1e-14)
         again = device.springs(np.zeros(50), found.phi_1, found.phi_2)
         np.testing.assert_allclose(again.stiffness, stiffness, rtol=1e-11)
 

@@ -15,10 +15,13 @@ from vsacli.actuators.mechanisms.awas import Awas
 from vsacli.actuators.mechanisms.mechanism import Mechanism
 from vsacli.actuators.mechanisms.potential import Potential as OwnPotential
 from vsacli.actuators.mechanisms.potential import Ranges, Start
+from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
 from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.serial import Serial
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.documents.source import Source
+from vsacli.documents.table import Table
 
 INERTIA, DAMPING = (0.3, 0.02), (0.1, 0.05)
 """Of motors 1 and 2."""
@@ -94,6 +97,28 @@ def _two_springs(k: float, k_c: float) -> Potential:
     return lambda q, *theta: sum(k / 2 * (each - q) ** 2 + k_c / 4 * (each - q) ** 4 for each in theta)
 
 
+def profile(phi: FloatArray, lift: FloatArray) -> Table:
+    """A table, as if read from a file."""
+    return Table(("deflection", "lift"), np.column_stack([phi, lift]), Source("profile.csv", "", None))
+
+
+def _polynomial_cam(*coefficients: float, rest: float = 0.0) -> tuple[Table, Potential]:
+    """Lifts of a polynomial, from the second power on; up to the sixth it lies in the span of the fit."""
+
+    def lift(phi: Any) -> Any:
+        return sum(each * (phi - rest) ** power for power, each in enumerate(coefficients, 2))
+
+    def energy(q: Any, theta_1: Any, theta_2: Any) -> Any:
+        return CAM_K * (lift(theta_1 - q) + CAM_R * theta_2) ** 2 / 2
+
+    phi = np.linspace(-0.8, 0.8, 41)
+    return profile(phi, 0.01 + lift(phi)), energy
+
+
+CAM_K, CAM_R = 150000.0, 0.01
+_EVEN, _EVEN_POTENTIAL = _polynomial_cam(0.03, 0, 0.1)
+_UNEVEN, _UNEVEN_POTENTIAL = _polynomial_cam(0.03, 0.02, 0.1, -0.05, 0.1, rest=0.05)
+
 DEVICES = {
     "awas": Device(
         mechanism=Awas(k=50000, arm=(0.02, 0.12), lead=0.01),
@@ -150,6 +175,24 @@ DEVICES = {
         stiffness=(900, 1200),
         deflections=(0.1, 0.3),
         settings=(-0.3, -0.1),
+    ),
+    "cam": Device(
+        mechanism=Cam(k=CAM_K, r=CAM_R, pretension=(0.005, 0.05), profile=_EVEN),
+        potential=_EVEN_POTENTIAL,
+        stiffness=(200, 350),
+        deflections=(-0.2, 0.2),
+        settings=(1.5, 5),
+        scanned=(-0.8, 0.8),
+    ),
+    "cam, not symmetric": Device(
+        mechanism=Cam(k=CAM_K, r=CAM_R, pretension=(0.005, 0.05), profile=_UNEVEN),
+        potential=_UNEVEN_POTENTIAL,
+        stiffness=(350, 250),
+        deflections=(-0.1, 0.2),
+        settings=(2, 5),
+        scanned=(-0.8, 0.8),
+        symmetric=False,
+        rest=0.05,
     ),
 }
 """By the name of the mechanism, and what is special about the device."""

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 DEGREE = 4
-PIECES = (1, 2, 3, 4, 6, 8, 12, 16, 24)
-"""Knot spans of g that are tried."""
+PIECES = (2, 4, 6, 8, 12, 16, 24)
+"""Knot spans of g that are tried; even numbers, so that those of a symmetric profile are symmetric."""
 
 ROWS_PER_PIECE = 4
 """Points that a span needs; by trial with noise on 40 points, the criterion takes too many shorter ones."""
@@ -55,16 +55,21 @@ class Profile(NamedTuple):
 
 def fit_profile(deflection: FloatArray, lift: FloatArray) -> Profile:
     """Fit lifts (rows,) at ascending deflections (rows,), the lowest neither first nor last."""
-    most = max(1, len(lift) // ROWS_PER_PIECE)
-    rest = _rest(deflection, lift, min(FIRST_PIECES, most))
+    most = max(PIECES[0], len(lift) // ROWS_PER_PIECE)
+    if _is_symmetric(deflection, lift):
+        rest, pieces = 0.0, _pieces(deflection, lift, most)
+    else:
+        lowest = float(deflection[np.argmin(lift)])
+        near = lowest + _rest(deflection - lowest, lift, min(FIRST_PIECES, most))
+        pieces = _pieces(deflection - near, lift, most)
+        rest = near + _rest(deflection - near, lift, pieces)
+    return Profile(rest, _fit(deflection - rest, lift, pieces).curve)
+
+
+def _pieces(phi: FloatArray, lift: FloatArray, most: int) -> int:
+    """As many as the points call for, over deflections from rest."""
     counts = [pieces for pieces in PIECES if pieces <= most]
-    fits = [_fit(deflection - rest, lift, pieces) for pieces in counts]
-    best, pieces = min(zip(fits, counts, strict=True), key=lambda found: found[0].criterion)
-    again = _rest(deflection, lift, pieces)
-    refined = _fit(deflection - again, lift, pieces)
-    if refined.criterion < best.criterion:
-        return Profile(again, refined.curve)
-    return Profile(rest, best.curve)
+    return min(counts, key=lambda pieces: _fit(phi, lift, pieces).criterion)
 
 
 class _Fit(NamedTuple):
@@ -81,6 +86,8 @@ def _fit(phi: FloatArray, lift: FloatArray, pieces: int) -> _Fit:
     shapes = [spline_curve(knots, weights, DEGREE, _lift) for weights in np.eye(count)]
     columns = np.column_stack([shape(phi, 0, 0)[0] for shape in shapes])
     weights, _ = _weights(columns, lift, _least(phi, lift))
+    if _is_symmetric(phi, lift):
+        weights = (weights + weights[::-1]) / 2
     curve = spline_curve(knots, weights, DEGREE, _lift)
     misfit = lift - curve(phi, 0, 0)[0]
     misfit -= (misfit.min() + misfit.max()) / 2
@@ -109,24 +116,28 @@ def _weights(columns: FloatArray, lift: FloatArray, least: float) -> tuple[Float
     return least + (excess / sizes)[2:], distance
 
 
-def _rest(deflection: FloatArray, lift: FloatArray, pieces: int) -> float:
-    """Deflection between the neighbours of the lowest point from which the fit is best; zero by symmetry."""
+def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
+    """Deflection between the neighbours of the lowest point from which the fit is best."""
     from scipy.interpolate import PPoly
     from scipy.optimize import minimize_scalar
 
-    if np.array_equal(deflection, -deflection[::-1]) and np.array_equal(lift, lift[::-1]):
-        return 0.0
-    lowest = int(np.argmin(lift))
-    centred = deflection - deflection[lowest]
-    knots = spline_knots(float(centred[0]), float(centred[-1]), pieces, DEGREE)
+    knots = spline_knots(float(phi[0]), float(phi[-1]), pieces, DEGREE)
     bases = [PPoly.from_spline((knots, weights, DEGREE)) for weights in np.eye(len(knots) - DEGREE - 1)]
-    of_first = np.column_stack([times_deflection(basis).antiderivative()(centred) for basis in bases])
-    of_rest = np.column_stack([basis.antiderivative()(centred) for basis in bases])
-    least = _least(centred, lift)
+    of_first = np.column_stack([times_deflection(basis).antiderivative()(phi) for basis in bases])
+    of_rest = np.column_stack([basis.antiderivative()(phi) for basis in bases])
+    least, lowest = _least(phi, lift), int(np.argmin(lift))
     found = minimize_scalar(
         lambda rest: _weights(of_first - rest * of_rest, lift, least)[1],
-        bounds=(centred[lowest - 1], centred[lowest + 1]),
+        bounds=(phi[lowest - 1], phi[lowest + 1]),
         method="bounded",
-        options={"xatol": ROUNDING_SHARE * float(np.ptp(deflection))},
+        options={"xatol": float(np.finfo(float).eps * np.ptp(phi))},
     )
-    return float(deflection[lowest] + found.x)
+    return float(found.x)
+
+
+def _is_symmetric(phi: FloatArray, lift: FloatArray) -> bool:
+    """Whether lifts are those of the opposite deflections."""
+    return all(
+        np.allclose(column, other[::-1], rtol=0, atol=ROUNDING_SHARE * float(np.ptp(column)))
+        for column, other in ((phi, -phi), (lift, lift))
+    )
