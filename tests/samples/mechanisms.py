@@ -144,7 +144,7 @@ DEVICES = {
         scanned=(-1.6, 1.6),
     ),
     "maccepa, long lever, drum against the motor": Device(
-        mechanism=Maccepa(k=100000, b=0.13, c=0.05, r=-0.02, pretension=(0, 0.05)),
+        mechanism=Maccepa(k=100000, b=0.13, c=0.05, r=-0.02, pretension=(0.002, 0.05)),
         potential=_maccepa(100000, 0.13, 0.05, -0.02),
         stiffness=(300, 180),
         deflections=(-0.2, 0.2),
@@ -152,7 +152,7 @@ DEVICES = {
         anchor=0,
         scanned=(-1.6, 1.6),
     ),
-    "potential, the arm of the link changes with q": Device(
+    "potential": Device(
         mechanism=OwnPotential(
             energy="k/2*(r*theta_2)^2 * (phi - bow*sin(2*q))^2",
             constants=(("k", 50000), ("r", 0.01), ("bow", 0.1)),

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from vsacli.documents.fields import declared
+from vsacli.documents.table import Table
 from vsacli.robot.file import FORMAT
 from vsacli.robot.model import Robot
 
@@ -21,6 +25,23 @@ def fields(record: Any) -> dict[str, Any]:
     }
 
 
+def tables(content: Any) -> Iterator[Table]:
+    """The tables in a record, wherever they are."""
+    if isinstance(content, Table):
+        yield content
+    elif isinstance(content, tuple):
+        for each in content:
+            yield from tables(each)
+    elif is_dataclass(content):
+        for name in declared(type(content)):
+            yield from tables(getattr(content, name))
+
+
 def write_robot(robot: Robot, path: Path) -> None:
-    """Write a robot file, without the paths of tables."""
+    """Write a robot file, and its tables where their paths are relative to it."""
     path.write_text(yaml.safe_dump({"format": FORMAT, **fields(robot)}))
+    for table in tables(robot):
+        header = ",".join(table.columns)
+        np.savetxt(
+            path.parent / table.source.path, table.values, "%.17g", delimiter=",", header=header, comments=""
+        )
