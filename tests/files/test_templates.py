@@ -11,7 +11,8 @@ import pytest
 import yaml
 from samples.command_line import REPOSITORY, contents
 
-from vsacli.actuators.kinds import ACTUATORS
+from vsacli.actuators.kinds import ACTUATORS, EXAMPLES
+from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.cli.new import new
@@ -47,6 +48,21 @@ def test_a_new_robot_executes_its_new_trajectory(joints: str, actuator: str, tmp
     assert robot.warnings == (OF_PLACEHOLDERS,)
     report = report_of(robot, trajectory_template(robot), tmp_path)
     assert (report.verdict, report.warnings) == ("ok", (OF_PLACEHOLDERS,))
+
+
+@pytest.mark.parametrize("mechanism", MECHANISMS)
+def test_a_serial_robot_can_be_had_with_each_mechanism(mechanism: str, tmp_path: Path) -> None:
+    robot = robot_of(robot_template("RR", mechanism), tmp_path)
+    assert {joint.actuator_type for joint in robot.joints} == {"serial"}
+    assert report_of(robot, trajectory_template(robot), tmp_path).verdict == "ok"
+
+
+def test_a_mechanism_that_turns_drives_no_slide(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="awas turns about an axis, and drives no prismatic joint"):
+        robot_template("RP", "awas")
+    text = robot_template("R", "awas").replace("type: revolute ", "type: prismatic")
+    with pytest.raises(InputError, match=r"robot.yaml:\d+: .*actuator.mechanism.type: .*variable_ratio"):
+        robot_of(text, tmp_path)
 
 
 def test_without_a_robot_it_suits_new_ones_with_revolute_joints(tmp_path: Path) -> None:
@@ -153,7 +169,7 @@ def test_lines_are_not_too_long() -> None:
 def test_every_kind_of_actuator_can_be_had() -> None:
     robot_command = new.commands["robot"]
     (option,) = (each for each in robot_command.params if each.name == "actuator")
-    assert set(ACTUATORS) == set(option.type.choices)
+    assert set(EXAMPLES) == set(option.type.choices)
 
 
 @pytest.mark.parametrize("joints", ["", "X", "RRX", "R R", "R" * (MOST_JOINTS + 1)])

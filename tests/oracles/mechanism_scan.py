@@ -78,8 +78,11 @@ class Level:
         return np.broadcast_to(-self._at(phi, s).link, phi.shape) - self._tau_e
 
 
-def scanned_corridor(level: Level, anchor: int) -> Corridor:
-    """The monotone piece of the stiffness from one end of the settings on: the first if 0, the last if -1."""
+def scanned_corridor(level: Level, anchor: int, *, falls: bool) -> Corridor:
+    """The monotone piece of the stiffness from one end of the settings on: the first if 0, the last if -1.
+
+    If it must fall and does not, or the torque cannot be carried there, it is not the branch.
+    """
     order = slice(None, None, 1 if anchor == 0 else -1)
     settings, stiffness = level.settings[order], level.stiffness[order]
     there = np.flatnonzero(stiffness > 0)
@@ -87,6 +90,8 @@ def scanned_corridor(level: Level, anchor: int) -> Corridor:
         return Corridor(np.nan, np.nan, lower_turns=False, upper_turns=False)
     first = int(there[0])
     slopes = np.sign(np.diff(stiffness[first:]))
+    if falls and (first > 0 or slopes[0] > 0):
+        return Corridor(np.nan, np.nan, lower_turns=False, upper_turns=False)
     broken = np.flatnonzero(~(slopes == slopes[0]) | ~(stiffness[first + 1 :] > 0))
     last = first + int(broken[0]) if broken.size else SETTINGS - 1
     # elsewhere than at an end of the settings the torque has its maximum, and there is no stiffness

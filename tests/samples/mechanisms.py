@@ -11,12 +11,18 @@ import numpy as np
 import sympy
 
 from samples.full_model import Drive, Potential, springs_of
-from vsacli.actuators.mechanisms.awas import Awas
+from vsacli.actuators.laws.four_bar import FourBar
+from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.mechanisms.mechanism import Mechanism
 from vsacli.actuators.mechanisms.potential import Potential as OwnPotential
 from vsacli.actuators.mechanisms.potential import Ranges, Start
 from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
 from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
+from vsacli.actuators.mechanisms.ratios.awas import Awas
+from vsacli.actuators.mechanisms.ratios.lever import Lever
+from vsacli.actuators.mechanisms.ratios.scales import PolynomialScale, Power
+from vsacli.actuators.mechanisms.ratios.sine import Sine
+from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.serial import Serial
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -42,6 +48,8 @@ class Device:
         on_branch: which of the states with positive stiffness lie on the mechanism's branch; all by default.
         anchor: the end of the settings at which the branch begins, 0 the first or -1 the last.
         scanned: phi within which each setting carries a torque or has its largest; `deflections` if None.
+        falls: whether only a piece on which the stiffness falls from the anchor on belongs to the branch.
+        endless: whether it carries any torque.
         symmetric: whether U(-phi) = U(phi).
         rest: phi without load.
     """
@@ -54,6 +62,8 @@ class Device:
     on_branch: OnBranch = lambda phi, _: np.ones_like(phi, dtype=bool)
     anchor: int = -1
     scanned: tuple[float, float] | None = None
+    falls: bool = False
+    endless: bool = False
     symmetric: bool = True
     rest: float = 0.0
 
@@ -118,6 +128,23 @@ def _polynomial_cam(*coefficients: float, rest: float = 0.0) -> tuple[Table, Pot
 CAM_K, CAM_R = 150000.0, 0.01
 _EVEN, _EVEN_POTENTIAL = _polynomial_cam(0.03, 0, 0.1)
 _UNEVEN, _UNEVEN_POTENTIAL = _polynomial_cam(0.03, 0.02, 0.1, -0.05, 0.1, rest=0.05)
+
+
+def _lever(k: float, length: float, lead: float) -> Potential:
+    def energy(q: Any, theta_1: Any, theta_2: Any) -> Any:
+        ratio = lead * theta_2 / (length - lead * theta_2)
+        return k / 2 * (length * ratio * sympy.sin(theta_1 - q)) ** 2
+
+    return energy
+
+
+def _ratio(scale: Callable[[Any], Any], energy: Callable[[Any], Any]) -> Potential:
+    return lambda q, theta_1, theta_2: scale(theta_2) * energy(theta_1 - q)
+
+
+def _four_bar(k: float, ratio: float) -> Callable[[Any], Any]:
+    return lambda phi: k / 2 * (sympy.asin(ratio * sympy.sin(phi / 2)) - phi / 2) ** 2
+
 
 DEVICES = {
     "awas": Device(
@@ -193,6 +220,73 @@ DEVICES = {
         scanned=(-0.8, 0.8),
         symmetric=False,
         rest=0.05,
+    ),
+    "lever": Device(
+        mechanism=Lever(k=20000, length=0.1, pivot=(0.03, 0.08), lead=0.01),
+        potential=_lever(20000, 0.1, 0.01),
+        stiffness=(600, 900),
+        deflections=(-0.78, 0.78),
+        settings=(3, 8),
+    ),
+    "lever, lead against the motor": Device(
+        mechanism=Lever(k=50000, length=0.06, pivot=(0.01, 0.05), lead=-0.02),
+        potential=_lever(50000, 0.06, -0.02),
+        stiffness=(900, 600),
+        deflections=(-0.78, 0.78),
+        settings=(-2.5, -0.5),
+        anchor=0,
+    ),
+    "variable_ratio": Device(  # a jack spring: fewer active coils with theta_2
+        mechanism=VariableRatio(
+            setting=(1, 9), scale=Power(exponent=-1, lead=-1, offset=12), torque=Polynomial(c1=3000)
+        ),
+        potential=_ratio(lambda s: 1 / (12 - s), lambda phi: 1500 * phi**2),
+        stiffness=(400, 700),
+        deflections=(-0.2, 0.2),
+        settings=(1, 9),
+        scanned=(-1, 1),
+        endless=True,
+    ),
+    "variable_ratio, leaf spring": Device(
+        mechanism=VariableRatio(
+            setting=(-6, 6), scale=Power(exponent=-3, lead=0.01, offset=0.1), torque=Polynomial(c1=0.5)
+        ),
+        potential=_ratio(lambda s: (0.1 + 0.01 * s) ** -3, lambda phi: 0.25 * phi**2),
+        stiffness=(900, 600),
+        deflections=(-0.2, 0.2),
+        settings=(-5, 5),
+        scanned=(-30, 30),
+        anchor=0,
+        endless=True,
+    ),
+    "variable_ratio, sine": Device(
+        mechanism=VariableRatio(
+            setting=(0, 4), scale=PolynomialScale(coefficients=(1, 0.3, 0, 0.05)), torque=Sine(k=300, ratio=3)
+        ),
+        potential=_ratio(lambda s: 1 + 0.3 * s + 0.05 * s**3, lambda phi: 300 / 9 * (1 - sympy.cos(3 * phi))),
+        stiffness=(500, 900),
+        deflections=(-0.52, 0.52),
+        settings=(0, 4),
+    ),
+    "variable_ratio, torque that turns": Device(
+        mechanism=VariableRatio(
+            setting=(0.5, 2), scale=Power(exponent=1), torque=Polynomial(c1=300, c9=300 / 0.4**8)
+        ),
+        potential=_ratio(lambda s: s, lambda phi: 150 * phi**2 + 30 / 0.4**8 * phi**10),
+        stiffness=(350, 500),
+        deflections=(-0.24, 0.24),  # g'^2 = g g'' at 0.2430 rad
+        settings=(0.5, 2),
+        scanned=(-1, 1),
+        falls=True,
+    ),
+    "variable_ratio, four bar": Device(
+        mechanism=VariableRatio(setting=(1, 4), scale=Power(exponent=2), torque=FourBar(k=20, ratio=4)),
+        potential=_ratio(lambda s: s**2, _four_bar(20, 4)),
+        stiffness=(300, 500),
+        deflections=(-0.26, 0.26),  # g'^2 = g g'' at 0.2644 rad
+        settings=(1, 4),
+        scanned=(-0.5, 0.5),
+        falls=True,
     ),
 }
 """By the name of the mechanism, and what is special about the device."""

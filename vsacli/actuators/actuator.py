@@ -15,6 +15,7 @@ from vsacli.actuators.limit_check import LimitCheck, OfJoint, within
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag
 from vsacli.base.variables import MOTORS, SPRINGS, Variable
 from vsacli.documents.source import Source
@@ -103,6 +104,10 @@ class Actuator(ABC):
         Raises:
             InvalidRecordError: a constant is not positive.
         """
+
+    def unfit_for(self, joint_type: str) -> FieldProblem | None:  # noqa: ARG002
+        """Why it cannot drive joints of a type, which of its fields says so; None if it can."""
+        return None
 
     @property
     @abstractmethod

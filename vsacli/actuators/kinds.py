@@ -7,8 +7,10 @@ Adding a kind of actuator is adding a class derived from `vsacli.actuators.actua
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from vsacli.actuators.mechanisms import MECHANISMS
+from vsacli.base.errors import InputError
 from vsacli.base.lazy import LazyRegistry
 
 if TYPE_CHECKING:
@@ -23,6 +25,27 @@ ACTUATORS = LazyRegistry(
     }
 )
 """Kinds of actuator by the name they have in a robot file."""
+
+
+EXAMPLES = (*ACTUATORS, *MECHANISMS)
+"""Names of what a new robot can be driven by: a kind of actuator, or a serial one with a mechanism."""
+
+
+def example(name: str, joint_type: str) -> dict[str, Any]:
+    """Plausible values of a joint's key `actuator`.
+
+    Args:
+        name: one of `EXAMPLES`.
+        joint_type: of the joint.
+
+    Raises:
+        InputError: the mechanism does not drive such joints.
+    """
+    if name in ACTUATORS:
+        return {"type": name, **ACTUATORS[name].example(joint_type)}
+    if joint_type not in MECHANISMS[name].joint_types:
+        raise InputError.one(f"{name} turns about an axis, and drives no {joint_type} joint")
+    return {"type": "serial", **ACTUATORS["serial"].example(joint_type, name)}
 
 
 def existing(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:

@@ -71,21 +71,30 @@ class Serial(Actuator):
         return [True, False] if variable.name in {"phi", "dphi"} else super().has(variable)
 
     @classmethod
-    def example(cls, joint_type: str) -> dict[str, Any]:
-        """Motors alike, and an arm of adjustable length."""
-        word = "awas"
-        mechanism = {"type": word, **MECHANISMS[word].example(joint_type)}
-        return {"motor": Motor.example(joint_type), "mechanism": mechanism}
+    def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:
+        """Motors alike, and the mechanism of this name; by default the first that drives such joints."""
+        word = mechanism or next(name for name, each in MECHANISMS.items() if joint_type in each.joint_types)
+        example = {"type": word, **MECHANISMS[word].example(joint_type)}
+        return {"motor": Motor.example(joint_type), "mechanism": example}
 
     @classmethod
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
-        """Springs on an arm, whose range of stiffness has that of an elastic transmission in its middle."""
-        from vsacli.actuators.mechanisms.awas import Awas
+        """A linear spring, from a quarter to four times as stiff as an elastic transmission."""
+        from vsacli.actuators.laws.polynomial import Polynomial
+        from vsacli.actuators.mechanisms.ratios.scales import Power
+        from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
 
-        motor = Motor(inertia=constants.motor_inertia)
-        return cls(
-            motor=(motor, motor), mechanism=Awas(k=50 * constants.stiffness, arm=(0.05, 0.2), lead=0.02)
-        )
+        motor, torque = Motor(inertia=constants.motor_inertia), Polynomial(c1=constants.stiffness)
+        spring = VariableRatio(setting=(0.5, 2.0), scale=Power(exponent=2.0), torque=torque)
+        return cls(motor=(motor, motor), mechanism=spring)
+
+    def unfit_for(self, joint_type: str) -> FieldProblem | None:
+        """A mechanism that turns."""
+        if joint_type in self.mechanism.joint_types:
+            return None
+        others = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
+        reason = f"turns about an axis, and drives no {joint_type} joint; {' or '.join(others)} can"
+        return FieldProblem(("mechanism", "type"), reason)
 
     @property
     def motors(self) -> tuple[JointMotor, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import click
 
-from vsacli.actuators.kinds import ACTUATORS
+from vsacli.actuators.kinds import EXAMPLES
 from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
@@ -38,10 +38,10 @@ def new() -> None:
 )
 @click.option(
     "--actuator",
-    type=click.Choice(tuple(ACTUATORS)),
+    type=click.Choice(EXAMPLES),
     default="antagonistic",
     show_default=True,
-    help="What drives the joints.",
+    help="What drives the joints: a kind of actuator, or a mechanism of serial ones.",
 )
 @_output_option
 @overwrite_option

@@ -6,7 +6,7 @@ import math
 import textwrap
 from typing import Any
 
-from vsacli.actuators.kinds import ACTUATORS
+from vsacli.actuators.kinds import example
 from vsacli.base.errors import InputError
 from vsacli.documents.commented import WIDTH, commented_document
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
@@ -57,11 +57,11 @@ def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-
 
     Args:
         joints: a letter for each joint from the base to the tip, R (revolute) or P (prismatic).
-        actuator: of every joint, one of `ACTUATORS`.
+        actuator: of every joint, one of `EXAMPLES`: a kind, or a mechanism of serial ones.
         name: of the robot.
 
     Raises:
-        InputError: other letters, none, or too many.
+        InputError: other letters, none, or too many; or the mechanism drives no such joint.
     """
     kinds = [TYPES.get(letter, "") for letter in joints.upper()]
     if not all(kinds) or not 0 < len(kinds) <= MOST_JOINTS:
@@ -90,7 +90,7 @@ def _joint(number: int, joint_type: str, actuator: str) -> Values:
         "type": joint_type,
         **geometry,
         "damping": _by_type(joint_type, 0.1, 1.0),
-        "actuator": {"type": actuator, **ACTUATORS[actuator].example(joint_type)},
+        "actuator": example(actuator, joint_type),
     }
 
 

@@ -168,6 +168,9 @@ class Joint:
         if not self.actuator.sprung and self.damper is not None:
             reason = f"a joint with a {self.actuator_type} actuator has no springs to calm; leave it out"
             problems.append(FieldProblem(("damper",), reason))
+        unfit = self.actuator.unfit_for(self.type)
+        if unfit is not None:
+            problems.append(unfit.inside("actuator"))
         check_fields(self, *problems)
 
     @property

@@ -9,10 +9,12 @@ from vsacli.base.lazy import LazyRegistry
 
 MECHANISMS = LazyRegistry(
     {
-        "awas": "vsacli.actuators.mechanisms.awas:Awas",
-        "cam": "vsacli.actuators.mechanisms.preloaded_cams.cam:Cam",
+        "awas": "vsacli.actuators.mechanisms.ratios.awas:Awas",
+        "lever": "vsacli.actuators.mechanisms.ratios.lever:Lever",
+        "variable_ratio": "vsacli.actuators.mechanisms.ratios.variable_ratio:VariableRatio",
         "maccepa": "vsacli.actuators.mechanisms.preloaded_cams.maccepa:Maccepa",
         "potential": "vsacli.actuators.mechanisms.potential:Potential",
+        "cam": "vsacli.actuators.mechanisms.preloaded_cams.cam:Cam",
     }
 )
 """Mechanisms by the name they have in a robot file."""

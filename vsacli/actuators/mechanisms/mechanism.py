@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -22,7 +22,12 @@ class Mechanism(ABC):
 
     Equal mechanisms are the same for all that is computed. What depends on phi = theta_1 - q and the setting
     s = theta_2 alone gives `partials`; else it overrides `state`. Positions in rad (m), torques in N m (N).
+
+    Attributes:
+        joint_types: of the joints that it can drive; a lever that turns drives no prismatic one.
     """
+
+    joint_types: ClassVar[tuple[str, ...]] = ("revolute", "prismatic")
 
     def __post_init__(self) -> None:
         check_fields(self)

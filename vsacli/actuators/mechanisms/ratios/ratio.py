@@ -1,4 +1,4 @@
-"""Mechanisms whose motor 2 changes a ratio: U = K(s) w(phi), so that the torque is K(s) g(phi) with g = w'.
+"""The potential K(s) w(phi), and its closed solution where a lever stretches a spring by its turn.
 
 tau_e/sigma = g/g' gives phi whatever the setting is; then K = sigma/g' gives the setting.
 """
@@ -7,23 +7,20 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.mechanisms.ratios.scales import Scale
+from vsacli.actuators.mechanisms.ratios.sine import Sine
 from vsacli.actuators.mechanisms.state import Partials
 from vsacli.base.arrays import FloatArray
 
-
-class Scale(NamedTuple):
-    """The scale K(s), its slope K' and its curvature K'', arrays of one shape."""
-
-    value: FloatArray
-    slope: FloatArray
-    curvature: FloatArray
+TURN = Sine(k=2.0, ratio=2.0)
+"""g = sin 2phi, of w = sin^2(phi)."""
 
 
 def ratio_partials(scale: Scale, energy: FloatArray, form: SpringState) -> Partials:
@@ -59,6 +56,8 @@ class SineRatio(Mechanism):
     sigma and 2 tau_e, and 2phi the angle between it and sigma.
     """
 
+    joint_types: ClassVar[tuple[str, ...]] = ("revolute",)
+
     @abstractmethod
     def scale(self, s: FloatArray) -> Scale:
         """K(s) with its derivatives, positive and monotone over the range of the setting."""
@@ -74,13 +73,11 @@ class SineRatio(Mechanism):
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
         """Those of K(s) sin^2(phi)."""
-        sine, torque, stiffness = np.sin(phi), np.sin(2 * phi), 2 * np.cos(2 * phi)
-        form = SpringState(torque, stiffness, -4 * torque, -4 * stiffness)
-        return ratio_partials(self.scale(s), sine * sine, form)
+        return ratio_partials(self.scale(s), *TURN.energy_and_state(phi))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
         """(2 K_min)^2 <= sigma^2 + (2 tau_e)^2 <= (2 K_max)^2, cut at sigma = 0."""
-        load = 2 * np.abs(tau_e)
+        load = 2 * np.abs(np.where(np.isfinite(tau_e), tau_e, np.nan))
         least, most = ((2 * scale - load) * (2 * scale + load) for scale in self.scale_range)
         carried = most >= 0
         lower, upper = (np.sqrt(np.where(carried, np.maximum(each, 0), np.nan)) for each in (least, most))

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.mechanisms.ratio import Scale, SineRatio
+from vsacli.actuators.mechanisms.ratios.ratio import SineRatio
+from vsacli.actuators.mechanisms.ratios.scales import Scale
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem

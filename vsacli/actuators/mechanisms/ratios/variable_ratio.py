@@ -1,0 +1,173 @@
+"""Any ratio and any torque: T = K(s) g(phi), for jack springs, leaf springs, measured levers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.laws import LAWS, SpringLaw
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.mechanisms.ratios.ratio import ratio_partials
+from vsacli.actuators.mechanisms.ratios.scales import SCALES, ScaleLaw
+from vsacli.actuators.mechanisms.ratios.sine import Sine
+from vsacli.actuators.mechanisms.state import Partials
+from vsacli.actuators.pairs.bracketing import bracketed_root
+from vsacli.base import units
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.errors import FieldProblem
+from vsacli.base.lazy import LazyRegistry
+from vsacli.documents.fields import OneOf, check_fields, interval, value
+from vsacli.documents.source import Source
+
+TORQUES = LazyRegistry({**LAWS.homes, "sine": "vsacli.actuators.mechanisms.ratios.sine:Sine"})
+"""Torques by the name they have in a robot file: the laws of springs, and one that softens."""
+
+DEFLECTIONS = np.geomspace(1e-6, 1.0, 4000)
+"""Shares of a law's domain at which the sign of g'^2 - g g'' is looked at; laws turn within tenths of it."""
+
+ENDLESS = 1e3
+"""Deflection, rad (m), that stands for the end of a law that has none: no springs go so far."""
+
+
+class _Limit(NamedTuple):
+    """How far the deflection goes to one side of rest on the branch.
+
+    Attributes:
+        phi: the last deflection, infinite if there is none.
+        torque: g there.
+        critical: whether the stiffness turns around there, and A is singular; else the law ends.
+    """
+
+    phi: float
+    torque: float
+    critical: bool
+
+
+class _End(NamedTuple):
+    """An end of the branch at given torques; arrays (samples,)."""
+
+    phi: FloatArray
+    stiffness: FloatArray
+    limited: BoolArray
+    critical: BoolArray
+
+
+@dataclass(frozen=True)
+class VariableRatio(Mechanism):
+    """T = K(theta_2) g(phi): motor 2 scales a spring whose torque at K = 1 is g.
+
+    At a given torque the stiffness falls with the scale while the deflection grows, up to where g'^2 = g g''.
+    """
+
+    setting: tuple[float, float] = interval(units.POSITION, "theta_2 that the mechanism allows")
+    scale: ScaleLaw = value(OneOf(SCALES), "K over theta_2: positive, rising or falling throughout")
+    torque: SpringLaw | Sine = value(OneOf(TORQUES), "g, the torque where K is 1")
+
+    def __post_init__(self) -> None:
+        problems = []
+        if not -np.inf < self.setting[0] < self.setting[1] < np.inf:
+            problems.append(FieldProblem(("setting",), "must have two ends, the smaller one first"))
+        else:
+            problems += [FieldProblem(("scale",), each) for each in self.scale.problems(self.setting)]
+        check_fields(self, *problems)
+
+    @classmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:
+        """A spring of which half, or all, or twice as much is there."""
+        stiffness = 600 if joint_type == "revolute" else 6000
+        return {
+            "setting": [0.5, 2],
+            "scale": {"type": "power", "exponent": 2},
+            "torque": {"type": "polynomial", "c1": stiffness},
+        }
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the torque."""
+        return self.torque.warnings
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Those of the torque."""
+        return self.torque.sources
+
+    @property
+    def deflection_range(self) -> tuple[float, float]:
+        """The domain of the torque."""
+        return self.torque.domain
+
+    @property
+    def setting_range(self) -> tuple[float, float]:
+        """As given."""
+        return self.setting
+
+    def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
+        """Those of K w, with the energy w of the torque g."""
+        return ratio_partials(self.scale.at(s), *self.torque.energy_and_state(phi))
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
+        """tau_e/sigma = g/g' solved for phi between the ends of the scale, then K = sigma/g'."""
+        least, most = sorted(self.scale.at(np.array(self.setting, dtype=float)).value.tolist())
+        with np.errstate(all="ignore"):  # a torque of a tendon that pushes, for instance
+            soft, stiff = self._end(tau_e, least), self._end(tau_e, most)
+            carried = ~stiff.limited & np.isfinite(tau_e)
+            lower, upper = (np.where(carried, end.stiffness, np.nan) for end in (soft, stiff))
+            demand = np.minimum(np.maximum(stiffness, lower), upper)
+            phi = bracketed_root(self._excess, stiff.phi, soft.phi, (tau_e, demand))
+            scale = np.minimum(np.maximum(demand / self.torque.state(phi).sigma, least), most)
+            setting = self.scale.setting(scale, self.setting)
+        never = np.zeros_like(soft.critical)
+        return PairSolution(
+            lower=lower,
+            upper=upper,
+            lower_critical=soft.critical & carried,
+            upper_critical=never,
+            slack_below=never,
+            phi_1=np.where(np.isnan(demand), np.nan, phi),
+            phi_2=np.where(np.isnan(demand), np.nan, setting),
+        )
+
+    def _excess(self, phi: FloatArray, tau_e: FloatArray, stiffness: FloatArray) -> FloatArray:
+        """Sigma g - tau_e g', which grows with phi along the branch."""
+        state = self.torque.state(phi)
+        return stiffness * state.tau - tau_e * state.sigma
+
+    def _end(self, tau_e: FloatArray, scale: float) -> _End:
+        """Where the branch has a scale, or ends before."""
+        below, above = self._limits
+        torque = tau_e / scale
+        under, over = torque < below.torque, torque > above.torque
+        inside = np.minimum(np.maximum(torque, below.torque), above.torque)
+        phi = np.where(under, below.phi, np.where(over, above.phi, self.torque.deflection(inside)))
+        state = self.torque.state(phi)
+        factor = np.where(under | over, tau_e / state.tau, scale)
+        critical = (under & below.critical) | (over & above.critical)
+        return _End(phi, factor * state.sigma, under | over, critical)
+
+    @cached_property
+    def _limits(self) -> tuple[_Limit, _Limit]:
+        """To the negative and to the positive side."""
+        below, above = zip(self.torque.domain, self.torque.torque_range, strict=True)
+        return _limit(self.torque, *below), _limit(self.torque, *above)
+
+
+def _limit(law: SpringLaw | Sine, end: float, torque: float) -> _Limit:
+    """How far the deflection goes to one side, which ends there with a torque."""
+
+    def falling(phi: FloatArray) -> FloatArray:
+        """What is positive where the stiffness falls along the branch."""
+        state = law.state(phi)
+        return state.sigma * state.sigma - state.tau * state.zeta
+
+    phi = DEFLECTIONS * (end if np.isfinite(end) else np.copysign(ENDLESS, end))
+    with np.errstate(all="ignore"):  # laws that grow beyond all numbers
+        turned = np.flatnonzero(falling(phi) < 0)
+    if not turned.size:
+        return _Limit(end, torque, critical=False)
+    first = max(int(turned[0]), 1)
+    turn = bracketed_root(falling, phi[first - 1 : first], phi[first : first + 1])
+    return _Limit(float(turn[0]), float(law.state(turn).tau[0]), critical=True)
