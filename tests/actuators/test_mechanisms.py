@@ -15,15 +15,23 @@ from vsacli.base.arrays import FloatArray
 DRAWS = 10_000
 
 
-@pytest.fixture(params=slow_but(MECHANISMS, DEVICES))
+TESTED_APART = {"cam", "potential"}
+MECHANISM_OF = {
+    name: mechanism
+    for name, device in DEVICES.items()
+    if (mechanism := MECHANISMS.name_of(type(device.mechanism))) not in TESTED_APART
+}
+FIRST = {mechanism: name for name, mechanism in reversed(MECHANISM_OF.items())}
+"""The first device of each mechanism."""
+
+
+@pytest.fixture(params=slow_but(FIRST.values(), MECHANISM_OF))
 def device(request: pytest.FixtureRequest) -> Device:
     return DEVICES[request.param]
 
 
 def test_every_mechanism_has_a_device() -> None:
-    assert {name: MECHANISMS.name_of(type(DEVICES[name].mechanism)) for name in MECHANISMS} == dict(
-        zip(MECHANISMS, MECHANISMS, strict=True)
-    )
+    assert set(FIRST) | TESTED_APART == set(MECHANISMS)
 
 
 def states(device: Device, samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
