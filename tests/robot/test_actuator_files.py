@@ -207,7 +207,7 @@ def test_columns_of_joints_that_take_no_stiffness_are_named_and_left() -> None:
     write_csv("a.q", "b.q", "c.q", "a.stiffness", "b.stiffness", "c.stiffness", "b.dstiffness")
     found = load_trajectory("move.csv", robot(RIGID, ELASTIC, ANTAGONISTIC))
     assert found.chosen("stiffness").tolist() == [False, False, True]
-    unused = "a.stiffness, b.stiffness, b.dstiffness; only antagonistic joints take a stiffness"
+    unused = "a.stiffness, b.stiffness, b.dstiffness; only antagonistic or serial joints take a stiffness"
     assert found.notes == (f"move.csv: not used: {unused}",)
     assert found.warnings == (
         f"dq, ddq, d3q, d4q come from a C6 spline through q; {FEW}",
@@ -247,7 +247,7 @@ def test_samples_without_any_stiffness() -> None:
     assert inverse_dynamics(robot(RIGID, ELASTIC), free).report.verdict == "ok"
     for other in (free, Trajectory.from_samples(TIME, Q[:, :2], np.full((21, 2), np.nan))):
         with pytest.raises(
-            InputError, match=r"samples has no stiffness for b; each antagonistic joint needs one"
+            InputError, match=r"samples has no stiffness for b; each antagonistic or serial joint needs one"
         ):
             inverse_dynamics(robot(RIGID, ANTAGONISTIC), other)
     with pytest.raises(InputError, match="derivatives of a stiffness are given, but not the stiffness"):

@@ -72,7 +72,7 @@ STIFFNESS = Signal(
         "rate of the commanded stiffness",
         "second derivative of the commanded stiffness",
     ),
-    meaning="stiffness of the antagonistic joints",
+    meaning="stiffness of the antagonistic and serial joints",
     spline_degree=5,
     positive=True,
     optional=True,

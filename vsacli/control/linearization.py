@@ -49,7 +49,7 @@ def feedback_linearization(
     A control loop keeps a `FeedbackLinearization`, which prepares the robot once.
 
     Args:
-        robot: either all of its joints have springs, elastic and antagonistic ones mixed at will, or none
+        robot: either all of its joints have springs, of any kinds mixed at will, or none
             has, which gives the computed torque (3).
         state: measured state, at one instant or over samples.
         reference: commanded motion and stiffness, arrays ([samples,] joints), and the wrench that acts.

@@ -138,7 +138,7 @@ def compute_block(
 
     Args:
         robot: the robot.
-        motion: commanded motion and stiffness, (samples, joints); the actuators that are not antagonistic
+        motion: commanded motion and stiffness, (samples, joints); the actuators that take no stiffness
             have a stiffness of their own, or none.
         near_singular: margin below which a step is near-singular.
         integrated: deflections of the joints to use instead of the root of (14), (joints, 2, samples);
@@ -177,7 +177,7 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
     """A trajectory for a robot: the same, with what its devices do that are not commanded.
 
     Raises:
-        InputError: it has another number of joints than the robot, or no stiffness for an antagonistic one.
+        InputError: it has another number of joints than the robot, or lacks a stiffness that one takes.
         TypeError: one of both is none.
     """
     check_robot(robot)

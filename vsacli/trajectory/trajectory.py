@@ -142,7 +142,7 @@ class Trajectory:
             time: (samples,) in s, strictly increasing, at least 8.
             q: position, (samples, joints), rad (m), as are its derivatives per s^k.
             stiffness: joint stiffness, (samples, joints), N m/rad (N/m), as are its derivatives per s^k. Only
-                that of antagonistic joints counts; others may have NaN, and None will do if there are none.
+                that of joints that take one counts; others may have NaN, and None will do if there are none.
             dq: first derivative of q.
             ddq: second derivative of q.
             d3q: third derivative of q.

@@ -33,7 +33,7 @@ def motion_structure(robot: Robot) -> Structure:
 
 def command_structure(robot: Robot) -> Structure:
     """Motion and stiffness."""
-    meaning = "Commanded motion and stiffness; only antagonistic joints read a stiffness."
+    meaning = "Commanded motion and stiffness; only antagonistic and serial joints read a stiffness."
     names = (name for signal in (POSITION, *robot.signals) for name in signal.names)
     return Structure("command", meaning, _arrays(robot, tuple(names)))
 

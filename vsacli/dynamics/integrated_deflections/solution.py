@@ -49,7 +49,7 @@ class IntegratedDeflections:
     def at(self, time: FloatArray) -> FloatArray:
         """Deflections of all joints at any times of the span, (joints, 2, samples).
 
-        NaN from a stop on, and at joints that are not antagonistic.
+        NaN from a stop on, and at joints whose stiffness is not commanded.
         """
         phi = np.full((len(self.stops), 2, len(time)), np.nan)
         elapsed = time - self._start

@@ -26,9 +26,10 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
 
     `reach` and `static_load` are the largest values found over the configurations within the position limits;
     a prismatic joint without limits is held at zero. `static_load` is the torque of gravity alone.
-    `stiffness_range` of an antagonistic joint is reachable while it carries no torque, `loaded` while it
-    carries the static load in either direction; an end that nothing bounds is infinite, both are NaN if the
-    springs cannot carry the load. Of an elastic joint it is the stiffness that its spring then has.
+    `stiffness_range` of a joint whose stiffness is commanded is reachable while it carries no torque,
+    `loaded` while it carries the static load in either direction; an end that nothing bounds is infinite,
+    both are NaN if the springs cannot carry the load. Of an elastic joint it is the stiffness that its spring
+    then has.
     """
     return {
         "kind": "robot",
