@@ -108,10 +108,26 @@ def sweep(time, seed):
     return np.array([0.5 * np.sin(turn), fourth])
 
 
+def random_motion(time, seed):
+    """A sum of sines with random amplitudes; its power falls by f^-14 beyond 0.7 Hz, that of d4q by f^-6."""
+    rng, corner, period = np.random.default_rng(5000 + seed), 0.7, 2.5 * time[-1]
+    frequencies = np.arange(1, int(20 * corner * period)) / period
+    sizes = (1 + (frequencies / corner) ** 2) ** -3.5
+    sizes *= 0.5 / np.linalg.norm(sizes)
+    value, fourth = np.zeros_like(time), np.zeros_like(time)
+    for frequency, size in zip(frequencies, sizes, strict=True):
+        rate, (cosine, sine) = 2 * np.pi * frequency, size * rng.standard_normal(2)
+        turn = cosine * np.cos(rate * time) + sine * np.sin(rate * time)
+        value += turn
+        fourth += rate**4 * turn
+    return np.array([value, fourth])
+
+
 MOTIONS: dict[str, Callable[[np.ndarray, int], np.ndarray]] = {
     "sines": sines,
     "rest to rest, pauses": pauses,
     "sweep to 4 Hz": sweep,
+    "random": random_motion,
     "velocity steps, 200 ms": slow_velocity_steps,
     "velocity steps, 50 ms": velocity_steps,
     "minimum jerk": minimum_jerk,

@@ -179,7 +179,7 @@ def test_estimate_is_that_of_dense_algebra(degree):
     assert model.deviance == pytest.approx(deviance, rel=1e-6)
     rows = BSpline(bins.knots, np.eye(bins.coefficients), degree)(model.probes, nu=2)
     deviations = np.linalg.norm(rows @ inverse, axis=1) * np.sqrt(rest / freedom)
-    np.testing.assert_allclose(model.deviations(2), deviations, rtol=1e-6)
+    np.testing.assert_allclose(np.sqrt(model.variances(2) * model.noise_variance), deviations, rtol=1e-6)
 
 
 def test_uniform_basis_adds_up_to_one():

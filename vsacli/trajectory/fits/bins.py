@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -115,6 +116,24 @@ class Bins:
         places = np.arange(-self.degree, self.spans + self.degree + 1, dtype=np.float64)
         return self.start + self.span * places
 
+    def stretch(self, first: int, spans: int) -> Bins:
+        """The bins of some spans, as if nothing else had been recorded.
+
+        Args:
+            first: index of the first of the spans.
+            spans: their number.
+        """
+        start, stop = np.searchsorted(self.first, [first, first + spans])
+        return replace(
+            self,
+            start=self.start + first * self.span,
+            spans=spans,
+            means=self.means[start:stop],
+            design=self.design[start:stop],
+            first=self.first[start:stop] - first,
+            gaps=self.gaps[start : stop - 1],
+        )
+
     def whitened(self, correlation: float) -> Whitened:
         """Differences of neighbouring means whose errors are independent.
 
@@ -157,11 +176,13 @@ class Bins:
         share = np.interp(correlation, between / within, within / count**2, left=1 / count)
         return float(self.noise**2 * share)
 
-    def differences(self, order: int) -> FloatArray:
+    @cached_property
+    def differences(self) -> FloatArray:
         """Rows of the differences of the coefficients, (blocks, rows, columns), and units behind the last.
 
-        The units make the unknowns that fill up the last block zero.
+        Their order is the degree. The units make the unknowns that fill up the last block zero.
         """
+        order = self.degree
         count, last = block_count(self.coefficients), self.coefficients - order
         weights = [(-1.0) ** (order - k) * math.comb(order, k) for k in range(order + 1)]
         rows = sort_rows(np.arange(last), np.tile(weights, (last, 1)), self.coefficients).blocks

@@ -186,8 +186,8 @@ class Fit:
         for part, posterior in zip(self.parts, self._posteriors, strict=True):
             if posterior is not None:
                 basis = local_basis(part.spline.t, self.degree, time, orders)
-                unit = self._units(part, posterior)
-                found[part.members] = unit[:, None, None, None] ** 2 * of_derivatives(posterior, basis)
+                units = self._units(part, posterior, time)
+                found[part.members] = units[:, :, None] * units[:, None] * of_derivatives(posterior, basis)
         return found
 
     @cached_property
@@ -195,21 +195,22 @@ class Fit:
         """Of the coefficients of each part; None if nothing can be said of them."""
         return [part.posterior(self.time) for part in self.parts]
 
-    def _units(self, part: Part, posterior: Posterior) -> FloatArray:
-        """Of the deviations of the posterior, (members,): as large as what is stated of the part."""
+    def _units(self, part: Part, posterior: Posterior, time: FloatArray) -> FloatArray:
+        """Of the deviations of the posterior, (members, orders or 1, samples or 1)."""
         known = part.smoothing
         if part.smooth and known is not None:
-            return np.array([known.unit])
+            start, end = part.knots[[0, -1]]
+            return known.units_at((time - start) / (end - start))[None]
         units = self.noise[part.members]
-        if known is None:
-            return np.asarray(units)
-        order, probes = ORDERS[self.degree] - 1, np.linspace(*part.inside, PROBES)
-        basis = local_basis(part.spline.t, self.degree, probes, order + 1)
-        found = units * np.sqrt(np.mean(of_derivatives(posterior, basis)[order, order]))
-        size = np.sqrt(np.mean(part.spline(probes, nu=order) ** 2, axis=0))
-        # relative to the derivative without this error, which the size of this spline's includes
-        share = known.relative / np.hypot(1.0, known.relative)
-        return np.asarray(units * np.maximum(1.0, share * size / found))
+        if known is not None:
+            order, probes = ORDERS[self.degree] - 1, np.linspace(*part.inside, PROBES)
+            basis = local_basis(part.spline.t, self.degree, probes, order + 1)
+            found = units * np.sqrt(np.mean(of_derivatives(posterior, basis)[order, order]))
+            size = np.sqrt(np.mean(part.spline(probes, nu=order) ** 2, axis=0))
+            # relative to the derivative without this error, which the size of this spline's includes
+            share = known.relative / np.hypot(1.0, known.relative)
+            units = units * np.maximum(1.0, share * size / found)
+        return np.asarray(units[:, None, None])
 
 
 def join(

@@ -86,11 +86,16 @@ def judged(record: Record, fit: Fit, *, chosen: bool) -> Iterator[Part]:
             difference = _difference(part, column, judge, record)
             if wanted or (not chosen and _better(judge, difference, record)):
                 yield judge
-            elif judge.smoothing.resolved or record.spoilt[member] > DISAGREEMENT or not part.exact:
+            elif judge.smoothing.resolved or _disagrees(record, member) or not part.exact:
                 single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], fit.degree)
                 relative = float(np.hypot(judge.smoothing.relative, difference))
                 known = replace(judge.smoothing, relative=relative, follows_lines=True)
                 yield Part(judge.members, single, part.exact, known)
+
+
+def _disagrees(record: Record, member: int) -> bool:
+    """Whether noise alone speaks against a spline through the samples."""
+    return bool(record.spoilt[member] > DISAGREEMENT or record.filtered[member])
 
 
 def _judge(record: Record, member: int, degree: int) -> Part:

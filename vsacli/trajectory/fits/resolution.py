@@ -10,7 +10,8 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins
-from vsacli.trajectory.fits.penalised import Model, most_likely
+from vsacli.trajectory.fits.penalised import KINK_VARIANCE, Model
+from vsacli.trajectory.fits.search import most_likely
 
 FIRST_SPANS, FIRST_SPANS_SHORT = 32, 4
 """Of the coarsest resolution; that of records of fewer than `SHORT` samples is coarser."""
@@ -20,10 +21,6 @@ SHORT = 256
 FEWEST_SAMPLES, ALWAYS_SPANS, MOST_SPANS = 3, 128, 32768
 """Samples of a span; spans that there may be also with fewer, and never more of. Noise of fewer samples in a
 row has spoilt what a finer resolution would show, and time grows with the spans."""
-
-SEGMENTED_FACTOR = 2.0
-"""By which the deviation of a spline with several penalties is multiplied. On 36 records from rest to rest
-with pauses the error was 1.4 to 2.2 times the posterior deviation, which takes the penalties for known."""
 
 NEGLIGIBLE = 0.02
 """Relative change of the highest derivative from one resolution to the next that asks for no finer one. If
@@ -69,6 +66,7 @@ class Resolution(NamedTuple):
         model: the coarser of both, or the finer if noise does not explain the change.
         deviation: of the highest derivative by noise, relative.
         change: of that derivative from one to the other, relative.
+        unexplained: what of the change noise does not explain, in units of the row per s^order.
         residual: of the model, root mean square.
         given: whether it follows from a bandwidth.
     """
@@ -76,11 +74,12 @@ class Resolution(NamedTuple):
     model: Model
     deviation: float
     change: float
+    unexplained: float
     residual: float
     given: bool = False
 
     @property
-    def stated(self) -> float:
+    def total(self) -> float:
         """Both together, as what is unresolved is an error like any other."""
         return float(np.hypot(self.deviation, self.change))
 
@@ -88,7 +87,7 @@ class Resolution(NamedTuple):
     def accepted(self) -> bool:
         """Whether the next resolution changes no more than noise does, and both are small."""
         confirmed = self.change < max(CONFIRMED * self.deviation, NEGLIGIBLE)
-        return self.given or (confirmed and self.stated < ACCEPTED)
+        return self.given or (confirmed and self.total < ACCEPTED)
 
 
 def find_resolution(
@@ -119,7 +118,7 @@ def find_resolution(
             return tried[-1]
     least = min((each.residual for each in tried), default=0.0)
     close = [each for each in tried if each.residual <= CLOSE * least]
-    return min(close, key=lambda each: each.stated, default=None)
+    return min(close, key=lambda each: each.total, default=None)
 
 
 def _given(
@@ -157,23 +156,27 @@ def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, ord
     expected = fine.spline(fine.probes, nu=order)[fine.inside, 0]
     found = coarse.spline(fine.probes, nu=order)[fine.inside, 0]
     size = max(_rms(expected), np.finfo(float).tiny)
-    change, deviation = _rms(found - expected), rms_deviation(coarse, order)
+    change, deviation = _rms(found - expected), _deviation(coarse, order)
     explained = change < CONFIRMED * deviation
     model = fine if not explained and change < NEGLIGIBLE * size else coarse
-    deviation = deviation if model is coarse else rms_deviation(fine, order)
+    deviation = deviation if model is coarse else _deviation(fine, order)
     some = slice(None, None, 1 + len(time) // PROBES)
     residual = _rms(row[some] - model.spline(time[some])[:, 0])
-    return Resolution(model, deviation / size, change / size, residual)
+    # the finer of two splines near the same samples is the coarser plus what is independent of it
+    more, less = (_mean_variance(each, each.variances(order)) for each in (fine, coarse))
+    unexplained = float(np.sqrt(max(0.0, change**2 - abs(more - less))))
+    return Resolution(model, deviation / size, change / size, unexplained, residual)
 
 
-def rms_deviation(model: Model, order: int) -> float:
-    """Of a derivative, away from the ends."""
-    return deviation_factor(model) * _rms(model.deviations(order)[model.inside])
+def _deviation(model: Model, order: int) -> float:
+    """Of a derivative by the posterior, away from the ends; `calibration` has a better one."""
+    factor = np.where(model.kinks, KINK_VARIANCE, 1.0)
+    return float(np.sqrt(_mean_variance(model, factor * model.variances(order, model.cautious))))
 
 
-def deviation_factor(model: Model) -> float:
-    """By which the posterior deviation is too small."""
-    return SEGMENTED_FACTOR if model.segments > 1 else 1.0
+def _mean_variance(model: Model, variances: FloatArray) -> float:
+    """Away from the ends, (2 spans,) to one."""
+    return float(np.mean(variances[model.inside])) * model.noise_variance
 
 
 def _rms(values: FloatArray) -> float:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.trajectory.fits.calibration import calibrated
 from vsacli.trajectory.fits.information import Posterior
-from vsacli.trajectory.fits.resolution import KnownNoise, deviation_factor, find_resolution, rms_deviation
+from vsacli.trajectory.fits.resolution import KnownNoise, find_resolution
 from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding, spectral_lines
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ class Smoothing:
         resolved: whether two successive resolutions agree on that derivative.
         lines: frequencies that stand out of the residual.
         posterior: of the coefficients.
-        unit: of the posterior's deviations.
+        units: of the posterior's deviations of the value and each derivative, at equal steps of the spline's
+            span, (orders, steps).
         follows_lines: whether the spline follows those that are not of mains.
     """
 
@@ -37,13 +38,22 @@ class Smoothing:
     resolved: bool
     lines: Lines
     posterior: Posterior
-    unit: float
+    units: FloatArray
     follows_lines: bool = False
 
     @property
     def determined(self) -> bool:
         """Whether the record determines the highest derivative to 10 %."""
         return self.resolved and self.relative <= 0.1
+
+    def units_at(self, place: FloatArray) -> FloatArray:
+        """Units of the posterior's deviations, (orders, places).
+
+        Args:
+            place: of the spline's span, 0 to 1, (places,).
+        """
+        steps = self.units.shape[1]
+        return np.array([np.interp(place * steps - 0.5, np.arange(steps), row) for row in self.units])
 
     def stretched(self, factor: float) -> Smoothing:
         """That of the same course, slower by a factor."""
@@ -81,11 +91,12 @@ def smoothing_spline(
     if found is None:
         return None
     model, spline = found.model, found.model.spline
-    deviations = np.array([scale * rms_deviation(model, each) for each in range(order + 1)])
-    residual = row - (scale * spline(time)[:, 0] + offset)
+    known_errors = calibrated(model, order + 1, found.unexplained)
+    deviations = scale * np.sqrt(np.mean(known_errors.deviations[:, model.inside] ** 2, axis=1))
     size = scale * float(np.sqrt(np.mean(spline(model.probes, nu=order)[model.inside] ** 2)))
+    relative = float(deviations[order]) / max(size, np.finfo(float).tiny) if found.accepted else found.total
+    residual = row - (scale * spline(time)[:, 0] + offset)
     lines = Lines() if is_rounding(row, residual) else spectral_lines(time, residual, order, size)
-    # the unit of the posterior that makes its deviations those that are stated
-    unit = scale * deviation_factor(model) * math.sqrt(model.noise_variance) * found.stated / found.deviation
-    smoothing = Smoothing(deviations, found.stated, found.accepted, lines, model.cautious, unit)
+    units = scale * known_errors.units
+    smoothing = Smoothing(deviations, relative, found.accepted, lines, model.cautious, units)
     return BSpline(spline.t, scale * spline.c + offset, degree), smoothing
