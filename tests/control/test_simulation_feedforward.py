@@ -103,7 +103,7 @@ def fall(robot, torque, duration, stiffness):
 
     def rates(_time, y):
         state = y[:1], y[1:2], y[2 : 2 + parts], y[2 + parts :]
-        ddq, ddtheta = plant.accelerations(*state, np.array([torque]), None, {})
+        ddq, ddtheta, _ = plant.accelerations(*state, np.array([torque]), None, {})
         return np.concatenate((state[1], ddq, state[3], ddtheta))
 
     start = np.concatenate((q, still, theta, np.zeros(parts)))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vsacli.actuators.kinds import existing
-from vsacli.base.variables import VARIABLES, Variable
+from vsacli.base.variables import OF_ANY_ROBOT, VARIABLES, Variable
 
 STIFFNESS_K, STIFFNESS_KC, MOTOR_INERTIA = 400.0, 2000.0, 3.2
 
@@ -43,6 +43,9 @@ class Result:
 
     def existing(self, variable: Variable) -> np.ndarray:
         return np.array(existing(variable, self.actuators))
+
+    def has(self, variable: Variable) -> bool:
+        return variable.requires in OF_ANY_ROBOT
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> np.ndarray:
         return self._values[name][start:stop]

@@ -125,6 +125,11 @@ class Actuator(ABC):
         return False
 
     @property
+    def sides(self) -> tuple[JointMotor | None, ...]:
+        """Motors 1 and 2, None where there is none."""
+        return (*self.motors, None)[: len(MOTORS)]
+
+    @property
     def max_deflections(self) -> tuple[float, ...]:
         """Largest admissible |phi| at each motor; a limit that is flagged."""
         return (math.inf,) * self.motor_count
@@ -150,6 +155,8 @@ class Actuator(ABC):
             yield LimitCheck(Flag.DEFLECTION_LIMIT, "phi", number, within(deflection))
             yield LimitCheck(Flag.MOTOR_VELOCITY_LIMIT, "dtheta", number, within(motor.max_velocity))
             yield LimitCheck(Flag.MOTOR_TORQUE_LIMIT, "tau_motor", number, within(motor.max_torque))
+            yield LimitCheck(Flag.CURRENT_LIMIT, "current", number, within(motor.max_current or math.inf))
+            yield LimitCheck(Flag.VOLTAGE_LIMIT, "voltage", number, within(motor.max_voltage or math.inf))
 
     @abstractmethod
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:

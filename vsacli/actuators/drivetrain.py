@@ -13,7 +13,9 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.rotors import Rotors
+from vsacli.actuators.windings import Windings
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.variables import VARIABLES
 
@@ -38,6 +40,8 @@ class Drivetrain:
         joint: (motors,), index of the joint of each motor.
         inertia, damping, max_torque: (motors,) of the motors, joint side of the gear.
         rotors: of the motors with springs.
+        friction: dry friction of the motors, joint side; None if none has any.
+        windings: constants of the motors that give current and voltage; None if none is given.
         rigid: (joints,), whether the joint has no spring.
         deflected: (joints, 2), where there is a motor whose phi is a deflection.
         chosen: indices of the joints whose stiffness is commanded.
@@ -58,6 +62,8 @@ class Drivetrain:
             for name in ("inertia", "damping", "max_torque")
         )
         self.rotors = Rotors([actuator for actuator in actuators if actuator.sprung])
+        self.friction = FrictionLaws.of([motor.friction for _, motor in motors])
+        self.windings = Windings.of([motor for _, motor in motors])
         self.chosen = np.flatnonzero(["stiffness" in actuator.commanded for actuator in actuators])
         self.spring_joint = self.joint[self.sprung]
         self._direct = np.flatnonzero(self.rigid)
@@ -90,9 +96,7 @@ class Drivetrain:
 
         The latter are taken at motors without a spring.
         """
-        values = rigid[..., self.joint]
-        values[..., self.sprung] = sprung
-        return self.of_joints(values)
+        return self.of_joints(self.of_all(rigid, sprung))
 
     def direct(self, values: FloatArray) -> FloatArray:
         """The value of the motor that moves a joint directly, (..., joints) from (..., motors), else 0."""
@@ -100,6 +104,12 @@ class Drivetrain:
         if self._direct.size:
             result[..., self._direct] = values[..., ~self.sprung]
         return result
+
+    def of_all(self, rigid: FloatArray, sprung: FloatArray) -> FloatArray:
+        """(..., motors) from values of motors with springs, and of joints, taken at other motors."""
+        values = rigid[..., self.joint]
+        values[..., self.sprung] = sprung
+        return values
 
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """phi, (..., springs), from positions of joints (..., joints) and motors (..., springs); or rates."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
+from vsacli.actuators.friction import Friction
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import (
@@ -13,11 +15,29 @@ from vsacli.documents.fields import (
     NON_ZERO,
     POSITIVE,
     POSITIVE_OR_INFINITE,
+    Record,
     check_fields,
     number,
+    value,
 )
 
 _SIDE = "joint side of the gear unless gear_ratio is given"
+
+NEEDED = {
+    "torque_constant": ("gear_ratio",),
+    "resistance": ("torque_constant",),
+    "max_current": ("torque_constant",),
+    "max_voltage": ("torque_constant", "resistance"),
+}
+"""What must be given, too, where a constant of the windings is: they are those of the motor's shaft."""
+
+_UNKNOWN = {
+    "torque_constant": "the torque on the motor's shaft",
+    "resistance": "the current",
+    "max_current": "the current",
+    "max_voltage": "the voltage",
+}
+"""What is not known without."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +51,13 @@ class JointMotor:
     gear_ratio: float | None = number(
         units.GEAR_RATIO, "motion of the motor's shaft over that on the joint side", default=None
     )
+    friction: Friction | None = value(Record(Friction), "dry friction, joint side of the gear", default=None)
+    torque_constant: float | None = number(
+        units.JOINT_TORQUE_CONSTANT, "torque on the joint side of the gear over the current", default=None
+    )
+    resistance: float | None = number(units.RESISTANCE, "resistance of the windings", default=None)
+    max_current: float | None = number(units.CURRENT, "largest |current|", default=None)
+    max_voltage: float | None = number(units.VOLTAGE, "largest |voltage|", default=None)
 
 
 @dataclass(frozen=True)
@@ -58,6 +85,32 @@ class Motor:
         check=NON_ZERO,
         default=None,
     )
+    friction: Friction | None = value(Record(Friction), f"dry friction, {_SIDE}", default=None)
+    torque_constant: float | None = number(
+        units.TORQUE_CONSTANT,
+        "torque over current, and so voltage over velocity, on the motor's shaft; needs gear_ratio, "
+        "1 for a direct drive",
+        check=POSITIVE,
+        default=None,
+    )
+    resistance: float | None = number(
+        units.RESISTANCE,
+        "resistance of the windings; needs torque_constant",
+        check=NON_NEGATIVE,
+        default=None,
+    )
+    max_current: float | None = number(
+        units.CURRENT,
+        "largest |current|; flagged beyond; needs torque_constant",
+        check=POSITIVE_OR_INFINITE,
+        default=None,
+    )
+    max_voltage: float | None = number(
+        units.VOLTAGE,
+        "largest |voltage|; flagged beyond; needs torque_constant and resistance",
+        check=POSITIVE_OR_INFINITE,
+        default=None,
+    )
 
     unit_variant_with = ("gear_ratio", "revolute")
 
@@ -67,7 +120,16 @@ class Motor:
         if self.gear_ratio and POSITIVE.problem(inertia) and not POSITIVE.problem(self.inertia):
             reason = f"makes the inertia on the joint side {inertia:g}, too far from anything built"
             problems.append(FieldProblem(("gear_ratio",), reason))
-        check_fields(self, *problems)
+        check_fields(self, *problems, *self._missing())
+
+    def _missing(self) -> Iterator[FieldProblem]:
+        """What constants of the windings cannot do without."""
+        for name, needed in NEEDED.items():
+            missing = [key for key in needed if getattr(self, key) is None]
+            if getattr(self, name) is not None and missing:
+                direct = " (1 for a direct drive)" if "gear_ratio" in missing else ""
+                reason = f"needs {' and '.join(missing)}{direct}, without which {_UNKNOWN[name]} is not known"
+                yield FieldProblem((name,), reason)
 
     @staticmethod
     def example(joint_type: str) -> dict[str, float]:
@@ -77,12 +139,18 @@ class Motor:
 
     @cached_property
     def at_joint(self) -> JointMotor:
-        """What its joint has of it: inertia and damping times the ratio squared, torque times the ratio."""
-        ratio = abs(self.gear_ratio or 1.0)
+        """What its joint has of it: inertia and damping times the ratio squared, torques times the ratio."""
+        signed = self.gear_ratio or 1.0
+        ratio = abs(signed)
         return JointMotor(
             inertia=self.inertia * ratio * ratio,
             damping=self.damping * ratio * ratio,
             max_torque=self.max_torque * ratio,
             max_velocity=self.max_velocity / ratio,
             gear_ratio=self.gear_ratio,
+            friction=self.friction and self.friction.geared(signed),
+            torque_constant=None if self.torque_constant is None else signed * self.torque_constant,
+            resistance=self.resistance,
+            max_current=self.max_current,
+            max_voltage=self.max_voltage,
         )

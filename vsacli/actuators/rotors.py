@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 
 
 class Rotors:
@@ -42,3 +42,11 @@ class Rotors:
             effective = self._inertia[here] - share * self._coupling[here]
             accelerations[..., here] = (torques[..., here] - share * torques[..., other]) / effective
         return accelerations
+
+    def held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Theta'' where some motors are held, and the torques that hold these, 0 of others; (..., motors)."""
+        apart = held.copy()
+        apart[..., self._coupled] |= held[..., self._other]
+        moving = np.where(apart, torques / self._inertia, self.accelerations(torques))
+        accelerations = np.where(held, 0.0, moving)
+        return accelerations, np.where(held, torques - self.torques(accelerations), 0.0)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
+from vsacli.analysis.dry_friction import DryFriction
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.dynamics.energy import JointEnergy
@@ -138,6 +139,7 @@ class JointReport(Stored):
         uncertainty: what recorded signals leave uncertain; None if nothing comes from fits of records.
         between: what comes nearer to its bound between the steps than at any step: "margin" is the stiffness
             in its corridor, others are called as the flags of their limits.
+        dry_friction: of each motor whose friction is sharp, where its torque is two-valued.
     """
 
     name: str
@@ -163,6 +165,7 @@ class JointReport(Stored):
     peak_dtheta: tuple[float, float] = UNKNOWN
     uncertainty: JointUncertainty | None = None
     between: dict[str, Worst] = field(default_factory=dict)
+    dry_friction: tuple[DryFriction, ...] = ()
 
     shape: ClassVar = {
         **named("name", "type", "actuator", "steps", "first_time", "worst"),
@@ -174,6 +177,7 @@ class JointReport(Stored):
         **named("other_preload", "energy"),
         "uncertainty?": "uncertainty",
         "between?": "between",
+        "dry_friction?": "dry_friction",
     }
 
     def shows(self, verdict: str) -> bool:

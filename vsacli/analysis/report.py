@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 from vsacli.analysis import report_text as text
+from vsacli.analysis.dry_friction import dry_friction_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.analysis.uncertainty_text import uncertainty_lines
@@ -79,6 +80,9 @@ class Report(Stored):
                 *text.stops(self.joints, self.drifts),
                 *text.start(self.joints),
                 *text.end(self.joints),
+                *dry_friction_lines(
+                    [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
+                ),
                 *text.energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
                 *text.drift_lines(self.drifts),
                 text.self_check_line(self.self_check),

@@ -256,12 +256,25 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
         name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
         held = f"; springs hold up to {number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
         yield f"energy: motors spend {spent} J, take back {recovered} J{held}"
+        yield from _losses(energies)
     paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
     if paired:
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
         unit = TORQUE.unit(joint_type)
         effort, load = f"{number(most.co_contraction)} {unit}", f"{number(most.load)} {unit}"
         yield f"co-contraction: up to {effort} rms for each motor ({name}), its load takes {load}"
+
+
+def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
+    """What friction and windings take, of a robot whose file says so."""
+    taken = {
+        "friction and damping take {} J": [energy.dissipated for energy in energies],
+        "the windings turn {} J into heat": [energy.copper_loss for energy in energies],
+    }
+    known = {words: [loss for loss in losses if loss is not None] for words, losses in taken.items()}
+    sums = [words.format(number(sum(losses))) for words, losses in known.items() if losses]
+    if sums:
+        yield "losses: " + ", ".join(sums)
 
 
 def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterator[str]:

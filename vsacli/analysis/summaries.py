@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from vsacli.actuators.reach import margin, nearer_end
+from vsacli.analysis.dry_friction import dry_frictions
 from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, JointUncertainty, Worst
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
@@ -36,6 +37,7 @@ class JointSummary:
         self._start: FloatArray | None = None
         self._end = np.full((2, len(MOTORS)), np.nan)
         self._other_preload = "stiffness" in joint.actuator.commanded
+        self._dry_friction = dry_frictions(joint.actuator.motors)
 
     def add(self, block: Block) -> None:
         """Merge a block of steps."""
@@ -55,6 +57,8 @@ class JointSummary:
             np.fmax(most, np.fmax.reduce(stiffness)),
         )
         rows = block.tau_e[:, index], *block.tau_motor[:, index].T, *block.dtheta[:, index].T
+        for motor in self._dry_friction:
+            motor.add(block.time, block.dtheta[:, index, motor.number - 1])
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(np.abs(row)) for row in rows])
 
     def add_between(self, block: Block) -> None:
@@ -129,6 +133,7 @@ class JointSummary:
             end_dtheta=end_dtheta,
             peak_dtheta=_pair(self._peaks[3:]),
             uncertainty=uncertainty,
+            dry_friction=tuple(motor.report() for motor in self._dry_friction),
         )
 
     def _count(self, flags: FlagArray, time: FloatArray) -> None:

@@ -51,6 +51,8 @@ class Flag(enum.IntFlag):
         "the motion inside a damped transmission is unstable: deviations from what was computed would grow",
         None,
     )
+    CURRENT_LIMIT = 2048, "a motor current exceeds max_current", "current of motor"
+    VOLTAGE_LIMIT = 4096, "a motor voltage exceeds max_voltage", "voltage of motor"
     DAMPING_LIMIT = 8192, "the commanded damping leaves the range of the damper", "damping"
     NOT_FINITE = (
         16384,

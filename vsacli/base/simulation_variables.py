@@ -14,6 +14,7 @@ ACTUAL = (
     *("tau_e", "phi", "dphi", "theta", "dtheta", "tau_spring", "tau_motor"),
     *("elastic_energy", "motor_power", "motor_energy", "det_A"),
     *("damping", "tau_damper"),
+    *("dissipated_power", "current", "voltage", "copper_loss"),
 )
 ERRORS = ("q", "dq", "stiffness", "dstiffness")
 

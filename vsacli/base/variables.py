@@ -20,6 +20,12 @@ MOTORS = (1, 2)
 SPRINGS = "springs"
 """What a joint must have to have a variable, unless that is to take a commanded signal."""
 
+MOTOR_CONSTANTS = ("torque_constant", "resistance")
+"""Constants of a motor that it must have to have a variable."""
+
+LOSSES = "friction"
+"""What the robot must have for the variables on what its joints lose."""
+
 OF_ANY_ROBOT = (None, SPRINGS, STIFFNESS.key)
 """What variables require that every result has, NaN where a joint does not have them. Those that require
 something else are left out of results of robots no joint of which has it."""
@@ -34,7 +40,8 @@ class Variable(NamedTuple):
         quantity: unit at revolute and prismatic joints, or of moments and forces.
         long_name: a few words.
         equation: number in Buondonno & De Luca (2016), or where the value comes from.
-        requires: what a joint must have to have it, `SPRINGS` or a commanded signal by key; else it is NaN.
+        requires: what a joint must have to have it, `SPRINGS`, a commanded signal by key, one of
+            `MOTOR_CONSTANTS`; else it is NaN. `LOSSES` all joints have if any has friction.
         geared: the power of a motor's gear ratio by which the value is larger on the motor's shaft.
     """
 
@@ -101,6 +108,38 @@ _COMPUTED = (
         units.ENERGY,
         "mechanical work of the motor since the first step",
         "integral of motor_power",
+    ),
+    Variable(
+        "dissipated_power",
+        _JOINT,
+        units.POWER,
+        "power that friction and damping of the joint and its motors take",
+        "friction times velocity",
+        LOSSES,
+    ),
+    Variable(
+        "current",
+        _MOTOR,
+        units.CURRENT,
+        "current of the motor",
+        "tau_motor/(gear_ratio * torque_constant)",
+        "torque_constant",
+    ),
+    Variable(
+        "voltage",
+        _MOTOR,
+        units.VOLTAGE,
+        "voltage of the motor",
+        "resistance * current + torque_constant * gear_ratio * dtheta",
+        "resistance",
+    ),
+    Variable(
+        "copper_loss",
+        _MOTOR,
+        units.POWER,
+        "heat in the windings of the motor",
+        "resistance * current^2",
+        "resistance",
     ),
     Variable(
         "det_A",

@@ -31,6 +31,7 @@ from vsacli.cli.plot import draw_staged
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.results.plots import FigureFiles
+    from vsacli.robot.model import Robot
 
 
 @click.command(
@@ -85,7 +86,11 @@ def invdyn(
 
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
-        figures = None if plot_folder is None else _figures(plot_folder, path.stem, variables, outputs)
+        figures = (
+            None
+            if plot_folder is None
+            else _figures(inputs.robot, plot_folder, path.stem, variables, outputs)
+        )
         run = Run(
             *inputs,
             stop_on_infeasible=stop_on_infeasible,
@@ -104,10 +109,12 @@ def invdyn(
     return code
 
 
-def _figures(folder: str, stem: str, variables: tuple[str, ...] | None, outputs: Outputs) -> FigureFiles:
+def _figures(
+    robot: Robot, folder: str, stem: str, variables: tuple[str, ...] | None, outputs: Outputs
+) -> FigureFiles:
     """Those that the variables which are stored allow."""
     from vsacli.base.variables import VARIABLES
-    from vsacli.results.plots import RESULT_DRAWINGS, FigureFiles, drawable_figures
+    from vsacli.results.plots import FigureFiles, drawable_figures, result_drawings
 
-    drawn = drawable_figures(RESULT_DRAWINGS, VARIABLES if variables is None else variables)
+    drawn = drawable_figures(result_drawings(robot.has), VARIABLES if variables is None else variables)
     return FigureFiles(drawn, folder, stem, "png", outputs)

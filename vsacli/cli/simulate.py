@@ -167,7 +167,7 @@ def simulate(
 def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFiles:
     from vsacli.results.plots import FigureFiles, simulation_drawings
 
-    drawn = simulation_drawings(joint.actuator_type for joint in robot.joints)
+    drawn = simulation_drawings(lambda variable: any(any(joint.has(variable)) for joint in robot.joints))
     return FigureFiles(drawn, folder, stem, "png", outputs)
 
 

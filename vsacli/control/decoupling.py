@@ -48,8 +48,13 @@ class Decoupling:
         dtheta: FloatArray,
         reference: Motion,
         integral: Integral,
+        slip: FloatArray | None = None,
     ) -> FloatArray:
-        """Motor torques, (..., motors); NaN at a joint whose A is singular."""
+        """Motor torques, (..., motors); NaN at a joint whose A is singular.
+
+        Friction is compensated by the velocities of the motors; where it is sharp by their direction `slip`,
+        (motors,), if that is given, and not at all at rest.
+        """
         drivetrain = self._plant.drivetrain
         springs = drivetrain.state(q, theta, dq, dtheta)
         link = self._link_motion(q, dq, springs, reference.wrench, reference.commanded)
@@ -70,7 +75,9 @@ class Decoupling:
         ddtau_e = add(ddtau_e, dampers.ddtau)
         ddtheta = springs.motor_accelerations(link.ddq, ddtau_e, v_sigma)
         of_rotors = drivetrain.rotors.torques(ddtheta)
-        return of_rotors + drivetrain.damping * dtheta + springs.tau_spring  # (73)-(74)
+        torque = of_rotors + drivetrain.damping * dtheta + springs.tau_spring  # (73)-(74)
+        friction = drivetrain.friction
+        return torque if friction is None else torque + friction.torque(dtheta, slip)
 
     def link_motion(
         self,

@@ -28,8 +28,9 @@ class ComputedTorque:
         _dtheta: FloatArray,
         reference: Motion,
         integral: Integral,
+        slip: FloatArray | None = None,
     ) -> FloatArray:
-        """Motor torques, (..., motors): tau = (M + B) v + n + Dm q'."""
+        """Motor torques, (..., motors): tau = (M + B) v + n + Dm q' + friction, `slip` as of `Decoupling`."""
         v_q = linear_control(
             (reference.q, reference.dq, reference.ddq),
             (q, dq),
@@ -38,7 +39,8 @@ class ComputedTorque:
         chain, drivetrain = self._plant.chain, self._plant.drivetrain
         of_links = (chain.mass_matrix(q) @ v_q[..., None])[..., 0] + chain.bias(q, dq, reference.wrench)
         of_links += drivetrain.inertia * v_q + drivetrain.damping * dq
-        return of_links
+        friction = drivetrain.friction
+        return of_links if friction is None else of_links + friction.torque(dq, slip)
 
 
 def feedback_linearization(

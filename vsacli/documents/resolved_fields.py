@@ -15,7 +15,7 @@ class ResolvedField(NamedTuple):
 
     Attributes:
         path: keys that lead to it in a file, e.g. ("joints", "link", "mass").
-        dims: one name an axis of `values`: joint, motor, axis or bound.
+        dims: one name an axis of `values`: joint, motor, axis, bound or direction.
         quantity: unit at revolute and prismatic joints, None for text.
         doc: the declared sentence.
         values: float64 or str objects; NaN or "" at entries that do not have the field.

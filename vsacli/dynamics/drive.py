@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.transmission import Command
+from vsacli.actuators.windings import Windings
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, finite, has, not_finite_flags
 from vsacli.base.signals import DAMPING
@@ -24,7 +26,8 @@ class Drive(NamedTuple):
 
     The names are those of the result variables. Where a step is infeasible everything of the motors is NaN,
     where it is singular what needs the inverse of the decoupling matrix is. What the actuator does not have
-    is NaN throughout; what belongs to devices that the joint does not have is None.
+    is NaN throughout; what belongs to devices that the joint does not have, or to motors without torque
+    constant, is None.
     """
 
     stiffness: FloatArray
@@ -44,6 +47,9 @@ class Drive(NamedTuple):
     stiffness_upper: FloatArray
     flags: FlagArray
     tau_damper: FloatArray | None = None
+    current: FloatArray | None = None
+    voltage: FloatArray | None = None
+    copper_loss: FloatArray | None = None
 
     def arrays(self) -> dict[str, AnyArray]:
         """Those there are, by name."""
@@ -72,6 +78,13 @@ def drive(
     damping = _by_motor([motor.damping for motor in motors])
     of_rotors = _rotor_torques(actuator, transmission.ddtheta)
     tau_motor = of_rotors + damping * dtheta + transmission.tau_spring  # (73)-(74)
+    friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
+    if friction is not None:
+        tau_motor = tau_motor + friction.with_axis_behind().torque(dtheta)
+    windings = Windings.of(actuator.sides)
+    electrical: dict[str, Any] = (
+        {} if windings is None else windings.with_axis_behind().variables(tau_motor, dtheta)
+    )
     driven = Drive(
         **transmission._asdict(),
         theta=actuator.motor_positions(transmission.phi, command.q),  # (69)
@@ -79,7 +92,7 @@ def drive(
         tau_motor=tau_motor,
         motor_power=tau_motor * dtheta,
         tau_damper=command.commanded[DAMPING.key] * command.dq if joint.damper else None,
-    )
+    )._replace(**electrical)
     driven = driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
     of_joint = {**command.arrays(), **driven.arrays()}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))

@@ -20,11 +20,13 @@ from vsacli.compute.vector import (
     Scalar,
     SymmetricTensor,
     Vector,
+    add,
     exact,
     trigonometric,
 )
 from vsacli.dynamics.dampers import damper_torque
-from vsacli.dynamics.recursion import JointState, LinkConstants, TipLoad, recursion
+from vsacli.dynamics.joint_friction import joint_friction
+from vsacli.dynamics.recursion import JointState, LinkConstants, TipLoad, TorqueDerivatives, recursion
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot, check_robot
@@ -247,7 +249,8 @@ def joint_state(
         damping: of its damper, with two derivatives; counts if that lies between the links.
     """
     dh = joint.dh
-    resistance = damper_torque(damping if joint.damper_at("link") else (0, 0, 0), rates[:3])
+    damper = damper_torque(damping if joint.damper_at("link") else (0, 0, 0), rates[:3])
+    resistance = TorqueDerivatives(*map(add, damper, joint_friction(joint.friction, rates)))
     if joint.is_revolute:
         angle = q + dh.theta
         return JointState(np.cos(angle), np.sin(angle), exact(dh.d), rates, resistance)

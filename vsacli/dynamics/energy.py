@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -11,7 +12,9 @@ import numpy as np
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray, by_joint, over_time
 from vsacli.base.json_records import Stored, named
-from vsacli.base.variables import Block
+from vsacli.base.variables import VARIABLES, Block
+from vsacli.dynamics.losses import LossMeter
+from vsacli.dynamics.quadrature import integrals, positive_part, work_on_each_other
 from vsacli.robot.model import Robot
 
 
@@ -32,6 +35,8 @@ class JointEnergy(Stored):
         co_contraction: root mean square over time of (tau_1 - tau_2)/2, N m (N); NaN where
             torques do not split.
         load: that of tau_e/2, likewise.
+        dissipated: what friction and damping of joint and motors took, J; None if nothing has dry friction.
+        copper_loss: heat in the windings of its motors, J; None if no resistance is given.
     """
 
     elastic_peak: float
@@ -39,10 +44,14 @@ class JointEnergy(Stored):
     recovered: float
     co_contraction: float
     load: float
+    dissipated: float | None = None
+    copper_loss: float | None = None
 
-    shape: ClassVar = named(
-        "elastic_peak", "spent", "recovered", "co_contraction", "load", "co_contraction_share"
-    )
+    shape: ClassVar = {
+        **named("elastic_peak", "spent", "recovered", "co_contraction", "load", "co_contraction_share"),
+        "dissipated?": "dissipated",
+        "copper_loss?": "copper_loss",
+    }
 
     @property
     def co_contraction_share(self) -> float:
@@ -60,6 +69,9 @@ class Flow(NamedTuple):
         motor_power: (joints, 2, samples), W.
         tau_spring: (joints, 2, samples), N m (N).
         elastic_energy: (joints, samples), J.
+        dissipated: taken by friction and damping in each interval, (joints, samples - 1), J; None if there is
+            no dry friction.
+        copper: heat in the windings in each interval, (joints, 2, samples - 1), J; None if it is not known.
     """
 
     intervals: FloatArray
@@ -67,6 +79,8 @@ class Flow(NamedTuple):
     motor_power: FloatArray
     tau_spring: FloatArray
     elastic_energy: FloatArray
+    dissipated: FloatArray | None = None
+    copper: FloatArray | None = None
 
 
 class EnergyMeter:
@@ -79,6 +93,7 @@ class EnergyMeter:
         self._work, self._spent = _Sum(), _Sum()
         self._duration, self._load, self._co_contraction = _Sum(), _Sum(), _Sum()
         self._peak: FloatArray | float = math.nan
+        self._dissipated, self._copper = _Sum(), _Sum()
 
     def add(self, flow: Flow) -> FloatArray:
         """Merge a flow; returns the work of each motor up to the end of each interval, in its place."""
@@ -90,6 +105,10 @@ class EnergyMeter:
             effort *= effort
             total.add(intervals / 8 * (effort[:, 1:] + effort[:, :-1]))
         self._spent.add(positive_part(intervals, flow.motor_power, flow.work))
+        if flow.dissipated is not None:
+            self._dissipated.add(flow.dissipated)
+        if flow.copper is not None:
+            self._copper.add(flow.copper)
         return self._work.add(flow.work)
 
     def report(self, robot: Robot) -> list[JointEnergy]:
@@ -103,7 +122,21 @@ class EnergyMeter:
             for total in (self._co_contraction, self._load)
         ]
         found = np.array((self._peak, spent, spent - work, *efforts))
-        return [JointEnergy(*of_joint) for of_joint in found.T.tolist()]
+        lost = zip(self._dissipated_of(robot), self._copper_of(robot), strict=True)
+        return [
+            replace(JointEnergy(*each), dissipated=dissipated, copper_loss=copper_loss)
+            for each, (dissipated, copper_loss) in zip(found.T.tolist(), lost, strict=True)
+        ]
+
+    def _dissipated_of(self, robot: Robot) -> list[float | None]:
+        if not robot.has(VARIABLES["dissipated_power"]):
+            return [None] * len(robot.joints)
+        return list(map(float, np.asarray(self._dissipated.value)))
+
+    def _copper_of(self, robot: Robot) -> Iterator[float | None]:
+        for index, joint in enumerate(robot.joints):
+            heated = joint.has(VARIABLES["copper_loss"])
+            yield float(np.sum(np.asarray(self._copper.value)[index, heated])) if any(heated) else None
 
 
 class RunEnergy:
@@ -114,6 +147,8 @@ class RunEnergy:
         self._inertia, self._damping = _motor_constants(robot)
         self._coupling = np.array([joint.actuator.coupled_rotors for joint in robot.joints])
         self._meter = EnergyMeter()
+        lossy = any(robot.has(VARIABLES[name]) for name in ("dissipated_power", "copper_loss"))
+        self._losses = LossMeter(robot) if lossy else None
         self._last: _Rows | None = None
 
     def add(self, block: Block) -> FloatArray:
@@ -129,6 +164,10 @@ class RunEnergy:
             motion = joined.dtheta[coupled], joined.ddtheta[coupled]
             work[coupled] += self._coupling[coupled, None, None] * work_on_each_other(intervals, *motion)
         flow = Flow(intervals, work, joined.motor_power, joined.tau_spring, joined.elastic_energy)
+        if self._losses is not None:
+            lost = self._losses.add(block)
+            work += lost.motor_friction
+            flow = flow._replace(dissipated=lost.dissipated, copper=lost.copper)
         return over_time(self._meter.add(flow))
 
     def _rows(self, block: Block) -> _Rows:
@@ -200,63 +239,6 @@ class _Sum:
         np.add.accumulate(pieces, axis=-1, out=pieces)
         self.value = pieces[..., -1].copy()
         return pieces
-
-
-def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> FloatArray:
-    """Time integral over each interval, by the cubic with the values and rates at its ends; error O(h^5).
-
-    Args:
-        intervals: lengths h, (samples - 1,), s.
-        values: of the integrand, (..., samples).
-        rates: its derivative, likewise.
-    """
-    integral: FloatArray = rates[..., :-1] - rates[..., 1:]
-    integral *= intervals / 6
-    integral += values[..., 1:]
-    integral += values[..., :-1]
-    integral *= intervals / 2
-    return integral
-
-
-def work_on_each_other(intervals: FloatArray, dtheta: FloatArray, ddtheta: FloatArray) -> FloatArray:
-    """Integral of each motor's velocity times the acceleration of the other over each interval.
-
-    By the cubics with the velocities and accelerations at the ends; error O(h^5). The sum of both is the
-    difference of theta_1' theta_2', as it must be.
-
-    Args:
-        intervals: lengths h, (samples - 1,), s.
-        dtheta: (joints, 2, samples).
-        ddtheta: likewise.
-    """
-    before, after = dtheta[..., :-1], dtheta[..., 1:]
-    rise, rise_after = intervals * ddtheta[..., :-1], intervals * ddtheta[..., 1:]
-
-    def turned(one: FloatArray, two: FloatArray) -> FloatArray:
-        """What is one motor's times what is the other's, less the same with the motors exchanged."""
-        return one * two[:, ::-1] - two * one[:, ::-1]
-
-    area = turned(before, after) - turned(rise, rise_after) / 30
-    area += (turned(before, rise - rise_after) + turned(rise - rise_after, after)) / 5
-    whole = (after * after[:, ::-1] - before * before[:, ::-1]) + area
-    return whole / 2
-
-
-def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) -> FloatArray:
-    """Time integral of the positive part of a power over each interval.
-
-    Args:
-        intervals: lengths h, (samples - 1,), s.
-        power: (..., samples); where it changes its sign in an interval it is taken for linear, error O(h^3).
-        work: its integral over each interval, (..., samples - 1).
-    """
-    positive: FloatArray = np.maximum(work, 0.0)
-    before, after = power[..., :-1], power[..., 1:]
-    turns = before * after < 0
-    if turns.any():
-        low, high = np.minimum(before, after)[turns], np.maximum(before, after)[turns]
-        positive[turns] = np.broadcast_to(intervals, turns.shape)[turns] / 2 * high**2 / (high - low)
-    return positive
 
 
 def _motor_constants(robot: Robot) -> FloatArray:

@@ -10,13 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.base.arrays import FloatArray, checked_shape
+from vsacli.base.arrays import BoolArray, FloatArray, checked_shape
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.signals import DAMPING
 from vsacli.base.wrench import Wrench, check_wrench
 from vsacli.compute.vector import add
 from vsacli.dynamics.dampers import Dampers
 from vsacli.dynamics.rigid_body import chain_of
+from vsacli.dynamics.stiction import Response, response_with_friction
 from vsacli.robot.model import Robot, check_robot
 
 
@@ -92,7 +93,7 @@ def state_derivative(
     commanded[DAMPING.key] = checked_shape(
         DAMPING.key, np.broadcast_to(least, q.shape) if damping is None else damping, len(robot.joints)
     )
-    ddq, ddtheta = plant.accelerations(q, dq, theta, dtheta, torque, wrench, commanded)
+    ddq, ddtheta, _ = plant.accelerations(q, dq, theta, dtheta, torque, wrench, commanded)
     merged = plant.drivetrain.merged
     return Rates(dq, ddq, merged(dtheta, dq), merged(ddtheta, ddq))
 
@@ -147,8 +148,11 @@ class Plant:
         torque: FloatArray,
         wrench: Wrench | None,
         commanded: Mapping[str, FloatArray],
-    ) -> tuple[FloatArray, FloatArray]:
-        """Accelerations of the joints (..., joints) and of the motors with springs (..., springs), by (5).
+        slip: FloatArray | None = None,
+    ) -> Response:
+        """Accelerations of the joints and of the motors with springs, by (5).
+
+        A motor with sharp friction that rests stays at rest as long as its friction can hold it.
 
         Args:
             q: position of the joints, (..., joints).
@@ -158,15 +162,43 @@ class Plant:
             torque: of all motors, (..., motors).
             wrench: what the environment exerts, if the plant was made for one.
             commanded: the damping, by name, (..., joints); counts if there are dampers.
+            slip: where friction is sharp the direction in which a motor slides, 0 while it is held,
+                (motors,); if None, a motor that rests is held as long as its friction can.
         """
         tau_e, spring = self.drivetrain.torques(q, theta)
         damper = self.dampers.passed(commanded, dq, dtheta)
         resistance = add(self.chain.bias(q, dq, wrench), self.dampers.of_links(commanded, dq).tau)
         matrix = self.chain.mass_matrix(q) + self._rigid_matrix
-        drive = add(tau_e, damper.links) + self.drivetrain.direct(torque)
-        ddq = self.chain.solve(matrix, drive - resistance - self._rigid_damping * dq)
-        left = torque[..., self.drivetrain.sprung] - self._damping * dtheta - add(spring, damper.motors)
-        return ddq, self.drivetrain.rotors.accelerations(left)
+        laws, velocity = self.drivetrain.friction, self.drivetrain.of_all(dq, dtheta)
+
+        def balance(given: FloatArray, held: BoolArray | None) -> tuple[FloatArray, FloatArray, FloatArray]:
+            drive = add(tau_e, damper.links) + self.drivetrain.direct(given)
+            on_joints = drive - resistance - self._rigid_damping * dq
+            left = given[..., self.drivetrain.sprung] - self._damping * dtheta
+            on_motors = left - add(spring, damper.motors)
+            return self._balanced(matrix, on_joints, on_motors, held)
+
+        if laws is None:
+            ddq, ddtheta, _ = balance(torque, None)
+            return Response(ddq, ddtheta, None)
+        return response_with_friction(laws, torque, velocity, slip, balance)
+
+    def _balanced(
+        self, matrix: FloatArray, on_joints: FloatArray, on_motors: FloatArray, held: BoolArray | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Accelerations under forces on joints and on motors with springs; see `Balance`."""
+        rotors = self.drivetrain.rotors
+        if held is None or not held.any():
+            still = np.zeros((*on_motors.shape[:-1], len(self.drivetrain.joint)))
+            return self.chain.solve(matrix, on_joints), rotors.accelerations(on_motors), still
+        held_joints = self.drivetrain.direct(held.astype(np.float64)) > 0
+        apart = held_joints[..., :, None] | held_joints[..., None, :]
+        free = np.where(apart, np.eye(on_joints.shape[-1]), matrix)
+        ddq = self.chain.solve(free, np.where(held_joints, 0.0, on_joints))
+        holding_joints = on_joints - (matrix @ ddq[..., None])[..., 0]
+        ddtheta, holding_motors = rotors.held(on_motors, held[..., self.drivetrain.sprung])
+        holding = self.drivetrain.of_all(holding_joints, holding_motors)
+        return ddq, ddtheta, np.where(held, holding, 0.0)
 
     def link_torque(
         self, dq: FloatArray, ddq: FloatArray, tau_e: FloatArray, torque: FloatArray
@@ -177,7 +209,7 @@ class Plant:
             dq: velocity of the joints, (..., joints).
             ddq: their acceleration.
             tau_e: of the springs, (..., joints), 0 where there are none.
-            torque: of all motors, (..., motors).
+            torque: of all motors less their dry friction, (..., motors).
         """
         of_rotors = self._rigid_inertia * ddq + self._rigid_damping * dq
         return tau_e + self.drivetrain.direct(torque) - of_rotors

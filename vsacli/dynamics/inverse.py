@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,13 +24,14 @@ from vsacli.compute.vector import Scalar
 from vsacli.dynamics.drive import Drive, drive
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.losses import dissipated_power
 from vsacli.robot.commanded_joints import takers
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.devices import with_uncommanded_devices
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
-COMPUTED = (*TORQUES, *Drive._fields)
+COMPUTED = (*TORQUES, *Drive._fields, "dissipated_power")
 """The variables that inverse dynamics computes, where the robot has them."""
 
 
@@ -86,7 +88,7 @@ class InverseDynamics(RowKernel):
         integrated = {"phi": (joints, SIDES)} if self.integrated else {}
         return RowLayout({**self.links.arguments.shapes, **commanded, **integrated})
 
-    @property
+    @cached_property
     def results(self) -> RowLayout:
         """Rows that inverse dynamics gives."""
         joints, declared = len(self.robot.joints), [VARIABLES[name] for name in COMPUTED]
@@ -114,6 +116,10 @@ class InverseDynamics(RowKernel):
             for index, joint in enumerate(self.robot.joints)
         ]
         driven = {name: [getattr(each, name) for each in drives] for name in Drive._fields}
+        if "dissipated_power" in self.results.shapes:
+            moved = zip(given["dq"], driven["dtheta"], strict=True)
+            motions = [{"dq": dq, "dtheta": dtheta} for dq, dtheta in moved]
+            driven["dissipated_power"] = list(map(dissipated_power, self.robot.joints, motions))
         absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(drives[0].dtheta, np.nan)}
         computed: dict[str, Iterable[Scalar]] = {
             name: _rows(absent[len(VARIABLES[name].dims)] if array is None else array for array in of_all)

@@ -49,15 +49,7 @@ class TorqueDerivatives(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """Pose and motion of a joint.
-
-    Attributes:
-        cos: of its angle.
-        sin: of its angle.
-        d: its offset.
-        rates: first to fourth derivative of q.
-        resistance: what it takes beside what moves the links and beside D q'.
-    """
+    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque that dampers and friction take."""
 
     cos: Scalar
     sin: Scalar

@@ -184,7 +184,8 @@ def _recorded(robot: Robot, frame: str | None) -> Chain:
 
 
 def _inertia_program(robot: Robot) -> StateFunction:
-    """Lower triangle of M, row by row."""
+    """Lower triangle of M, row by row; an offset of friction has no part in it."""
+    robot = replace(robot, joints=tuple(replace(joint, friction=None) for joint in robot.joints))
     tape = Tape()
     q = tape.inputs(len(robot.joints))
     numbers = range(len(robot.joints))

@@ -10,12 +10,13 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.damper import Damper
+from vsacli.actuators.friction import Friction
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.signals import COMMANDED, Signal
-from vsacli.base.variables import OF_ANY_ROBOT, Variable
+from vsacli.base.variables import LOSSES, MOTOR_CONSTANTS, OF_ANY_ROBOT, Variable
 from vsacli.documents.fields import (
     NON_NEGATIVE,
     OneOf,
@@ -154,6 +155,9 @@ class Joint:
     damping: float = number(
         units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
     )
+    friction: Friction | None = value(
+        Record(Friction), "dry friction between the links, smooth: with a width", default=None
+    )
     actuator: Actuator = value(OneOf(ACTUATORS), "what drives the joint")
     damper: Damper | None = value(Record(Damper), "damper whose damping is commanded", default=None)
     limits: Limits = value(Record(Limits), "limits of the commanded motion", default=Limits())
@@ -171,7 +175,7 @@ class Joint:
         unfit = self.actuator.unfit_for(self.type)
         if unfit is not None:
             problems.append(unfit.inside("actuator"))
-        check_fields(self, *problems)
+        check_fields(self, *problems, *self._friction_problems())
 
     @property
     def is_revolute(self) -> bool:
@@ -207,8 +211,37 @@ class Joint:
         """Which columns of a result variable it has: of motors 1 and 2, or of the joint."""
         if variable.requires in OF_ANY_ROBOT:
             return self.actuator.has(variable)
-        there = variable.requires in self.commanded
-        return [there and column for column in self.actuator.has(variable._replace(requires=None))]
+        of_kind = self.actuator.has(variable._replace(requires=None))
+        if variable.requires in MOTOR_CONSTANTS:
+            given = [getattr(side, variable.requires, None) is not None for side in self.actuator.sides]
+            return [kind and motor for kind, motor in zip(of_kind, given, strict=True)]
+        there = variable.requires == LOSSES or variable.requires in self.commanded
+        return [there and column for column in of_kind]
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether it or one of its motors has dry friction."""
+        return any((self.friction, *(motor.friction for motor in self.actuator.motors)))
+
+    def _friction_problems(self) -> Iterator[FieldProblem]:
+        """What keeps its friction from being differentiated twice, as part of the elastic torque."""
+        if self.friction is None:
+            return
+        backward, forward = self.friction.coulomb
+        if self.friction.sharp:
+            reason = (
+                "must be positive: friction between the links is part of the elastic torque, of which two "
+                "derivatives are needed, and the sign function has none; take a speed below which the joint "
+                "hardly moves, or give the friction to the motor, where width 0 will do"
+            )
+            yield FieldProblem(("friction", "width"), reason)
+        if backward != forward:
+            reason = (
+                "must be one number between the links: with two the slope of the torque jumps at rest; give "
+                f"their mean {(backward + forward) / 2:g}, and half their difference as "
+                f"offset: {(forward - backward) / 2:g}"
+            )
+            yield FieldProblem(("friction", "coulomb"), reason)
 
     def warnings(self, *, massless: bool = False) -> Iterator[str]:
         """What may not be what was meant, of link and springs; if no link has a mass, nothing on that."""

@@ -11,7 +11,7 @@ from vsacli.base import units
 from vsacli.base.errors import Problem, check_type
 from vsacli.base.signals import COMMANDED, Signal
 from vsacli.base.tables import aligned, html_table
-from vsacli.base.variables import OF_ANY_ROBOT, VARIABLES, Variable
+from vsacli.base.variables import LOSSES, OF_ANY_ROBOT, VARIABLES, Variable
 from vsacli.documents.fields import (
     Items,
     Name,
@@ -105,6 +105,8 @@ class Robot:
 
     def has(self, variable: Variable) -> bool:
         """Whether results of the robot hold a variable of joints."""
+        if variable.requires == LOSSES:
+            return any(joint.has_friction for joint in self.joints)
         required_of_none = variable.requires in OF_ANY_ROBOT
         return required_of_none or any(any(joint.has(variable)) for joint in self.joints)
 

@@ -38,7 +38,7 @@ class Emitter(Protocol):
 
 
 class Symbol:
-    """An input of a program, or the result of an operation, as a scalar with + - * / cos sin.
+    """An input of a program, or the result of an operation, as a scalar with + - * / cos sin tanh.
 
     Attributes:
         tape: where the operation is.
@@ -90,6 +90,10 @@ class Symbol:
     def sin(self) -> Operand:
         """Sine; what `numpy.sin` calls."""
         return self.tape.emit("sin", self)
+
+    def tanh(self) -> Operand:
+        """Hyperbolic tangent; what `numpy.tanh` calls."""
+        return self.tape.emit("tanh", self)
 
 
 Operand: TypeAlias = Symbol | float | int | bool

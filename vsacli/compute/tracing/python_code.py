@@ -21,13 +21,14 @@ _EXPRESSIONS = {
     "multiply": "{} * {}",
     "divide": "{} / {}",
     "negative": "-{}",
-    "cos": "cos({})",
-    "sin": "sin({})",
+    **{name: f"{name}({{}})" for name in ("cos", "sin", "tanh")},
 }
+_ON_NUMBERS = {"cos": math.cos, "sin": math.sin, "tanh": math.tanh}
+_ON_ROWS = {"cos": np.cos, "sin": np.sin, "tanh": np.tanh}
 
 
 class StateFunction:
-    """A program of + - * / cos sin for single states, some hundred times faster than what it was traced from.
+    """A program of + - * / cos sin tanh for single states, some hundred times faster than its text.
 
     It takes single numbers or rows of samples, and is compiled to one function without a loop or a branch.
     """
@@ -35,8 +36,8 @@ class StateFunction:
     def __init__(self, program: Program) -> None:
         self.source = _state_source(program)
         code = _compiled(self.source)
-        self._on_numbers: Callable[..., list[Any]] = FunctionType(code, {"cos": math.cos, "sin": math.sin})
-        self._on_rows: Callable[..., list[Any]] = FunctionType(code, {"cos": np.cos, "sin": np.sin})
+        self._on_numbers: Callable[..., list[Any]] = FunctionType(code, dict(_ON_NUMBERS))
+        self._on_rows: Callable[..., list[Any]] = FunctionType(code, dict(_ON_ROWS))
 
     def __call__(self, *inputs: FloatArray) -> FloatArray:
         """Run on arrays (n,) or (samples, n), whose columns are the inputs; the outputs come likewise.

@@ -104,12 +104,22 @@ class _Law:
         )
         command = Motion.of(np.zeros(1), reference)
         torque = law.torque(state["q"], state["dq"], theta, dtheta, command, Integral(**integral))
-        tau_motor = np.full_like(state["theta"], np.nan)
-        tau_motor[drivetrain.present] = torque
+        tau_motor = self._of_joints(torque)
         values = {**state, "phi": state["theta"] - state["q"][:, None], "tau_motor": tau_motor}
+        if drivetrain.windings is not None:
+            velocity = drivetrain.of_all(state["dq"], dtheta)
+            electrical = drivetrain.windings.variables(torque, velocity)
+            values |= {name: self._of_joints(each) for name, each in electrical.items()}
         singular = drivetrain.determinant(state["q"], theta) == 0
         flags = [self._flags(joint, values, singular[joint]) for joint in range(len(self._robot.joints))]
         return [*tau_motor.ravel(), *flags]
+
+    def _of_joints(self, of_motors: Any) -> Any:
+        """(joints, 2) from (motors,), NaN where there is no motor."""
+        present = self._plant.drivetrain.present
+        values = np.full_like(of_motors, np.nan, shape=present.shape)
+        values[present] = of_motors
+        return values
 
     def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
         """The arrays of each argument by name."""

@@ -9,6 +9,7 @@ from vsacli.control.simulation.controllers import Controller
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.state_vector import Packing, Phase
 from vsacli.dynamics.forward import Plant
+from vsacli.dynamics.stiction import Response
 from vsacli.robot.model import Robot
 
 
@@ -23,6 +24,10 @@ class ClosedLoop:
     Attributes:
         plant: the robot's equations of motion.
         packing: of its state in a vector.
+        slip: where friction of a motor is sharp the direction in which it slides now, 0 while it is held,
+            (motors,), NaN where it is not; None if it is nowhere.
+        held: torques that the motors are asked for whatever the state, until the controller acts again; None
+            if it acts at every instant.
     """
 
     def __init__(self, robot: Robot, controller: Controller, reference: Reference) -> None:
@@ -30,10 +35,14 @@ class ClosedLoop:
         self.packing = Packing(self.plant.drivetrain)
         self.controller = controller
         self.reference = reference
+        self.slip: FloatArray | None = None
+        self.held: FloatArray | None = None
 
     def demand(self, time: float, vector: FloatArray) -> FloatArray:
         """Torques that the controller asks of the motors in a state."""
-        return self.controller.torque(time, self.packing.unpack(vector))
+        if self.held is not None:
+            return self.held
+        return self.controller.torque(time, self.packing.unpack(vector), self.slip)
 
     def applied(self, demand: FloatArray) -> FloatArray:
         """What the motors give of the torques asked of them."""
@@ -42,18 +51,14 @@ class ClosedLoop:
 
     def derivative(self, time: float, vector: FloatArray) -> FloatArray:
         """Time derivatives of state vectors (..., entries) at a time while the controller acts."""
-        return self.derivative_under(self.demand(time, vector), time, vector)
-
-    def derivative_under(self, demand: FloatArray, time: float, vector: FloatArray) -> FloatArray:
-        """The same under torques asked of the motors."""
         phase = self.packing.unpack(vector)
-        ddq, ddtheta = self.accelerations(time, phase, demand)
+        ddq, ddtheta, _ = self.response(time, phase, self.demand(time, vector), self.slip)
         integral = self.controller.error_rates(time, phase)
         return np.concatenate((phase.dq, ddq, phase.dtheta, ddtheta, *integral), axis=-1)
 
-    def accelerations(
-        self, time: float | FloatArray, phase: Phase, demand: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Of the joints and of the motors with springs, under torques asked of the motors."""
+    def response(
+        self, time: float | FloatArray, phase: Phase, demand: FloatArray, slip: FloatArray | None = None
+    ) -> Response:
+        """What torques asked of the motors lead to; `slip` as of `Plant.accelerations`."""
         wrench, damping = self.reference.wrench(time), self.reference.damping(time)
-        return self.plant.accelerations(*phase[:4], self.applied(demand), wrench, damping)
+        return self.plant.accelerations(*phase[:4], self.applied(demand), wrench, damping, slip)

@@ -29,8 +29,14 @@ class Controller(Protocol):
 
     ending: Ending | None
 
-    def torque(self, time: float | FloatArray, phase: Phase) -> FloatArray:
-        """Motor torques, ([samples,] motors)."""
+    def torque(self, time: float | FloatArray, phase: Phase, slip: FloatArray | None = None) -> FloatArray:
+        """Motor torques, ([samples,] motors).
+
+        Args:
+            time: s.
+            phase: the measured state.
+            slip: direction in which each motor moves, as far as that is known apart from its velocity.
+        """
 
     def error_rates(self, time: float, phase: Phase) -> Integral:
         """What the integrals of the errors grow by per second."""
@@ -44,19 +50,29 @@ class Feedforward:
 
     def __init__(self, model: Robot, trajectory: Trajectory) -> None:
         drivetrain = Drivetrain(model.actuators)
-        self._table = tabulate(
-            lambda time: drivetrain.of_motors(compute_block(model, trajectory.at(time)).tau_motor),
-            trajectory.breakpoints,
-        )
+        self._friction = drivetrain.friction
+
+        def columns(time: FloatArray) -> FloatArray:
+            block = compute_block(model, trajectory.at(time))
+            torque, velocity = map(drivetrain.of_motors, (block.tau_motor, block.dtheta))
+            if self._friction is None:
+                return torque
+            return np.concatenate((torque - self._friction.torque(velocity), velocity), axis=-1)
+
+        self._table = tabulate(columns, trajectory.breakpoints)
         self.ending: Ending | None = None
         if (found := first_undefined(self._table)) is not None:
-            time, motor = found
+            time, column = found
+            motor = column % len(drivetrain.joint)
             self.ending = Ending(time, _NO_TORQUES, Flag.INFEASIBLE, int(drivetrain.joint[motor]))
 
-    def torque(self, time: float | FloatArray, _phase: Phase) -> FloatArray:
-        """Motor torques, ([samples,] motors)."""
-        torque: FloatArray = self._table(time)
-        return torque
+    def torque(self, time: float | FloatArray, _phase: Phase, _slip: FloatArray | None = None) -> FloatArray:
+        """Motor torques, ([samples,] motors); friction is that of the commanded motion."""
+        values: FloatArray = self._table(time)
+        if self._friction is None:
+            return values
+        smooth, velocity = np.split(values, 2, axis=-1)
+        return smooth + self._friction.torque(velocity)
 
     def error_rates(self, _time: float, phase: Phase) -> Integral:
         """Nothing is integrated."""
@@ -72,11 +88,10 @@ class LinearizingFeedback:
         self.ending: Ending | None = None
         self._integrates = gains.integrates
 
-    def torque(self, time: float | FloatArray, phase: Phase) -> FloatArray:
+    def torque(self, time: float | FloatArray, phase: Phase, slip: FloatArray | None = None) -> FloatArray:
         """Motor torques, ([samples,] motors)."""
-        return self._feedback.law.torque(
-            phase.q, phase.dq, phase.theta, phase.dtheta, self._reference(time), phase.integral
-        )
+        reference = self._reference(time)
+        return self._feedback.law.torque(*phase[:4], reference, phase.integral, slip)
 
     def error_rates(self, time: float, phase: Phase) -> Integral:
         """Errors of position, and of stiffness where it can be commanded; zero without integral action."""

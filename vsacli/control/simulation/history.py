@@ -6,11 +6,12 @@ import numpy as np
 
 from vsacli.base.arrays import FlagArray, FloatArray, of_joint
 from vsacli.base.simulation_variables import ERRORS, SIMULATION_VARIABLES, TRACKED, actual, error
-from vsacli.base.variables import Block
+from vsacli.base.variables import VARIABLES, Block
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.state_trajectory import StateTrajectory
 from vsacli.dynamics.limits import limit_flags
+from vsacli.dynamics.losses import dissipated_power
 from vsacli.robot.model import Robot
 
 
@@ -28,6 +29,9 @@ def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory, first: 
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in TRACKED}
     found = _actual(loop, integrated)
+    if robot.has(VARIABLES["dissipated_power"]):
+        of_joints = (of_joint(found, index) for index in range(len(robot.joints)))
+        found["dissipated_power"] = np.stack(list(map(dissipated_power, robot.joints, of_joints)), axis=1)
     chosen = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)
     for name in ("stiffness", "dstiffness"):  # elsewhere there is none to command
         commanded[name] = np.where(chosen, commanded[name], found[name])
@@ -45,14 +49,15 @@ def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory, first: 
 def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArray]:
     plant, drivetrain = loop.plant, loop.plant.drivetrain
     phase, torque = loop.packing.unpack(integrated.states), loop.applied(integrated.demand)
-    ddq, _ = loop.accelerations(integrated.time, phase, integrated.demand)
+    ddq, _, friction = loop.response(integrated.time, phase, integrated.demand)
     phi, dphi = drivetrain.deflections(phase.q, phase.theta), drivetrain.deflections(phase.dq, phase.dtheta)
     springs = drivetrain.state(phase.q, phase.theta, phase.dq, phase.dtheta)
-    tau_e = plant.link_torque(phase.dq, ddq, springs.tau_e, torque)
+    passed_on = torque if friction is None else torque - friction
+    tau_e = plant.link_torque(phase.dq, ddq, springs.tau_e, passed_on)
     still, deflected = np.zeros_like(phase.q), drivetrain.deflected
     theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)
     tau_motor = drivetrain.of_joints(torque)
-    return {
+    found = {
         "q": phase.q,
         "dq": phase.dq,
         "ddq": ddq,
@@ -71,6 +76,10 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
         "det_A": drivetrain.determinant(phase.q, phase.theta),
         **plant.dampers.variables(loop.reference.damping(integrated.time), phase.dq, phase.dtheta),
     }
+    if drivetrain.windings is not None:
+        electrical = drivetrain.windings.variables(torque, drivetrain.of_all(phase.dq, phase.dtheta))
+        found |= {name: drivetrain.of_joints(values) for name, values in electrical.items()}
+    return found
 
 
 def _work(theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, NamedTuple
@@ -15,6 +16,7 @@ from vsacli.base.json_records import Stored
 from vsacli.control.simulation.boundaries import Boundary
 from vsacli.control.simulation.budget import Budget, Deadline, Derivative, Progress
 from vsacli.control.simulation.ending import INCOMPLETE, Ending
+from vsacli.control.simulation.sliding import Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
 
 EXPLICIT = "DOP853"
@@ -74,12 +76,18 @@ class Integrator:
         tolerances: of each step.
         budget: of the run.
         progress: called with the time reached, s.
+        switches: at which it goes on under other equations of motion.
     """
 
     def __init__(
-        self, boundaries: Sequence[Boundary], tolerances: Tolerances, budget: Budget, progress: Progress
+        self,
+        boundaries: Sequence[Boundary],
+        tolerances: Tolerances,
+        budget: Budget,
+        progress: Progress,
+        switches: Sequence[Switch] = (),
     ) -> None:
-        self._boundaries = boundaries
+        self._boundaries, self._switches = boundaries, switches
         self._tolerances = tolerances
         self._progress = progress
         self._budget = budget
@@ -126,27 +134,59 @@ class Integrator:
         is_due: Callable[[float], bool],
         **options: Any,
     ) -> tuple[FloatArray, FloatArray, Ending | None]:
+        deadline = Deadline(self._budget.limit, is_due, float(times[-1]), self._progress)
+        events = [deadline, *self._boundaries, *self._switches]
+        time = float(times[0])
+        parts: list[tuple[FloatArray, FloatArray]] = []
+        while True:
+            solution = self._until_event(derivative, (time, times), start, events, options)
+            if parts:
+                parts.append(_evaluated(solution, start))
+            else:  # over no time at all, and where the first step fails, `solve_ivp` returns no states
+                parts.append(_evaluated(solution, start) if len(solution.t) else (times[:1], start[None]))
+            reached, states = (np.concatenate(each) for each in zip(*parts, strict=True))
+            if solution.status < 0:
+                reason = "the motion became too fast to integrate"
+                return reached, states, Ending(float(reached[-1]), reason)
+            hits = zip(events, solution.t_events, solution.y_events, strict=True)
+            event, when, where = next(((event, *hit) for event, *hit in hits if len(hit[0])), (None, (), ()))
+            if event is None:
+                return reached, states, None
+            if not isinstance(event, Switch):
+                ending = event.ending(float(when[-1]), where[-1])
+                return np.append(reached, when[-1:]), np.concatenate((states, where[-1:])), ending
+            time, start = float(when[-1]), event.passed(float(when[-1]), where[-1])
+            times = times[times > time]
+            if not times.size:
+                return reached, states, None
+
+    def _until_event(
+        self,
+        derivative: Derivative,
+        span: tuple[float, FloatArray],
+        start: FloatArray,
+        events: Sequence[Any],
+        options: Mapping[str, Any],
+    ) -> Any:
+        """A solution from a time on, evaluated at further times, to the first event or the last time."""
         from scipy.integrate import solve_ivp
 
-        deadline = Deadline(self._budget.limit, is_due, float(times[-1]), self._progress)
-        events: list[Any] = [deadline, *self._boundaries]
+        time, times = span
         with np.errstate(all="ignore"):  # a trial step may leave the range of a law
-            solution: Any = solve_ivp(
+            return solve_ivp(
                 derivative,
-                (float(times[0]), float(times[-1])),
+                (time, float(times[-1])),
                 start,
                 t_eval=times,
                 events=events,
                 rtol=self._tolerances.rtol,
+                max_step=min((switch.longest_step for switch in self._switches), default=math.inf),
                 **options,
             )
-        # Over no time at all, and where the first step fails, `solve_ivp` returns no states.
-        reached, states = (solution.t, solution.y.T) if len(solution.t) else (times[:1], start[None])
-        if solution.status < 0:
-            reason = "the motion became too fast to integrate"
-            return reached, states, Ending(float(reached[-1]), reason)
-        for event, hits, where in zip(events, solution.t_events, solution.y_events, strict=True):
-            if len(hits):
-                ending = event.ending(float(hits[-1]), where[-1])
-                return np.append(reached, hits[-1:]), np.concatenate((states, where[-1:])), ending
-        return reached, states, None
+
+
+def _evaluated(solution: Any, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Times and states (times, entries) of a solution, which may have none."""
+    if not len(solution.t):
+        return np.empty(0), np.empty((0, len(start)))
+    return solution.t, solution.y.T

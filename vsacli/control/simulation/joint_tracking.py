@@ -19,6 +19,7 @@ from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.history import History
 from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
 from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.quadrature import trapezoids
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
@@ -98,8 +99,13 @@ def _energies(robot: Robot, history: History) -> list[JointEnergy]:
         _led(getattr(history, name))
         for name in ("time", *map(actual, ("motor_energy", "motor_power", "tau_spring", "elastic_energy")))
     )
+    lost = {"dissipated": history.dissipated_power_actual, "copper": history.copper_loss_actual}
+    intervals = np.diff(time)
+    losses = {
+        name: None if taken is None else trapezoids(intervals, _led(taken)) for name, taken in lost.items()
+    }
     meter = EnergyMeter()
-    meter.add(Flow(np.diff(time), np.diff(work), power, tau_spring, elastic_energy))
+    meter.add(Flow(intervals, np.diff(work), power, tau_spring, elastic_energy, **losses))
     return meter.report(robot)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from vsacli.actuators.friction import Friction
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.documents.fields import Kind, Number, OneOf, Pair, Record, declared
@@ -17,9 +18,9 @@ from vsacli.robot.model import Robot
 def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
     """The robot with every dynamic parameter wrong by a random relative error; itself if that is zero.
 
-    Masses, centres of mass, inertia tensors, dampings, motor inertias and the constants of springs and
-    mechanisms are each multiplied by 1 + relative u with u uniform in [-1, 1]; a tensor as a whole, so that
-    it remains one of a body. Geometry, gravity, limits and measured tables stay as they are.
+    Masses, centres of mass, inertia tensors, dampings, dry friction, motor inertias and the constants of
+    springs and mechanisms are each multiplied by 1 + relative u with u uniform in [-1, 1]; a tensor as a
+    whole, so that it remains one of a body. Geometry, gravity, limits and measured tables stay as they are.
 
     Args:
         robot: the true one.
@@ -53,7 +54,11 @@ class _Wrong:
             reason = f"an error of up to {self._relative:g} makes an actuator that cannot be"
             raise InputError.one(f"joint {joint.name}: {reason}: {error}; choose a smaller one") from error
         return replace(
-            joint, link=self._link(joint.link), damping=self._number(joint.damping), actuator=actuator
+            joint,
+            link=self._link(joint.link),
+            damping=self._number(joint.damping),
+            friction=self._friction(joint.friction),
+            actuator=actuator,
         )
 
     def _number(self, value: float) -> float:
@@ -91,4 +96,18 @@ class _Wrong:
         return value
 
     def _motor(self, motor: Motor) -> Motor:
-        return replace(motor, inertia=self._number(motor.inertia), damping=self._number(motor.damping))
+        return replace(
+            motor,
+            inertia=self._number(motor.inertia),
+            damping=self._number(motor.damping),
+            friction=self._friction(motor.friction),
+        )
+
+    def _friction(self, friction: Friction | None) -> Friction | None:
+        """Both directions by one factor, since those between links are equal; the width stays."""
+        if friction is None:
+            return None
+        factor = self._number(1.0)
+        backward, forward = friction.coulomb
+        offset = self._number(friction.offset)
+        return replace(friction, coulomb=(factor * backward, factor * forward), offset=offset)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -72,8 +71,8 @@ def sampled(
     reached, states, ending = [times[:1]], [start[None]], None
     demands = [loop.controller.torque(float(times[0]), measurement.phase)]
     for interval in np.stack((times[:-1], times[1:]), axis=1):
-        held = partial(loop.derivative_under, demands[-1])
-        time, after, ending = integrator.over(held, interval, states[-1][-1])
+        loop.held = demands[-1]
+        time, after, ending = integrator.over(loop.derivative, interval, states[-1][-1])
         reached.append(time[1:])
         states.append(after[1:])
         measurement.add(loop.packing.unpack(after[-1]), time[-1] - time[0])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.control.gains import Integral
 
 
@@ -22,12 +22,19 @@ class Phase(NamedTuple):
 
 
 class Packing:
-    """How a `Phase` lies in a vector."""
+    """How a `Phase` lies in a vector.
+
+    Attributes:
+        motor_velocities: places of the velocities of all motors, (motors,).
+    """
 
     def __init__(self, drivetrain: Drivetrain) -> None:
         joints, springs = len(drivetrain.present), int(drivetrain.sprung.sum())
         ends = np.cumsum([joints, joints, springs, springs, joints, joints]).tolist()
         self._parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+        entries: AnyArray = np.arange(ends[-1])
+        dq, dtheta = entries[self._parts[1]], entries[self._parts[3]]
+        self.motor_velocities = drivetrain.of_all(dq, dtheta)
 
     def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """The vector of a state at which nothing is integrated yet."""

@@ -141,9 +141,13 @@ def _scalar_entry(node: Node, key: str) -> tree.Scalar | None:
 
 @dataclass(eq=False)
 class Pair(_Entries):
-    """One value for both sides of a joint, or a list of two, read as a pair."""
+    """One value for both of two, the sides of a joint say, or a list of two, read as a pair.
+
+    `dim` is what the arrays of both lie along.
+    """
 
     item: Kind
+    dim: str = "motor"
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Both values, which are one if one was written."""
@@ -186,5 +190,5 @@ class Pair(_Entries):
         return self.item.lines(name, value, comment, of_record)
 
     def arrays(self, content: Any, of_record: ArraysOfRecord, /) -> Iterator[ResolvedField]:
-        """Those of both motors."""
-        return stacked("motor", (self.item.arrays(side, of_record) for side in content))
+        """Those of both."""
+        return stacked(self.dim, (self.item.arrays(side, of_record) for side in content))

@@ -21,6 +21,7 @@ from vsacli.results.plots.figures import (
     drawings_of,
     omitted_figures,
     plot_stored,
+    result_drawings,
     simulation_drawings,
 )
 from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
@@ -42,6 +43,7 @@ __all__ = [
     "omitted_figures",
     "plot_feasibility",
     "plot_stored",
+    "result_drawings",
     "save_figures",
     "simulation_drawings",
 ]

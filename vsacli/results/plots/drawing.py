@@ -6,7 +6,7 @@ The first line styles are the paper's, continued to any number of joints.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -114,6 +114,12 @@ _SPREAD: dict[str, Any] = {"alpha": 0.3, "linewidth": 0}
 _SINGULAR_BAND = {"facecolor": "none", "edgecolor": "0.45", "linewidth": 0.8, "hatch": "////", "zorder": 0.6}
 
 
+_LIMIT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (1, 2))}
+
+LIMIT_SIGHT = 1.5
+"""Limits beyond what is shown by this factor are not drawn: curves would become flat."""
+
+
 def draw_curve(axes: Axes, time: FloatArray, values: FloatArray, index: int, style: LineStyle) -> None:
     """Draw a curve that breaks at NaN; a point alone between two gaps becomes a dot.
 
@@ -154,6 +160,26 @@ def draw_uncertainty(
     axes.fill_between(time, values - 2 * deviations, values + 2 * deviations, color=style.color, **_SPREAD)
     axes.set_ylim(shown)
     return [Patch(facecolor="0.5", **_SPREAD, label="two standard deviations")]
+
+
+def draw_limits(axes: Axes, bounds: Mapping[int, float]) -> list[Artist]:
+    """Draw what the size of curves is bounded by, those that are in sight or nearly so.
+
+    Args:
+        axes: where to draw, with all curves.
+        bounds: by number of the curve, which gives the colour; not finite where there is none.
+
+    Returns:
+        What a legend shows for them.
+    """
+    low, high = axes.get_ylim()
+    seen = LIMIT_SIGHT * max(-low, high)
+    drawn = {index: bound for index, bound in bounds.items() if bound <= seen}
+    for index, bound in drawn.items():
+        for end in (-bound, bound):
+            if low - (high - low) / 2 <= end <= high + (high - low) / 2:
+                axes.axhline(end, color=line_style(index).color, **_LIMIT)
+    return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if drawn else []
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:

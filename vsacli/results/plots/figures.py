@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from vsacli.actuators.kinds import existing
 from vsacli.base.errors import InputError
-from vsacli.base.units import ENERGY, POSITION, STIFFNESS, TORQUE
-from vsacli.base.variables import MOTORS
+from vsacli.base.units import CURRENT, ENERGY, POSITION, STIFFNESS, TORQUE, VOLTAGE, Quantity
+from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.results.plots.corridor_figure import MOST_ROWS, compliant_joints, draw_corridors
 from vsacli.results.plots.curves import Failures
 from vsacli.results.plots.drawing import house_style
@@ -130,28 +129,55 @@ def _work_label(motor: int, _joint_type: str) -> str:
 _WORK_LABELS = [partial(_work_label, motor) for motor in MOTORS]
 
 
+def _current(result: StoredResult, failures: Failures) -> Figure:
+    return grouped_figure(result, failures, "current", _CURRENT_LABELS, "max_current")
+
+
+def _voltage(result: StoredResult, failures: Failures) -> Figure:
+    return grouped_figure(result, failures, "voltage", _VOLTAGE_LABELS, "max_voltage")
+
+
+def _electrical_label(letter: str, quantity: Quantity, motor: int, joint_type: str) -> str:
+    words = {"i": "current", "u": "voltage"}[letter]
+    return f"{words} of motor {motor}, ${letter}_{motor}$ [{quantity.unit(joint_type)}]"
+
+
+_CURRENT_LABELS = [partial(_electrical_label, "i", CURRENT, motor) for motor in MOTORS]
+_VOLTAGE_LABELS = [partial(_electrical_label, "u", VOLTAGE, motor) for motor in MOTORS]
+
+
 RESULT_DRAWINGS: dict[str, Drawing] = {
     "motion": Drawing(("q", "stiffness"), _motion),
     "motor-torque": Drawing(("tau_motor",), _motor_torque),
     "elastic-torque": Drawing(("tau_e",), _elastic_torque),
     "energy": Drawing(("elastic_energy", "motor_energy"), _energy),
+    "motor-current": Drawing(("current",), _current),
+    "motor-voltage": Drawing(("voltage",), _voltage),
 }
 """The figures of a result of `invdyn`, by name."""
 
 
-def simulation_drawings(actuators: Iterable[str]) -> dict[str, Drawing]:
-    """The figures of a simulation of joints with these types of actuators, by name."""
-    types = tuple(actuators)
+def result_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
+    """The figures of a result of `invdyn`, by name, of a robot that has the variables that they need."""
     return {
-        name: _drawing(variable, labels)
-        for name, (variable, labels) in _FIGURES.items()
-        if np.any(existing(StoredSimulation.declared[variable], types))
+        name: drawing
+        for name, drawing in RESULT_DRAWINGS.items()
+        if all(has(VARIABLES[needed]) for needed in drawing.needs)
     }
 
 
-def _drawing(variable: str, labels: Sequence[Label]) -> Drawing:
+def simulation_drawings(there: Callable[[Variable], bool]) -> dict[str, Drawing]:
+    """The figures of a simulation, by name, of a robot one of whose joints has what they show."""
+    return {
+        name: _drawing(variable, *look)
+        for name, (variable, *look) in _FIGURES.items()
+        if there(StoredSimulation.declared[variable])
+    }
+
+
+def _drawing(variable: str, labels: Sequence[Label], limit: str = "") -> Drawing:
     def draw(simulation: StoredResult, failures: Failures) -> Figure:
-        return grouped_figure(simulation, failures, variable, labels)
+        return grouped_figure(simulation, failures, variable, labels, limit)
 
     return Drawing((variable,), draw)
 
@@ -164,18 +190,21 @@ def _stiffness_error(joint_type: str) -> str:
     return rf"stiffness error $\sigma - \sigma_d$ [{STIFFNESS.unit(joint_type)}]"
 
 
-_FIGURES: dict[str, tuple[str, Sequence[Label]]] = {
+_FIGURES: dict[str, tuple[Any, ...]] = {
     "position-error": ("q_error", [_position_error]),
     "stiffness-error": ("stiffness_error", [_stiffness_error]),
     "motor-torque": ("tau_motor_actual", MOTOR_LABELS),
+    "motor-current": ("current_actual", _CURRENT_LABELS, "max_current"),
+    "motor-voltage": ("voltage_actual", _VOLTAGE_LABELS, "max_voltage"),
 }
+"""Variable, labels, and the limit if there is one."""
 
 
 def drawings_of(stored: StoredResult) -> Mapping[str, Drawing]:
     """The figures that a file of its kind has, by name."""
     if isinstance(stored, StoredSimulation):
-        return simulation_drawings(stored.actuators)
-    return RESULT_DRAWINGS
+        return simulation_drawings(lambda variable: bool(stored.existing(variable).any()))
+    return result_drawings(stored.has)
 
 
 def plot_stored(stored: StoredResult) -> Figures:

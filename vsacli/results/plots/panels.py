@@ -21,6 +21,7 @@ from vsacli.results.plots.curves import Failures, read_curves
 from vsacli.results.plots.drawing import (
     draw_bands,
     draw_curve,
+    draw_limits,
     draw_uncertainty,
     line_handle,
     line_style,
@@ -142,21 +143,37 @@ Label = Callable[[str], str]
 """Label of an axis for a type of joint."""
 
 
-def grouped_figure(result: StoredResult, failures: Failures, name: str, labels: Sequence[Label]) -> Figure:
-    """A figure of one variable that some joint has, with a column of panels for each of its curves."""
+def grouped_figure(
+    result: StoredResult, failures: Failures, name: str, labels: Sequence[Label], limit: str = ""
+) -> Figure:
+    """A figure of one variable that some joint has, with a column of panels for each of its curves.
+
+    Args:
+        result: the file.
+        failures: its steps that cannot be done.
+        name: of the variable.
+        labels: of the axes, for each curve.
+        limit: constant of the motors that bounds the size of the variable, if one does.
+    """
     height = GROUP_HEIGHT * len(panel_groups(result.joint_types)) + 1
     figure = Figure((2 * PANEL_WIDTH, height), layout="constrained")
-    handles = draw_groups(figure.add_gridspec()[0], result, failures, name, labels)
+    handles = draw_groups(figure.add_gridspec()[0], result, failures, name, labels, limit)
     return complete(figure, result_title(result), handles)
 
 
 def draw_groups(
-    place: SubplotSpec, result: StoredResult, failures: Failures, name: str, labels: Sequence[Label]
+    place: SubplotSpec,
+    result: StoredResult,
+    failures: Failures,
+    name: str,
+    labels: Sequence[Label],
+    limit: str = "",
 ) -> list[Artist]:
     """Draw a variable, a row of panels for each group of joints that have it; returns what a legend shows."""
     there = result.existing(result.declared[name])
     drawn = np.flatnonzero(there.any(axis=0)).tolist()
     groups = [group for group in panel_groups(result.joint_types) if there[group].any()]
+    bounds = result.motor_constant(limit) if limit else None
     uncertain = deviation(name) in result.variables
     joints = read_curves(result, [name, deviation(name)] if uncertain else [name])
     panels = place.subgridspec(len(groups), len(drawn)).subplots(squeeze=False)
@@ -171,6 +188,8 @@ def draw_groups(
                 handles += draw_uncertainty(
                     axes, joints[joint].time, curves[curve], deviations[curve], line_style(joint)
                 )
+            if bounds is not None:
+                handles += draw_limits(axes, {joint: bounds[joint, curve] for joint in present})
             handles += draw_bands(axes, failures.time, *failures.among(group))
             axes.set_ylabel(labels[curve](result.joint_types[group[0]]))
     share_time(panels, np.array([there[group][:, drawn].any(axis=0) for group in groups]), failures.time)

@@ -36,8 +36,8 @@ from vsacli.results.store.schema import (
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
-LABELS = {"axis": ("x", "y", "z"), "bound": ("lower", "upper")}
-"""Dimensions that only the robot's arrays have."""
+LABELS = {"axis": ("x", "y", "z"), "bound": ("lower", "upper"), "direction": ("negative", "positive")}
+"""Dimensions that only the robot's arrays have, each if an array has it."""
 
 GZIP_LEVEL = 4
 
@@ -161,12 +161,12 @@ def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5p
     One group for the joints, and no deeper: a group `motor` would collide with the coordinate `motor`.
     """
     group = inputs.create_group("robot", track_order=True)
-    scales = dict(coordinates)
-    for name, labels in LABELS.items():
-        scales[name] = _add_array(group, name, np.array(labels, dtype=TEXT))
+    scales, fields = dict(coordinates), resolve(robot)
+    for name in [name for name in LABELS if any(name in field.dims for field in fields)]:
+        scales[name] = _add_array(group, name, np.array(LABELS[name], dtype=TEXT))
         scales[name].make_scale(name)
     joints = group.create_group("joints")
-    for field in resolve(robot):
+    for field in fields:
         of_joints = field.path[0] == "joints"
         name = "_".join(field.path[1:] if of_joints else field.path)
         dataset = _write_field(joints if of_joints else group, name, field, robot.joint_types)

@@ -17,7 +17,7 @@ from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line, shown
-from vsacli.base.variables import MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
+from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import (
     CheckedFile,
     bounded,
@@ -28,7 +28,8 @@ from vsacli.results.store.damage import (
 from vsacli.results.store.inputs import StoredInput, read_sources
 from vsacli.results.store.schema import EXISTING, FORMAT, row_shape, storage_type
 
-GEAR_RATIO = "inputs/robot/joints/actuator_motor_gear_ratio"
+OF_MOTORS = "inputs/robot/joints/actuator_motor_{}"
+"""Where a constant of the motors stands, by its name in the robot file."""
 
 BLOCK_SAMPLES = 8192
 """Samples that are read at a time to see whether they can be."""
@@ -83,7 +84,7 @@ class StoredResult:
             self.joint_names = self._labels("joint")
             self.joint_types = self._labels("joint_type")
             self.actuators = self._labels("inputs/robot/joints/actuator_type")
-            self.gear_ratio = self._gear_ratios()
+            self.gear_ratio = self._motor_constant("gear_ratio")
             self.variables = tuple(
                 name for name, variable in self.declared.items() if variable.dims and name in file
             )
@@ -97,13 +98,28 @@ class StoredResult:
     def _labels(self, name: str) -> tuple[str, ...]:
         return tuple(map(one_line, self._bounded(name).asstr()[...]))
 
-    def _gear_ratios(self) -> FloatArray:
-        """The stored ones, which have no second axis if no joint has two motors."""
-        ratios = np.full((len(self.actuators), len(MOTORS)), np.nan)
-        if GEAR_RATIO in self._file:
-            stored = self._bounded(GEAR_RATIO)
-            ratios.T[: 1 if stored.ndim == 1 else len(MOTORS)] = stored[...].T
-        return ratios
+    def motor_constant(self, name: str) -> FloatArray:
+        """A number of the motors as they act on their joints, (joints, 2); NaN where the robot gives none.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        with reporting_damage(self.path):
+            return self._motor_constant(name)
+
+    def _motor_constant(self, name: str) -> FloatArray:
+        """What is stored, which has no second axis if no joint has two motors."""
+        constants = np.full((len(self.actuators), len(MOTORS)), np.nan)
+        if OF_MOTORS.format(name) in self._file:
+            stored = self._bounded(OF_MOTORS.format(name))
+            constants.T[: 1 if stored.ndim == 1 else len(MOTORS)] = stored[...].T
+        return constants
+
+    def has(self, variable: Variable) -> bool:
+        """Whether runs of its robot have a variable, as far as that depends on what the robot file gives."""
+        if variable.requires in MOTOR_CONSTANTS:
+            return not np.isnan(self.motor_constant(variable.requires)).all()
+        return variable.requires in OF_ANY_ROBOT or variable.name in self.variables
 
     def _json(self, name: str) -> dict[str, Any]:
         content = json.loads(own_dataset(self._file, name).asstr()[()])

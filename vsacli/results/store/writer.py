@@ -18,7 +18,7 @@ from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
 from vsacli.base.signals import COMMANDED
 from vsacli.base.storage import check_free_space, reporting_storage_errors, storage_error
-from vsacli.base.variables import UNCERTAIN, VARIABLES, Variable, deviation, select_variables
+from vsacli.base.variables import MOTOR_CONSTANTS, UNCERTAIN, VARIABLES, Variable, deviation, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes
 from vsacli.results.store.schema import FORMAT, TEXT, storable
@@ -213,6 +213,8 @@ def _not_given(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]
 
 
 def _requirement(variable: Variable) -> str:
+    if variable.requires in MOTOR_CONSTANTS:
+        return f"a motor with a {variable.requires}"
     signal = COMMANDED.get(f"{variable.requires}")
     return f"{variable.requires}" if signal is None else f"a {signal.device or signal.key}"
 

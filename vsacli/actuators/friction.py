@@ -1,0 +1,130 @@
+"""Dry friction of motors and joints: Coulomb's law, sharp at zero velocity or smoothed over a width.
+
+With v the velocity, the torque is F s(v) + F_o, F one of two sizes by the direction of v. The shape s is the
+sign of v (below, such friction is "sharp"), or tanh(v/w) with the width w ("smooth").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base import units
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.documents.fields import NON_NEGATIVE, Number, Pair, check_fields, number, value
+
+REST = 1e-10
+"""Speed, rad/s (m/s), up to which something rests: at the ends of motions from rest to rest, rounding left
+1e-13 of the shipped robots' motors. At this speed a turn takes two thousand years."""
+
+
+@dataclass(frozen=True)
+class Friction:
+    """Dry friction: a torque against the motion that hardly depends on its speed."""
+
+    coulomb: tuple[float, float] = value(
+        Pair(Number(units.TORQUE), dim="direction"),
+        "Coulomb friction, or a list of two: while the velocity is negative, and while it is positive",
+        check=NON_NEGATIVE,
+    )
+    offset: float = number(units.TORQUE, "torque that is added, whatever the velocity", default=0.0)
+    width: float = number(
+        units.VELOCITY,
+        "w of tanh(velocity/w), by which friction changes its sign; 0 for the sign function",
+        check=NON_NEGATIVE,
+        default=0.0,
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def sharp(self) -> bool:
+        """Whether the torque at rest is not known: Coulomb friction whose shape is the sign."""
+        return self.width == 0 and any(self.coulomb)
+
+    def geared(self, ratio: float) -> Friction:
+        """On the joint's side of a gear, with what it is on the motor's shaft, which turns `ratio` times."""
+        backward, forward = (abs(ratio) * size for size in self.coulomb)
+        return Friction(
+            coulomb=(backward, forward) if ratio > 0 else (forward, backward),
+            offset=ratio * self.offset,
+            width=self.width / abs(ratio),
+        )
+
+
+NO_FRICTION = Friction(coulomb=(0.0, 0.0))
+
+
+class FrictionLaws(NamedTuple):
+    """Friction of several motors or joints; arrays that spread with those of their velocities.
+
+    Attributes:
+        backward, forward: sizes of Coulomb friction while the velocity is negative, and positive.
+        offset: torque that is added.
+        width: of the change of sign, 0 for the sign function.
+    """
+
+    backward: FloatArray
+    forward: FloatArray
+    offset: FloatArray
+    width: FloatArray
+
+    @classmethod
+    def of(cls, frictions: Sequence[Friction | None]) -> FrictionLaws | None:
+        """One entry each, on the last axis; None if none has friction."""
+        if not any(frictions):
+            return None
+        laws = [friction or NO_FRICTION for friction in frictions]
+        rows = [(*law.coulomb, law.offset, law.width) for law in laws]
+        return cls(*np.array(rows).T)
+
+    def with_axis_behind(self) -> FrictionLaws:
+        """The same with a further axis, for samples, behind those there are."""
+        return FrictionLaws(*(values[..., None] for values in self))
+
+    @property
+    def sharp(self) -> BoolArray:
+        """Where the torque at rest is not known."""
+        sharp: BoolArray = (self.width == 0) & (self.backward + self.forward > 0)
+        return sharp
+
+    def torque(self, velocity: FloatArray, direction: FloatArray | None = None) -> FloatArray:
+        """Friction at velocities; at rest the offset alone, where the shape is the sign.
+
+        Args:
+            velocity: rad/s (m/s), any shape that spreads with the laws.
+            direction: of the motion, -1, 0 or 1, where the shape is the sign; that of the velocity if None,
+                and where it is NaN.
+        """
+        sign = direction_of(velocity)
+        if direction is not None:
+            sign = np.where(np.isnan(direction), sign, direction)
+        smooth = np.tanh(velocity / np.where(self.width > 0, self.width, 1.0))
+        return self._size(velocity, sign) * np.where(self.width > 0, smooth, sign) + self.offset
+
+    def beyond(self, torque: FloatArray) -> FloatArray:
+        """1 where a torque is more than sharp friction can hold, -1 where it is less, else 0."""
+        coulomb = torque - self.offset
+        outside = np.where(coulomb > self.forward, 1.0, np.where(coulomb < -self.backward, -1.0, 0.0))
+        return np.where(self.sharp, outside, 0.0)
+
+    def power(self, velocity: FloatArray, acceleration: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What smooth friction takes, offset included, and the rate of that; of the sign only its offset."""
+        width = np.where(self.width > 0, self.width, 1.0)
+        smooth = np.tanh(velocity / width)
+        size = np.where(self.width > 0, self._size(velocity, smooth), 0.0)
+        torque = size * smooth + self.offset
+        return torque * velocity, (torque + size * (1 - smooth * smooth) / width * velocity) * acceleration
+
+    def _size(self, velocity: FloatArray, sign: FloatArray) -> FloatArray:
+        """The size that counts: by the direction where the shape is the sign, else by the velocity."""
+        return np.where(np.where(self.width > 0, velocity, sign) < 0, self.backward, self.forward)
+
+
+def direction_of(velocity: FloatArray) -> FloatArray:
+    """-1, 0 or 1; 0 at rest, and where the velocity does not exist."""
+    return np.where(np.abs(velocity) > REST, np.where(velocity < 0, -1.0, 1.0), 0.0)

@@ -1,0 +1,135 @@
+"""Where sharp Coulomb friction leaves a motor's torque open: at rest, and as it turns back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vsacli.actuators.friction import direction_of
+from vsacli.actuators.motor import JointMotor
+from vsacli.base.arrays import FloatArray
+from vsacli.base.json_records import Stored, named
+from vsacli.base.units import TORQUE, time_text
+
+
+@dataclass(frozen=True)
+class DryFriction(Stored):
+    """A motor whose friction is the sign function's, where that is two-valued.
+
+    Attributes:
+        motor: 1 or 2.
+        lowest: what may add to the stated torque at rest, N m (N), joint side; zero or negative.
+        highest: the other end of that range; zero or positive.
+        start: steps at rest from the first step on.
+        between: steps at rest on the way.
+        end: steps at rest up to the last step.
+        reversals: how often it turns back; its torque jumps by `highest` - `lowest` there.
+        first_reversal: time of the first step after it first does, s; NaN if it never does.
+    """
+
+    motor: int
+    lowest: float
+    highest: float
+    start: int
+    between: int
+    end: int
+    reversals: int
+    first_reversal: float
+
+    shape: ClassVar = {
+        "motor": "motor",
+        "torque": named("lowest", "highest"),
+        "steps_at_rest": named("start", "between", "end"),
+        "reversals": "reversals",
+        "first_reversal": "first_reversal",
+    }
+
+    @property
+    def jump(self) -> float:
+        """By how much its torque jumps where it turns back, N m (N)."""
+        return self.highest - self.lowest
+
+
+class DryFrictionSummary:
+    """Finds where one motor rests and turns back; `add` blocks in order, then ask for the `report`.
+
+    Attributes:
+        number: of the motor, 1 or 2.
+    """
+
+    def __init__(self, number: int, motor: JointMotor) -> None:
+        assert motor.friction is not None
+        self.number, (self._backward, self._forward) = number, motor.friction.coulomb
+        self._direction, self._steps, self._first_moving, self._moving, self._rest = 0.0, 0, -1, -1, 0
+        self._reversals, self._first_reversal = 0, math.nan
+
+    def add(self, time: FloatArray, dtheta: FloatArray) -> None:
+        """Merge consecutive steps, (samples,)."""
+        direction = direction_of(dtheta)
+        moving = np.flatnonzero(direction)
+        self._rest += len(time) - len(moving)
+        if moving.size:
+            turned = np.diff(direction[moving], prepend=self._direction or direction[moving[0]]) != 0
+            if turned.any() and not self._reversals:
+                self._first_reversal = float(time[moving[turned.argmax()]])
+            self._reversals += int(np.count_nonzero(turned))
+            if self._first_moving < 0:
+                self._first_moving = self._steps + int(moving[0])
+            self._moving, self._direction = self._steps + int(moving[-1]), float(direction[moving[-1]])
+        self._steps += len(time)
+
+    def report(self) -> DryFriction:
+        """What was found so far."""
+        start = self._steps if self._first_moving < 0 else self._first_moving
+        end = self._steps - 1 - self._moving if self._moving >= 0 else 0
+        return DryFriction(
+            motor=self.number,
+            lowest=-self._backward,
+            highest=self._forward,
+            start=start,
+            between=self._rest - start - end,
+            end=end,
+            reversals=self._reversals,
+            first_reversal=self._first_reversal,
+        )
+
+
+def dry_frictions(motors: Sequence[JointMotor]) -> list[DryFrictionSummary]:
+    """A summary of each motor of a joint whose friction is that of the sign function."""
+    return [
+        DryFrictionSummary(number, motor)
+        for number, motor in enumerate(motors, 1)
+        if motor.friction is not None and motor.friction.sharp
+    ]
+
+
+def dry_friction_lines(found: Sequence[tuple[str, str, DryFriction]]) -> Iterator[str]:
+    """From names and types of joints, each with a motor: a line on rest, and one on turning back."""
+    resting = [entry for entry in found if entry[2].start + entry[2].between + entry[2].end]
+    if resting:
+        name, joint_type, most = max(resting, key=lambda entry: entry[2].jump)
+        when = ", ".join(filter(None, _rests([each for _, _, each in resting])))
+        more, less, unit = f"{most.highest:.3g}", f"{-most.lowest:.3g}", TORQUE.unit(joint_type)
+        width = f"{more} {unit} more or less" if more == less else f"{more} {unit} more or {less} less"
+        yield f"dry friction: motors that rest ({when}) would do so with up to {width} ({name})"
+    turning = [entry for entry in found if entry[2].reversals]
+    if turning:
+        name, _, first = min(turning, key=lambda entry: entry[2].first_reversal)
+        whose, joint_type, most = max(turning, key=lambda entry: entry[2].jump)
+        count = sum(each.reversals for _, _, each in turning)
+        times, when = "once" if count == 1 else f"{count} times", time_text(first.first_reversal)
+        yield f"dry friction: motors turn back {times}, first {name} {first.motor} at t = {when}"
+        jump = f"{most.jump:.3g} {TORQUE.unit(joint_type)} ({whose})"
+        yield f"where they do, their torques jump by up to {jump}"
+
+
+def _rests(motors: Sequence[DryFriction]) -> Iterator[str]:
+    """When motors rest."""
+    yield "at the start" if any(each.start for each in motors) else ""
+    between = max(each.between for each in motors)
+    yield f"up to {between} steps on the way" if between else ""
+    yield "at the end" if any(each.end for each in motors) else ""

@@ -1,0 +1,61 @@
+"""Motors with dry friction: which way it acts, and what it takes to hold those that rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.friction import FrictionLaws, direction_of
+from vsacli.base.arrays import BoolArray, FloatArray
+
+
+class Response(NamedTuple):
+    """What follows from motor torques.
+
+    Attributes:
+        ddq: acceleration of the joints, (..., joints).
+        ddtheta: of the motors with springs, (..., springs).
+        friction: dry friction of all motors, (..., motors); None if none has any.
+    """
+
+    ddq: FloatArray
+    ddtheta: FloatArray
+    friction: FloatArray | None
+
+
+Balance = Callable[[FloatArray, BoolArray], tuple[FloatArray, FloatArray, FloatArray]]
+"""From the torques of all motors (..., motors), and which are held, to the accelerations of joints and of
+motors with springs, and what the held ones must be held with, (..., motors), 0 of others."""
+
+
+def response_with_friction(
+    laws: FrictionLaws,
+    torque: FloatArray,
+    velocity: FloatArray,
+    slip: FloatArray | None,
+    balance: Balance,
+) -> Response:
+    """Accelerations under motor torques and dry friction.
+
+    Args:
+        laws: dry friction of all motors.
+        torque: of all motors, (..., motors).
+        velocity: of all motors, (..., motors).
+        slip: where friction is sharp the direction in which a motor slides, 0 while it is held, (motors,). If
+            None, a motor that rests is held as long as its friction can.
+        balance: accelerations without friction.
+    """
+
+    def under(direction: FloatArray) -> tuple[Response, FloatArray]:
+        friction = laws.torque(velocity, direction)
+        ddq, ddtheta, holding = balance(torque - friction, laws.sharp & (direction == 0))
+        return Response(ddq, ddtheta, friction + holding), laws.beyond(friction + holding)
+
+    if slip is not None:
+        return under(np.broadcast_to(slip, velocity.shape))[0]
+    direction = direction_of(velocity)
+    found, beyond = under(direction)
+    released = np.where(direction == 0, beyond, 0.0)
+    return under(direction + released)[0] if released.any() else found
