@@ -72,7 +72,7 @@ def test_feedforward_spends_what_the_inverse_dynamics_says():
     # torques taken for linear over 1 ms, (1e-3/0.8)^2 of the work
     np.testing.assert_allclose(past.motor_energy_actual, commanded.motor_energy, rtol=0, atol=2e-6 * scale)
     for was, planned in zip(simulation.report.joints, commanded.report.joints, strict=True):
-        found, expected = astuple(was.energy), astuple(planned.energy)
+        found, expected = (astuple(each.energy)[:5] for each in (was, planned))  # without losses
         assert found == pytest.approx(expected, rel=1e-5, nan_ok=True)
     [energy] = [line for line in str(simulation.report).splitlines() if line.startswith("energy: ")]
     assert f"springs hold up to {max(past.elastic_energy_actual.max(axis=0)):.1f} J" in energy

@@ -8,12 +8,14 @@ if TYPE_CHECKING:
     from vsacli.actuators import laws
     from vsacli.actuators.antagonistic import Antagonistic
     from vsacli.actuators.elastic import Elastic
+    from vsacli.actuators.friction import Friction
     from vsacli.actuators.motor import Motor
     from vsacli.actuators.rigid import Rigid
 
 __all__ = [
     "Antagonistic",
     "Elastic",
+    "Friction",
     "Motor",
     "Rigid",
     "laws",

@@ -41,6 +41,11 @@ class Friction:
     def __post_init__(self) -> None:
         check_fields(self)
 
+    @staticmethod
+    def example(joint_type: str) -> dict[str, float]:
+        """Plausible values of its fields, as a new robot file shows them."""
+        return {"coulomb": 0.5 if joint_type == "revolute" else 5, "width": 0.01}
+
     @property
     def sharp(self) -> bool:
         """Whether the torque at rest is not known: Coulomb friction whose shape is the sign."""

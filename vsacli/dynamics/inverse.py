@@ -122,7 +122,7 @@ class InverseDynamics(RowKernel):
             driven["dissipated_power"] = list(map(dissipated_power, self.robot.joints, motions))
         absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(drives[0].dtheta, np.nan)}
         computed: dict[str, Iterable[Scalar]] = {
-            name: _rows(absent[len(VARIABLES[name].dims)] if array is None else array for array in of_all)
+            name: _rows([absent[len(VARIABLES[name].dims)] if array is None else array for array in of_all])
             for name, of_all in driven.items()
         }
         return self.results.pack({**torques, **computed})

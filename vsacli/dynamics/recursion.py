@@ -49,7 +49,7 @@ class TorqueDerivatives(NamedTuple):
 
 
 class JointState(NamedTuple):
-    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque that dampers and friction take."""
+    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque that damper and friction take."""
 
     cos: Scalar
     sin: Scalar

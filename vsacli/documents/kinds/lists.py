@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vsacli.base.errors import FieldProblem
+from vsacli.base.units import DIMENSIONLESS, Quantity
 from vsacli.documents import tree
 from vsacli.documents.kinds.nested import line_of
 from vsacli.documents.kinds.vectors import list_of
@@ -148,6 +149,12 @@ class Pair(_Entries):
 
     item: Kind
     dim: str = "motor"
+
+    @property
+    def unit(self) -> Quantity:
+        """What one measures."""
+        unit: Quantity = getattr(self.item, "unit", DIMENSIONLESS)
+        return unit
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Both values, which are one if one was written."""
