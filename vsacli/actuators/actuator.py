@@ -136,7 +136,7 @@ class Actuator(ABC):
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Lowest and highest phi for which the springs' laws hold, for each motor."""
+        """Lowest and highest phi for which the springs' laws hold; or what `Elasticity.ranged` gives."""
         return ((-math.inf, math.inf),) * self.motor_count
 
     @property
@@ -205,8 +205,11 @@ class Actuator(ABC):
 
     @property
     def opposite_preload(self) -> str | None:
-        """The other word that its field `preload` may hold; None if there is none."""
+        """The other word that its field for the preload may hold; None if there is none."""
         return None
+
+    preload_field: ClassVar[str] = "preload"
+    """Path to that field."""
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
         """Where another choice of the preload would reach the stiffness, (samples,)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
 
@@ -14,11 +14,10 @@ from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
 from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.pairs.decoupling_matrix import Sides, beta, determinant, solve
+from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
 from vsacli.actuators.reach import Reach, reach
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -44,7 +43,7 @@ class Antagonistic(Actuator):
         default=None,
     )
     preload: str = choice(
-        ("positive", "negative"),
+        PRELOADS,
         "branch of the deflections: positive has phi_1 up and phi_2 down",
         default="positive",
     )
@@ -54,17 +53,7 @@ class Antagonistic(Actuator):
     integrable = True
 
     def __post_init__(self) -> None:
-        problems = []
-        if all(spring.is_linear for spring in self.spring):
-            reason = (
-                "both are linear: no motion of the motors changes the stiffness (A is singular everywhere)"
-            )
-            problems.append(FieldProblem(("spring",), reason))
-        if self.preload == "negative" and any(spring.pulls_only for spring in self.spring):
-            problems.append(
-                FieldProblem(("preload",), "must be positive: a spring that only pulls cannot push")
-            )
-        check_fields(self, *problems, *self._coupling_problems())
+        check_fields(self, *self.pair.problems(), *self._coupling_problems())
 
     def _coupling_problems(self) -> Iterator[FieldProblem]:
         """How far the motors are apart is no variable of its own, so that a coupling must have no end."""
@@ -79,10 +68,14 @@ class Antagonistic(Actuator):
             yield FieldProblem(("coupling", "max_deflection"), reason)
 
     @cached_property
+    def pair(self) -> PreloadedPair:
+        """Both springs on the branch of the preload."""
+        return PreloadedPair(self.spring, self.preload)
+
+    @property
     def laws(self) -> tuple[SpringLaw, SpringLaw]:
         """The springs as they act on sides 1 and 2."""
-        first, second = self.spring
-        return first, second.as_second()
+        return self.pair.laws
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
@@ -130,8 +123,7 @@ class Antagonistic(Actuator):
 
     @property
     def _distinct_springs(self) -> tuple[SpringLaw, ...]:
-        further = () if self.coupling is None else (self.coupling,)
-        return tuple({id(law): law for law in (*self.spring, *further)}.values())
+        return (*self.pair.distinct, *(() if self.coupling is None else (self.coupling,)))
 
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
         """Deflections on the actuator's branch, their rates, and motor accelerations."""
@@ -206,38 +198,26 @@ class Antagonistic(Actuator):
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
         """Solve (14) on the branch that the actuator's preload names."""
-        first, second = self.laws
-        if self.preload == "negative":
-            return make_pair(second, first).solve(tau_e, stiffness).exchanged()
-        return make_pair(first, second).solve(tau_e, stiffness)
+        return self.pair.solve(tau_e, stiffness)
 
     @property
     def opposite_preload(self) -> str | None:
         """The other branch, unless the springs only pull."""
-        if any(law.pulls_only for law in self.laws):
-            return None
-        return "negative" if self.preload == "positive" else "positive"
+        return self.pair.opposite
 
-    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
+    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> BoolArray:
         """Where the branch with the opposite preload reaches the stiffness."""
-        if self.opposite_preload is None:
-            return np.zeros(tau_e.shape, dtype=bool)
-        opposite = replace(self, preload=self.opposite_preload)
-        return ~reach(stiffness, opposite.solve(tau_e, stiffness, q)).infeasible
+        return self.pair.opposite_reaches(tau_e, stiffness)
 
     def deflection_rates(self, phi: FloatArray, command: Command) -> FloatArray:
         """A^-1 (tau_e', sigma'), (19)-(20)."""
-        one, two = self._states(phi)
+        one, two = self.pair.states(*phi)
         right = command.dtau_e, command.commanded["dstiffness"]
         return np.stack(solve(one, two, determinant(one, two), *right))
 
     def determinant(self, phi: FloatArray, _q: FloatArray) -> FloatArray:
         """Det A (67)."""
-        return determinant(*self._states(phi))
-
-    def _states(self, phi: FloatArray) -> tuple[SpringState, SpringState]:
-        (first, second), (phi_1, phi_2) = self.laws, phi
-        return first.state(phi_1), second.state(phi_2)
+        return determinant(*self.pair.states(*phi))
 
 
 def _coupled(moved: Transmission, coupling: SpringLaw) -> Transmission:

@@ -46,7 +46,7 @@ class Drivetrain:
         deflected: (joints, 2), where there is a motor whose phi is a deflection.
         chosen: indices of the joints whose stiffness is commanded.
         spring_joint: (springs,), index of the joint of each spring.
-        domain: (2, springs), lowest and highest phi for which each law holds.
+        domain: (2, springs), lowest and highest `ranged` for which each law holds.
     """
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
@@ -114,6 +114,11 @@ class Drivetrain:
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """phi, (..., springs), from positions of joints (..., joints) and motors (..., springs); or rates."""
         parts = [each.deflections(*positions) for each, positions in self._positions(q, theta)]
+        return self.of_springs(parts, theta)
+
+    def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """What `domain` bounds, (..., springs), at positions as above."""
+        parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
     def torques(self, q: FloatArray, theta: FloatArray) -> Torques:

@@ -32,6 +32,10 @@ class Elasticity(ABC):
         """Phi from positions, or its rates from velocities: theta - q unless the kind says otherwise."""
         return theta - q[..., None]
 
+    def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """What `Actuator.phi_ranges` bounds, (..., joints, motors): phi, unless overridden."""
+        return self.deflections(q, theta)
+
     def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """What the springs depend on, (..., joints, coordinates), or its rates: phi, unless overridden."""
         return self.deflections(q, theta)

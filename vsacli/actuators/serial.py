@@ -51,6 +51,7 @@ class Serial(Actuator):
 
     motor_count = 2
     commanded = ("stiffness",)
+    preload_field = "mechanism.preload"
     integrable = True
 
     def __post_init__(self) -> None:
@@ -109,8 +110,8 @@ class Serial(Actuator):
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
-        """Deflections and settings for which the mechanism works."""
-        return self.mechanism.deflection_range, self.mechanism.setting_range
+        """Where the mechanism works, in what its range is stated in."""
+        return self.mechanism.ranges
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -185,6 +186,11 @@ class Serial(Actuator):
         """Phi and theta_2, on the mechanism's branch."""
         return self.mechanism.solve(tau_e, stiffness, q)
 
+    @property
+    def opposite_preload(self) -> str | None:
+        """That of the mechanism."""
+        return self.mechanism.opposite_preload
+
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:
         """Where another branch of the mechanism reaches the stiffness."""
         return self.mechanism.other_preload(tau_e, stiffness, q)
@@ -215,6 +221,10 @@ class _Springs(Elasticity):
     def deflections(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Phi and theta_2."""
         return np.stack((theta[..., 0] - q, theta[..., 1]), axis=-1)
+
+    def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """What the range of the mechanism is stated in."""
+        return np.stack(self._mechanism.ranged(theta[..., 0] - q, theta[..., 1]), axis=-1)
 
     def coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Phi, theta_2 and q."""

@@ -15,6 +15,7 @@ MECHANISMS = LazyRegistry(
         "maccepa": "vsacli.actuators.mechanisms.preloaded_cams.maccepa:Maccepa",
         "potential": "vsacli.actuators.mechanisms.potential:Potential",
         "cam": "vsacli.actuators.mechanisms.preloaded_cams.cam:Cam",
+        "shifted_cams": "vsacli.actuators.mechanisms.shifted_cams:ShiftedCams",
     }
 )
 """Mechanisms by the name they have in a robot file."""

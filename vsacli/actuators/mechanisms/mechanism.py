@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from vsacli.actuators.mechanisms.state import DeflectionState, MechanismState, P
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.documents.fields import check_fields
 from vsacli.documents.source import Source
+
+Range: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,15 @@ class Mechanism(ABC):
         """theta_2 for which it works."""
 
     @property
+    def ranges(self) -> tuple[Range, Range]:
+        """Where `ranged` must lie, two coordinates one after the other."""
+        return self.deflection_range, self.setting_range
+
+    def ranged(self, phi: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What the mechanism's range is stated in: phi and the setting, unless overridden."""
+        return phi, s
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """How far it may be from the device it describes, one sentence each."""
         return ()
@@ -70,6 +81,11 @@ class Mechanism(ABC):
             phi_1 is phi and phi_2 is theta_2, for the stiffness clipped into the corridor. An end is critical
             where A is singular; the torque's maximum and the ends of ranges are not.
         """
+
+    @property
+    def opposite_preload(self) -> str | None:
+        """The other word that its field `preload` may hold; None if there is none."""
+        return None
 
     def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
         """Where the other branch that the mechanism may be told to take would reach the stiffness."""

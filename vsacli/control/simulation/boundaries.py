@@ -82,7 +82,7 @@ class SpringRange(Boundary):
 
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Deflection to the nearer end of the law."""
-        phi = self._plant.drivetrain.deflections(q, theta)
+        phi = self._plant.drivetrain.ranged(q, theta)
         distances: FloatArray = np.fmin(phi - self._lowest, self._highest - phi)
         return distances
 

@@ -89,5 +89,10 @@ class Combination:
     def robot(self, robot: Robot) -> Robot:
         """The robot with the preloads of the combination."""
         return robot.replace(
-            {f"joints.{index}.actuator.preload": preload for index, preload in self.preloads.items()}
+            {preload_path(robot, index): preload for index, preload in self.preloads.items()}
         )
+
+
+def preload_path(robot: Robot, index: int) -> str:
+    """The path to the preload of a joint in the file of its robot."""
+    return f"joints.{index}.actuator.{robot.joints[index].actuator.preload_field}"

@@ -18,7 +18,7 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import ImpossibleError, path_reason
 from vsacli.studies.remedies.admissible_stiffness import Load
-from vsacli.studies.remedies.combination import Combination, Form, constant_change
+from vsacli.studies.remedies.combination import Combination, Form, constant_change, preload_path
 from vsacli.studies.remedies.motions import evenly_chosen, joined, select, slowed, stiffened
 from vsacli.studies.remedies.slow_down import FACTOR_DENOMINATOR, LARGEST_FACTOR, WATCHED_STEPS
 from vsacli.studies.remedies.task import Task
@@ -100,7 +100,7 @@ def _choices(robot: Robot, watched: Motion | None) -> list[dict[str, Joint]]:
     for index, joint in enumerate(robot.joints):
         preload = joint.actuator.opposite_preload
         if preload is not None:
-            exchanged = robot.replace(f"joints.{index}.actuator.preload", preload).joints[index]
+            exchanged = robot.replace(preload_path(robot, index), preload).joints[index]
             load = torques[:, index], watched.commanded["stiffness"][:, index], watched.q[:, index]
             if not _alike(joint.actuator, exchanged.actuator, *load):
                 choices[index][preload] = exchanged

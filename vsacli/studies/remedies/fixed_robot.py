@@ -8,6 +8,7 @@ from pathlib import Path
 
 from vsacli.base.errors import InputError
 from vsacli.documents.edited import edited, texts_at
+from vsacli.studies.remedies.combination import preload_path
 from vsacli.studies.remedies.suggestions import Remedy
 
 
@@ -24,7 +25,7 @@ def robot_text(remedy: Remedy, folder: Path) -> str:
     if source is None or source.text is None:
         raise InputError.one(f"{remedy.robot.name}: was not read from a file that could be changed")
     values = {
-        f"joints.{remedy.robot.joint_names.index(joint)}.actuator.preload": preload
+        preload_path(remedy.robot, remedy.robot.joint_names.index(joint)): preload
         for joint, preload in remedy.preload.preloads.items()
     }
     try:

@@ -1,0 +1,123 @@
+"""Two cams that motor 2 turns against each other, as in the floating spring joint of the DLR."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from vsacli.actuators.laws import LAWS, SpringLaw
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.mechanisms.mechanism import Mechanism, Range
+from vsacli.actuators.mechanisms.state import Partials
+from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.errors import FieldProblem
+from vsacli.documents.fields import OneOf, Pair, check_fields, choice, value
+from vsacli.documents.source import Source
+
+
+@dataclass(frozen=True)
+class ShiftedCams(Mechanism):
+    """Two cams, turned against each other by s = theta_2: U = U_1(phi + s) + U_2(phi - s).
+
+    The form of the floating spring joint (Wolf, Eiberger & Hirzinger, ICRA 2011) and of the bidirectional
+    antagonism BAVS (Petit, Friedl, Hoeppner & Grebenstein, IEEE/ASME Transactions on Mechatronics 2015). Torque
+    and stiffness are those of an antagonistic pair (14) with phi_1 = phi + s and phi_2 = phi - s, and so are
+    branch and corridor.
+    """
+
+    spring: tuple[SpringLaw, SpringLaw] = value(
+        Pair(OneOf(LAWS)),
+        "torque of cams 1 and 2 over phi + theta_2 and phi - theta_2; one mapping serves both",
+    )
+    preload: str = choice(PRELOADS, "sign of theta_2 on the branch that is used", default="positive")
+
+    def __post_init__(self) -> None:
+        check_fields(self, *self._cams.problems(), *self._limit_problems())
+
+    def _limit_problems(self) -> Iterator[FieldProblem]:
+        """What a cam is turned by is no variable of its own, whose limit could be flagged."""
+        for side, law in enumerate(self.spring):
+            if math.isfinite(law.max_deflection):
+                reason = "is not known of a cam, whose turn is no variable of results; leave it out"
+                yield FieldProblem(("spring", side, "max_deflection"), reason)
+
+    @cached_property
+    def _cams(self) -> PreloadedPair:
+        return PreloadedPair(self.spring, self.preload)
+
+    @classmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:
+        """Cams alike, whose torque grows with the cube of the turn."""
+        revolute = joint_type == "revolute"
+        constants = {"k": 200, "k_c": 8000} if revolute else {"k": 2000, "k_c": 500000}
+        return {"spring": {"type": "cubic", **constants}}
+
+    @property
+    def deflection_range(self) -> Range:
+        """Phi at which both cams can hold."""
+        (low_1, high_1), (low_2, high_2) = self.ranges
+        return (low_1 + low_2) / 2, (high_1 + high_2) / 2
+
+    @property
+    def setting_range(self) -> Range:
+        """theta_2 at which both can."""
+        (low_1, high_1), (low_2, high_2) = self.ranges
+        return (low_1 - high_2) / 2, (high_1 - low_2) / 2
+
+    @property
+    def ranges(self) -> tuple[Range, Range]:
+        """The ranges of either cam's law."""
+        first, second = self._cams.laws
+        return first.domain, second.domain
+
+    def ranged(self, phi: FloatArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """By how much either cam is turned."""
+        return phi + s, phi - s
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Those of the cams, once if both are one."""
+        return tuple(warning for law in self._cams.distinct for warning in law.warnings)
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Those of the cams."""
+        return tuple(source for law in self._cams.distinct for source in law.sources)
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
+        """Deflection and setting from the solution of the pair."""
+        found = self._cams.solve(tau_e, stiffness)
+        return found._replace(phi_1=(found.phi_1 + found.phi_2) / 2, phi_2=(found.phi_1 - found.phi_2) / 2)
+
+    @property
+    def opposite_preload(self) -> str | None:
+        """The other sign of theta_2, unless the cams are alike and it makes no difference."""
+        first, second = self._cams.laws
+        return None if first == second else self._cams.opposite
+
+    def other_preload(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
+        """Where the branch with the other sign of theta_2 reaches the stiffness."""
+        return self._cams.opposite_reaches(tau_e, stiffness)
+
+    def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
+        """Sums and differences of those of both cams; det A is -2 times that of the pair."""
+        first, second = self._cams.laws
+        (energy_1, one), (energy_2, two) = first.energy_and_state(phi + s), second.energy_and_state(phi - s)
+        return Partials(
+            energy=energy_1 + energy_2,
+            setting_torque=one.tau - two.tau,
+            setting_stiffness=one.sigma + two.sigma,
+            T=one.tau + two.tau,
+            T_p=one.sigma + two.sigma,
+            T_s=one.sigma - two.sigma,
+            T_pp=one.zeta + two.zeta,
+            T_ps=one.zeta - two.zeta,
+            T_ss=one.zeta + two.zeta,
+            T_ppp=one.eta + two.eta,
+            T_pps=one.eta - two.eta,
+            T_pss=one.eta + two.eta,
+        )

@@ -1,0 +1,79 @@
+"""Two springs as a robot file gives them, on the branch that a preload names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.pairs import make_pair
+from vsacli.actuators.reach import reach
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.errors import FieldProblem
+
+PRELOADS = ("positive", "negative")
+
+
+@dataclass(frozen=True)
+class PreloadedPair:
+    """Springs 1 and 2, and the branch of their deflections.
+
+    Attributes:
+        spring: as written.
+        preload: one of `PRELOADS`; positive has phi_1 up and phi_2 down.
+    """
+
+    spring: tuple[SpringLaw, SpringLaw]
+    preload: str
+
+    @cached_property
+    def laws(self) -> tuple[SpringLaw, SpringLaw]:
+        """The springs as they act on sides 1 and 2."""
+        first, second = self.spring
+        return first, second.as_second()
+
+    @property
+    def distinct(self) -> tuple[SpringLaw, ...]:
+        """The springs, once if both are one."""
+        return tuple({id(law): law for law in self.spring}.values())
+
+    def problems(self) -> Iterator[FieldProblem]:
+        """Why they cannot set a stiffness, in the fields `spring` and `preload`."""
+        if all(spring.is_linear for spring in self.spring):
+            reason = (
+                "both are linear: no motion of the motors changes the stiffness (A is singular everywhere)"
+            )
+            yield FieldProblem(("spring",), reason)
+        if self.preload == "negative" and any(spring.pulls_only for spring in self.spring):
+            yield FieldProblem(("preload",), "must be positive: a spring that only pulls cannot push")
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+        """Solve (14) on the branch, arrays (samples,)."""
+        first, second = self.laws
+        if self.preload == "negative":
+            return make_pair(second, first).solve(tau_e, stiffness).exchanged()
+        return make_pair(first, second).solve(tau_e, stiffness)
+
+    def states(self, phi_1: FloatArray, phi_2: FloatArray) -> tuple[SpringState, SpringState]:
+        """States of both springs at their deflections."""
+        first, second = self.laws
+        return first.state(phi_1), second.state(phi_2)
+
+    @property
+    def opposite(self) -> str | None:
+        """The other preload, unless the springs only pull."""
+        if any(law.pulls_only for law in self.laws):
+            return None
+        return next(word for word in PRELOADS if word != self.preload)
+
+    def opposite_reaches(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
+        """Where the other preload reaches a stiffness, (samples,)."""
+        if self.opposite is None:
+            return np.zeros(tau_e.shape, dtype=bool)
+        other = replace(self, preload=self.opposite)
+        return ~reach(stiffness, other.solve(tau_e, stiffness)).infeasible
