@@ -11,6 +11,7 @@ import numpy as np
 import sympy
 
 from samples.full_model import Drive, Potential, springs_of
+from samples.law_energies import SAMPLES, Energy
 from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.mechanisms.mechanism import Mechanism
@@ -23,6 +24,7 @@ from vsacli.actuators.mechanisms.ratios.lever import Lever
 from vsacli.actuators.mechanisms.ratios.scales import PolynomialScale, Power
 from vsacli.actuators.mechanisms.ratios.sine import Sine
 from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
+from vsacli.actuators.mechanisms.shifted_cams import ShiftedCams
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.serial import Serial
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -52,6 +54,7 @@ class Device:
         endless: whether it carries any torque.
         symmetric: whether U(-phi) = U(phi).
         rest: phi without load.
+        scanned_settings: theta_2 to scan where no end bounds it.
     """
 
     mechanism: Mechanism
@@ -66,6 +69,7 @@ class Device:
     endless: bool = False
     symmetric: bool = True
     rest: float = 0.0
+    scanned_settings: tuple[float, float] | None = None
 
     @property
     def actuator(self) -> Serial:
@@ -146,7 +150,30 @@ def _four_bar(k: float, ratio: float) -> Callable[[Any], Any]:
     return lambda phi: k / 2 * (sympy.asin(ratio * sympy.sin(phi / 2)) - phi / 2) ** 2
 
 
+def _shifted(energy: Energy) -> Potential:
+    return lambda q, theta_1, theta_2: energy(theta_1 - q + theta_2) + energy(theta_1 - q - theta_2)
+
+
 DEVICES = {
+    "shifted_cams": Device(
+        mechanism=ShiftedCams(spring=(SAMPLES["cubic"].law,) * 2),
+        potential=_shifted(SAMPLES["cubic"].energy),
+        stiffness=(290, 340),
+        deflections=(-0.13, 0.13),
+        settings=(0.02, 0.5),
+        scanned=(-1.5, 1.5),
+        scanned_settings=(-0.1, 1.0),
+    ),
+    "shifted_cams, the other preload": Device(
+        mechanism=ShiftedCams(spring=(SAMPLES["sinh"].law,) * 2, preload="negative"),
+        potential=_shifted(SAMPLES["sinh"].energy),
+        stiffness=(150, 110),
+        deflections=(-0.2, 0.2),
+        settings=(-0.3, -0.02),
+        anchor=0,
+        scanned=(-0.8, 0.8),
+        scanned_settings=(-0.5, 0.1),
+    ),
     "awas": Device(
         mechanism=Awas(k=50000, arm=(0.02, 0.12), lead=0.01),
         potential=_awas(50000, 0.01),

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.mechanisms.mechanism import Mechanism, Range
@@ -24,9 +26,9 @@ class ShiftedCams(Mechanism):
     """Two cams, turned against each other by s = theta_2: U = U_1(phi + s) + U_2(phi - s).
 
     The form of the floating spring joint (Wolf, Eiberger & Hirzinger, ICRA 2011) and of the bidirectional
-    antagonism BAVS (Petit, Friedl, Hoeppner & Grebenstein, IEEE/ASME Transactions on Mechatronics 2015). Torque
-    and stiffness are those of an antagonistic pair (14) with phi_1 = phi + s and phi_2 = phi - s, and so are
-    branch and corridor.
+    antagonism BAVS (Petit, Friedl, Hoeppner & Grebenstein, IEEE/ASME Transactions on Mechatronics 2015).
+    Torque and stiffness are those of an antagonistic pair (14) with phi_1 = phi + s and phi_2 = phi - s, and
+    so are branch and corridor.
     """
 
     spring: tuple[SpringLaw, SpringLaw] = value(
@@ -90,7 +92,8 @@ class ShiftedCams(Mechanism):
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
         """Deflection and setting from the solution of the pair."""
-        found = self._cams.solve(tau_e, stiffness)
+        with np.errstate(all="ignore"):  # a torque may be infinite
+            found = self._cams.solve(tau_e, stiffness)
         return found._replace(phi_1=(found.phi_1 + found.phi_2) / 2, phi_2=(found.phi_1 - found.phi_2) / 2)
 
     @property
