@@ -94,6 +94,20 @@ def test_robot_with_another_preload_keeps_its_comments(tmp_path: Path) -> None:
     assert [line for line in before if line not in after] == []
 
 
+def test_preload_of_a_mechanism_is_changed_where_it_stands(tmp_path: Path) -> None:
+    text = (REPOSITORY / "robots" / "shifted_cams_1r.yaml").read_text()
+    (tmp_path / "cams.yaml").write_text(
+        text.replace("type: shifted_cams", "type: shifted_cams\n        preload: positive")
+    )
+    trajectory = load_trajectory(
+        REPOSITORY / "trajectories" / "shifted_cams_1r.yaml", robot := load_robot(tmp_path / "cams.yaml")
+    )
+    changed = robot.replace("joints.elbow.actuator.mechanism.preload", "negative")
+    remedy = Remedy(0.0, changed, trajectory, preload=OtherPreload({"elbow": "negative"}))
+    *_, path = written(remedy, tmp_path / "fixed.yaml")
+    assert load_robot(path).joints == changed.joints
+
+
 def test_files_that_the_robot_names_are_found_from_elsewhere(tmp_path: Path) -> None:
     remedy = remedy_with(REPOSITORY / "robots" / "measured_1r.yaml", "elbow", "negative")
     *_, path = written(remedy, tmp_path / "fixed.yaml")
