@@ -15,7 +15,7 @@ from vsacli.base.arrays import FloatArray
 DRAWS = 10_000
 
 
-TESTED_APART = {"cam", "potential"}
+TESTED_APART = {"potential"}
 MECHANISM_OF = {
     name: mechanism
     for name, device in DEVICES.items()
