@@ -129,6 +129,21 @@ def test_the_corridor_is_that_of_a_scan_and_what_lies_outside_is_flagged(device:
         np.testing.assert_array_equal(reach(stiffness, found).infeasible, ~inside)
 
 
+def test_next_to_the_ends_of_the_corridor_it_carries_what_is_asked(device: Device) -> None:
+    phi, s, q = states(device, 200)
+    tau_e = -device.springs(q, q + phi, s).link
+    ends = device.mechanism.solve(tau_e, np.ones_like(tau_e), q)
+    for end, inwards in ((ends.lower, 1), (ends.upper, -1)):
+        for margin in (1e-2, 1e-4, 1e-6, 1e-8):
+            asked = end * (1 + inwards * margin)
+            there = (asked > 1e-3 * peak(ends.upper)) & (ends.lower <= asked) & (asked <= ends.upper)
+            stiffness, load, at = asked[there], tau_e[there], q[there]
+            found = device.mechanism.solve(load, stiffness, at)
+            again = device.springs(at, at + found.phi_1, found.phi_2)
+            np.testing.assert_allclose(-again.link, load, rtol=1e-10, atol=1e-12 * peak(tau_e))
+            np.testing.assert_allclose(again.stiffness, stiffness, rtol=1e-10)
+
+
 def test_it_rests_without_load(device: Device) -> None:
     unloaded = device.mechanism.solve(np.zeros(1), np.ones(1), np.zeros(1))
     lower, upper = float(unloaded.lower[0]), min(float(unloaded.upper[0]), 1e6)

@@ -1,4 +1,4 @@
-"""What the actuation of a joint takes with each kind of springs, beside the recursion."""
+"""What the actuation of a joint takes with each kind of springs and mechanism, beside the recursion."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from samples.mechanisms import DEVICES
 from samples.signals import by_name
 from samples.springs import SPRINGS
 from subjects import motion, seven_joints
 from timing import medians
 
+from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
@@ -42,36 +44,32 @@ class Actuation(NamedTuple):
     ratio: float
 
 
-def pairs() -> dict[str, tuple[SpringLaw, SpringLaw]]:
-    """Springs of every law: two alike, and two whose constants differ."""
-    found = {}
+def actuators() -> dict[str, Actuator]:
+    """Pairs of springs of every law, two alike and two whose constants differ; a device of each mechanism."""
+    found: dict[str, Actuator] = {}
+    motors = (Motor(inertia=0.01), Motor(inertia=0.01))
     for name, ((one, _), (other, _)) in SPRINGS.items():
-        found[f"{name}, alike"] = one, one
-        found[f"{name}, unlike"] = one, other
-    return found
+        found[f"{name}, alike"] = Antagonistic(motor=motors, spring=(one, one))
+        found[f"{name}, unlike"] = Antagonistic(motor=motors, spring=(one, other))
+    return found | {name: DEVICES[name].actuator for name in MECHANISMS}
 
 
 def compare(samples: int, repeats: int) -> Iterator[Actuation]:
-    """Time the recursion and the actuation with a pair of springs in turn, pair by pair.
+    """Time the recursion and the actuation with an actuator in turn, one actuator after the other.
 
-    The recursion is timed anew for each pair: next to each other, both meet the same state of the machine.
+    The recursion is timed anew for each: next to each other, both meet the same state of the machine.
     """
     robot, moving = seven_joints(), motion(JOINTS, samples)
-    for name, springs in pairs().items():
-        joint = _joint(robot.joints[0], springs)
+    for name, actuator in actuators().items():
+        joint = replace(robot.joints[0], actuator=actuator)
         ways: dict[str, Callable[[], object]] = {"recursion": lambda: link_torques(robot, *moving)}
         for load, share in SHARES.items():
-            command = _command(joint.actuator, samples, share)
+            command = _command(actuator, samples, share)
             ways[load] = lambda joint=joint, command=command: _drive(joint, command)
         seconds = medians(ways, repeats)
         of_joint = seconds["recursion"] / JOINTS
         for load in SHARES:
             yield Actuation(name, load, seconds[load] / samples, seconds[load] / of_joint)
-
-
-def _joint(joint: Joint, springs: tuple[SpringLaw, SpringLaw]) -> Joint:
-    motors = (Motor(inertia=0.01), Motor(inertia=0.01))
-    return replace(joint, actuator=Antagonistic(motor=motors, spring=springs))
 
 
 def _drive(joint: Joint, command: Command) -> None:
@@ -81,7 +79,7 @@ def _drive(joint: Joint, command: Command) -> None:
         drive(joint, Command.of({name: values[part] for name, values in command.arrays().items()}))
 
 
-def _command(actuator: Antagonistic, samples: int, share: float) -> Command:
+def _command(actuator: Actuator, samples: int, share: float) -> Command:
     """Demands that can be met: stiffness and load swing, the load to a share of the largest it can carry."""
     time, still = np.linspace(0, 1, samples), np.zeros(samples)
     least = actuator.solve(np.zeros(1), np.ones(1), np.zeros(1)).lower[0]
@@ -98,7 +96,7 @@ def _swinging(time: FloatArray, swings: int) -> FloatArray:
     return swung
 
 
-def _largest_load(actuator: Antagonistic, stiffness: FloatArray) -> FloatArray:
+def _largest_load(actuator: Actuator, stiffness: FloatArray) -> FloatArray:
     """About the largest |tau_e| that the stiffness allows in either direction, by bisection."""
     low, high = np.zeros_like(stiffness), 10 * stiffness
     for _ in range(30):

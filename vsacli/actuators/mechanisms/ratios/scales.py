@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.pairs.bracketing import bracketed_root
+from vsacli.actuators.mechanisms.ratios.increasing_root import increasing_root
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.lazy import LazyRegistry
+from vsacli.compute.control_flow import Values
 from vsacli.documents.fields import NON_ZERO, Items, Number, check_fields, number, value
 
 SETTINGS = 2001
@@ -41,9 +42,17 @@ class ScaleLaw(ABC):
         """K with its derivatives at settings."""
 
     def setting(self, scale: FloatArray, settings: tuple[float, float]) -> FloatArray:
-        """The setting in a range at which K has a value, by bracketing."""
+        """The setting in a range at which K has a value."""
         low, high = (np.full_like(scale, end) for end in settings)
-        return bracketed_root(lambda s, wanted: self.at(s).value - wanted, low, high, (scale,))
+        first, last = self.at(np.array(settings, dtype=float)).value.tolist()
+        sign = math.copysign(1.0, last - first)
+
+        def missing(s: FloatArray, wanted: FloatArray) -> Values:
+            value, slope, curvature = self.at(s)
+            return sign * (value - wanted), sign * slope, sign * curvature
+
+        start = low + (scale - first) * ((settings[1] - settings[0]) / (last - first))
+        return increasing_root(missing, low, high, start, (scale,))
 
     def problems(self, settings: tuple[float, float]) -> Iterator[str]:
         """Why it is none for a range of settings."""

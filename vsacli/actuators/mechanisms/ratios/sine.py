@@ -51,6 +51,10 @@ class Sine:
         """The inverse, asin(ratio torque/k)/ratio."""
         return np.arcsin(torque * (self.ratio / self.k)) / self.ratio
 
+    def deflection_at(self, quotient: FloatArray) -> FloatArray:
+        """Where torque over stiffness, tan(ratio phi)/ratio, has a value."""
+        return np.arctan(self.ratio * quotient) / self.ratio
+
     def state(self, phi: FloatArray) -> SpringState:
         """Torque and three derivatives."""
         return self.energy_and_state(phi)[1]

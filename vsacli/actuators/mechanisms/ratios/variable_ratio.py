@@ -11,6 +11,7 @@ import numpy as np
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.mechanisms.ratios.increasing_root import increasing_root
 from vsacli.actuators.mechanisms.ratios.ratio import ratio_partials
 from vsacli.actuators.mechanisms.ratios.scales import SCALES, ScaleLaw
 from vsacli.actuators.mechanisms.ratios.sine import Sine
@@ -20,6 +21,7 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.lazy import LazyRegistry
+from vsacli.compute.control_flow import Values
 from vsacli.documents.fields import OneOf, check_fields, interval, value
 from vsacli.documents.source import Source
 
@@ -117,7 +119,9 @@ class VariableRatio(Mechanism):
             carried = ~stiff.limited & np.isfinite(tau_e)
             lower, upper = (np.where(carried, end.stiffness, np.nan) for end in (soft, stiff))
             demand = np.minimum(np.maximum(stiffness, lower), upper)
-            phi = bracketed_root(self._excess, stiff.phi, soft.phi, (tau_e, demand))
+            ratio = tau_e / demand
+            ends = np.minimum(stiff.phi, soft.phi), np.maximum(stiff.phi, soft.phi)
+            phi = self._deflection(ratio, *ends)
             scale = np.minimum(np.maximum(demand / self.torque.state(phi).sigma, least), most)
             setting = self.scale.setting(scale, self.setting)
         never = np.zeros_like(soft.critical)
@@ -131,10 +135,18 @@ class VariableRatio(Mechanism):
             phi_2=np.where(np.isnan(demand), np.nan, setting),
         )
 
-    def _excess(self, phi: FloatArray, tau_e: FloatArray, stiffness: FloatArray) -> FloatArray:
-        """Sigma g - tau_e g', which grows with phi along the branch."""
+    def _deflection(self, ratio: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+        """Phi at which g/g' has a value, between two ends."""
+        if isinstance(self.torque, Sine):
+            return np.minimum(np.maximum(self.torque.deflection_at(ratio), low), high)
+        return increasing_root(self._torque_over_stiffness, low, high, ratio, (ratio,))
+
+    def _torque_over_stiffness(self, phi: FloatArray, ratio: FloatArray) -> Values:
+        """g/g' less a ratio, which grows with phi along the branch, and two derivatives."""
         state = self.torque.state(phi)
-        return stiffness * state.tau - tau_e * state.sigma
+        found, slope, curvature = (each / state.sigma for each in (state.tau, state.zeta, state.eta))
+        bent = 2 * found * slope * slope - slope - found * curvature
+        return found - ratio, 1 - found * slope, bent
 
     def _end(self, tau_e: FloatArray, scale: float) -> _End:
         """Where the branch has a scale, or ends before."""
