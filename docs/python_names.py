@@ -15,7 +15,7 @@ GROUPS = {
     "Elastic Rigid Motor Friction laws Placeholders",
     "Trajectories": "load_trajectory Trajectory Motion Wrench",
     "Inverse dynamics and its results": "inverse_dynamics Result Report Flag open_result suggest "
-    "compare Comparison",
+    "compare Comparison sensitivity Sensitivity",
     "Links": "link_torques forward_kinematics jacobian mass_matrix",
     "Control and simulation": "State state_derivative Gains feedback_linearization FeedbackLinearization "
     "Integral simulate perturbed InitialError GoalTolerance Tolerances",

@@ -35,7 +35,7 @@ PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 
 LONG = (
     *("cli.md", "energy.md", "python.md", "quickstart.md"),
-    *("recorded.md", "robots.md", "simulation.md", "suggestions.md", "urdf.md"),
+    *("recorded.md", "robots.md", "sensitivity.md", "simulation.md", "suggestions.md", "urdf.md"),
 )
 """Pages whose examples take more than a second."""
 

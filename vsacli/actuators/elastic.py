@@ -12,6 +12,7 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
 from vsacli.actuators.laws import LAWS, SpringLaw
+from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.laws.rows import SpringRows
 from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.limit_check import LimitCheck, OfJoint
@@ -117,7 +118,7 @@ class Elastic(Actuator):
         """Deflection tau_e/K: nothing is to be solved, and the stiffness is constant."""
         phi, constant = command.tau_e / stiffness, np.zeros_like(command.q)
         return single_motor(
-            stiffness=np.full_like(command.q, stiffness),
+            stiffness=constant + stiffness,
             dstiffness=constant,
             ddstiffness=constant,
             phi=phi,
@@ -135,7 +136,8 @@ class Elastic(Actuator):
         """
         law = self.law
         infeasible = has(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)
-        phi = np.where(infeasible, np.nan, law.deflection(command.tau_e))
+        found = self.solve(command.tau_e, np.full_like(command.tau_e, np.nan), command.q)
+        phi = np.where(infeasible, np.nan, found.phi_1)
         energy, spring = law.energy_and_state(phi)
         reached = Reach(
             infeasible=infeasible,
@@ -157,6 +159,12 @@ class Elastic(Actuator):
             elastic_energy=energy,
             flags=reached.flags,
         )
+
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
+        """The deflection at which the spring carries the torque, which leaves no choice of the stiffness."""
+        never = np.zeros_like(tau_e, dtype=bool)
+        deflection = self.law.deflection(tau_e)
+        return PairSolution(stiffness, stiffness, never, never, never, deflection, stiffness)
 
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
         """Sigma phi'."""

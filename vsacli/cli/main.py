@@ -29,6 +29,7 @@ _SECTIONS = {
         "check-feasibility": "vsacli.cli.check_feasibility:check_feasibility",
         "simulate": "vsacli.cli.simulate:simulate",
         "codegen": "vsacli.cli.codegen:codegen",
+        "sensitivity": "vsacli.cli.sensitivity:sensitivity",
     },
     "Results": {
         "plot": "vsacli.cli.plot:plot",

@@ -7,22 +7,28 @@ text serves every geometry without a branch on a value.
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Callable
+from numbers import Rational
 from typing import Any, NamedTuple
+
+import numpy as np
 
 Scalar = Any
 """Anything with + - * among its kind and with Python integers."""
 
 
-def exact(number: float) -> Scalar:
-    """The number, as a Python integer if it is one of the constants that fold."""
-    return int(number) if number in (0, 1, -1) else number
+def exact(number: Scalar) -> Scalar:
+    """The number, as a Python integer if it is one of the constants that fold; other scalars as they are."""
+    plain = isinstance(number, float | int | complex | Rational)
+    return int(number) if plain and number in (0, 1, -1) else number
 
 
-def trigonometric(function: Callable[[float], float], angle: float) -> Scalar:
-    """Cosine or sine of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
-    number = function(angle)
+def trigonometric(name: str, angle: Scalar) -> Scalar:
+    """`cos` or `sin` of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
+    if not isinstance(angle, float | int):
+        return getattr(np, name)(angle)
+    number: float = getattr(math, name)(angle)
     return 0 if abs(number) <= sys.float_info.epsilon * max(1.0, abs(angle)) else exact(number)
 
 

@@ -71,8 +71,19 @@ def drive(
         integrated: deflections of a joint to use instead of the root of (14), (2, samples); a
             step where they are NaN is infeasible.
     """
-    transmission = joint.actuator.transmit(command, near_singular, integrated)
+    driven = driven_by(joint, command, near_singular, integrated)
+    of_joint = {**command.arrays(), **driven.arrays()}
+    exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
+    unexplained = not_finite_flags(_not_finite(joint, of_joint))
+    return driven._replace(flags=driven.flags | exceeded | unexplained)
+
+
+def driven_by(
+    joint: Joint, command: Command, near_singular: float, integrated: FloatArray | None = None
+) -> Drive:
+    """As `drive`, with the flags of reach alone; also with scalars that carry derivatives along."""
     actuator = joint.actuator
+    transmission = actuator.transmit(command, near_singular, integrated)
     dtheta = actuator.motor_positions(transmission.dphi, command.dq)  # (69)
     motors = actuator.motors
     damping = _by_motor([motor.damping for motor in motors])
@@ -93,11 +104,7 @@ def drive(
         motor_power=tau_motor * dtheta,
         tau_damper=command.commanded[DAMPING.key] * command.dq if joint.damper else None,
     )._replace(**electrical)
-    driven = driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
-    of_joint = {**command.arrays(), **driven.arrays()}
-    exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
-    unexplained = not_finite_flags(_not_finite(joint, of_joint))
-    return driven._replace(flags=driven.flags | exceeded | unexplained)
+    return driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
 
 
 def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
@@ -131,4 +138,4 @@ def _published(actuator: Actuator, phi: FloatArray) -> FloatArray:
 
 def _by_motor(values: list[float]) -> FloatArray:
     """(2, 1), NaN for a motor there is not."""
-    return np.array([*values, *[math.nan] * (SIDES - len(values))])[:, None]
+    return np.stack([*values, *[math.nan] * (SIDES - len(values))])[:, None]

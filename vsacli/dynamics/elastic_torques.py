@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -44,8 +43,8 @@ def link_constants(joint: Joint) -> LinkConstants:
     return LinkConstants(
         revolute=joint.is_revolute,
         a=exact(joint.dh.a),
-        cos_alpha=trigonometric(math.cos, joint.dh.alpha),
-        sin_alpha=trigonometric(math.sin, joint.dh.alpha),
+        cos_alpha=trigonometric("cos", joint.dh.alpha),
+        sin_alpha=trigonometric("sin", joint.dh.alpha),
         mass=exact(joint.link.mass),
         com=Vector(*map(exact, joint.link.com)),
         inertia=SymmetricTensor(
@@ -254,7 +253,7 @@ def joint_state(
     if joint.is_revolute:
         angle = q + dh.theta
         return JointState(np.cos(angle), np.sin(angle), exact(dh.d), rates, resistance)
-    cos, sin = (trigonometric(function, dh.theta) for function in (math.cos, math.sin))
+    cos, sin = (trigonometric(name, dh.theta) for name in ("cos", "sin"))
     return JointState(cos, sin, q + dh.d, rates, resistance)
 
 

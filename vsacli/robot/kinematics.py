@@ -132,7 +132,7 @@ def tip_position(robot: Robot, q: FloatArray) -> FloatArray:
 def rotation_matrix(pose: Pose) -> Matrix:
     """Rz(yaw) Ry(pitch) Rx(roll), with exact zeros and ones at right angles."""
     (cr, cp, cy), (sr, sp, sy) = (
-        [trigonometric(function, angle) for angle in pose.rpy] for function in (math.cos, math.sin)
+        [trigonometric(function, angle) for angle in pose.rpy] for function in ("cos", "sin")
     )
     return Matrix(
         Vector(mul(cy, cp), sub(mul(mul(cy, sp), sr), mul(sy, cr)), add(mul(mul(cy, sp), cr), mul(sy, sr))),

@@ -12,7 +12,6 @@ their common x axis by a_i and alpha_i; nothing for the last one.
 from __future__ import annotations
 
 import dataclasses
-import math
 from itertools import pairwise
 
 from vsacli.compute.vector import Scalar, Vector, add, exact, mul, sub, trigonometric
@@ -55,7 +54,7 @@ def _standard_joint(joint: Joint, row: DenavitHartenberg, next_row: DenavitHarte
 
 def _moved_link(link: Link, row: DenavitHartenberg) -> Link:
     """The link seen from the frame that Tx(a) Rx(alpha) leads to."""
-    c, s = trigonometric(math.cos, row.alpha), trigonometric(math.sin, row.alpha)
+    c, s = trigonometric("cos", row.alpha), trigonometric("sin", row.alpha)
     x, (y, z) = link.com[0] - row.a, _turned(c, s, *link.com[1:])
     return Link(mass=link.mass, com=(x, y, z), inertia=_turned_inertia(link.inertia, c, s))
 

@@ -39,14 +39,14 @@ class FourBar(SpringLaw):
     @property
     def domain(self) -> tuple[float, float]:
         """Deflections up to the stretched linkage, all but a millionth."""
-        end = 2 * math.asin((1 - STRETCH_MARGIN) / self.ratio)
+        end = 2 * np.arcsin((1 - STRETCH_MARGIN) / self.ratio)
         return (-end, end)
 
     @cached_property
     def torque_range(self) -> tuple[float, float]:
         """Torques at the ends of the domain."""
-        low, high = self.torque(np.array(self.domain))
-        return float(low), float(high)
+        low, high = map(self.torque, self.domain)  # type: ignore[arg-type]  # numbers are arrays, too
+        return low, high  # type: ignore[return-value]
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Derivatives of the energy k beta^2/2, which share the angles."""

@@ -1,0 +1,113 @@
+"""How far motor torques and margins may be off while the numbers of a robot are uncertain: to first order."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vsacli.actuators.reach import margin
+from vsacli.base.arrays import FloatArray
+from vsacli.base.json_records import Published, named
+from vsacli.studies.sensitivities.drive_derivatives import MARGIN
+from vsacli.studies.sensitivities.sensitivity_run import Derivatives
+
+
+@dataclass(frozen=True)
+class JointBand(Published):
+    """What tolerances do to a joint.
+
+    Attributes:
+        torque: largest standard deviation of a motor torque, N m (N).
+        share: that over the largest motor torque.
+        time: when, s.
+        margin: the margin that is the smallest number of its own standard deviations, NaN if there is none.
+        margin_deviation: that deviation.
+        margin_time: when, s.
+        lost: probability that the margin is lost there; that it is lost at all is at least as large.
+    """
+
+    torque: float
+    share: float
+    time: float
+    margin: float
+    margin_deviation: float
+    margin_time: float
+    lost: float
+
+    shape: ClassVar = named("torque", "share", "time", "margin", "margin_deviation", "margin_time", "lost")
+
+
+class Band:
+    """Variances over a run; independent parameters, first order. `add` its blocks in order.
+
+    Attributes:
+        deviation: standard deviation of tau_motor, (samples, joints, 2), of the blocks so far.
+    """
+
+    def __init__(self, deviations: FloatArray) -> None:
+        self._variances = deviations**2
+        self._parts: list[tuple[FloatArray, ...]] = []
+
+    def add(self, part: Derivatives) -> None:
+        """Merge the next block."""
+        block = part.block
+        gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+        self._parts.append(
+            (
+                np.asarray(block.time),
+                np.asarray(block.tau_motor),
+                gap,
+                *(self._deviation(part.by_name[name]) for name in ("tau_motor", MARGIN)),
+            )
+        )
+
+    def _deviation(self, slopes: FloatArray) -> FloatArray:
+        counted = self._variances > 0
+        return np.asarray(np.sqrt(np.einsum("p...,p->...", slopes[counted] ** 2, self._variances[counted])))
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Of tau_motor."""
+        return np.concatenate([part[3] for part in self._parts])
+
+    def joints(self) -> list[JointBand]:
+        """What was found, of each joint."""
+        time, torque, gap, of_torque, of_margin = (
+            np.concatenate(parts) for parts in zip(*self._parts, strict=True)
+        )
+        return [
+            _of_joint(time, torque[:, joint], gap[:, joint], of_torque[:, joint], of_margin[:, joint])
+            for joint in range(gap.shape[1])
+        ]
+
+
+def _of_joint(
+    time: FloatArray, torque: FloatArray, gap: FloatArray, of_torque: FloatArray, of_margin: FloatArray
+) -> JointBand:
+    spread = np.nan_to_num(np.fmax(*of_torque.T))
+    worst = int(spread.argmax())
+    peak = float(np.nanmax(np.abs(torque), initial=0.0))
+    known = np.isfinite(gap) & (of_margin > 0)
+    if not known.any():
+        nothing = (math.nan,) * 3 + (0.0,)
+        return JointBand(
+            float(spread[worst]), _share(float(spread[worst]), peak), float(time[worst]), *nothing
+        )
+    distance = np.where(known, gap / np.where(known, of_margin, 1.0), np.inf)
+    near = int(distance.argmin())
+    return JointBand(
+        float(spread[worst]),
+        _share(float(spread[worst]), peak),
+        float(time[worst]),
+        float(gap[near]),
+        float(of_margin[near]),
+        float(time[near]),
+        math.erfc(float(distance[near]) / math.sqrt(2)) / 2,
+    )
+
+
+def _share(spread: float, peak: float) -> float:
+    return spread / peak if peak > 0 else math.nan

@@ -1,0 +1,148 @@
+"""The numbers of a robot by which all is differentiated, and robots that carry derivatives by them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple, TypeVar
+
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError
+from vsacli.base.units import Quantity
+from vsacli.compute.duals import Dual, seeds
+from vsacli.documents.plausibility import Entry, NumberPath, numbers
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+
+JOINTS, LIMITS, LARGEST = "joints", "limits", "max_"
+"""Words of paths: numbers under `limits`, and those that begin by `max_`, bound results and change none."""
+
+_Record = TypeVar("_Record")
+
+
+class Parameter(NamedTuple):
+    """A number of a robot.
+
+    Attributes:
+        path: to it, from the robot.
+        quantity: what it measures.
+        value: in SI units.
+        joint: index of its joint; None if it is of the whole robot.
+        joint_type: of that joint, "" if there is none.
+    """
+
+    path: NumberPath
+    quantity: Quantity
+    value: float
+    joint: int | None
+    joint_type: str
+
+    def __str__(self) -> str:
+        return ".".join(map(str, self.path))
+
+    @property
+    def part(self) -> str:
+        """What of a joint it belongs to, e.g. `dh`; of the robot, `gravity`, `base` or `tool`."""
+        return str(self.path[0] if self.joint is None else self.path[2])
+
+    @property
+    def unit(self) -> str:
+        """Its SI unit."""
+        return self.quantity.unit(self.joint_type)
+
+
+def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, ...]:
+    """The numbers of a robot that results depend on.
+
+    Args:
+        robot: the robot.
+        patterns: only those whose path fits one of these, e.g. `joints.*.actuator.spring.*`; all if empty.
+
+    Raises:
+        InputError: a pattern fits none.
+    """
+    found = [
+        _parameter(robot, number.path, number.quantity, number.value)
+        for number in numbers(robot)
+        if _matters(number.path)
+    ]
+    chosen = [each for each in found if not patterns or any(_fits(each, pattern) for pattern in patterns)]
+    for pattern in patterns:
+        if not any(_fits(each, pattern) for each in found):
+            hint = did_you_mean(pattern, [str(each) for each in found])
+            raise InputError.one(f"no number of the robot fits {pattern!r}{hint}")
+    return tuple(chosen)
+
+
+def _matters(path: NumberPath) -> bool:
+    return LIMITS not in path and not str(path[-1]).startswith(LARGEST)
+
+
+def _fits(parameter: Parameter, pattern: str) -> bool:
+    return fnmatchcase(str(parameter), pattern)
+
+
+def _parameter(robot: Robot, path: NumberPath, quantity: Quantity, value: float) -> Parameter:
+    entry = path[1] if path[0] == JOINTS else None
+    if not isinstance(entry, Entry):
+        return Parameter(path, quantity, value, None, "")
+    return Parameter(path, quantity, value, entry.number, robot.joints[entry.number].type)
+
+
+def seeded(robot: Robot, chosen: Sequence[Parameter], further: int = 0) -> Robot:
+    """A robot that carries the derivatives by some of its numbers, a direction each, and by `further` others.
+
+    It is none to be checked or written: records on the way to those numbers are made without their checks.
+    """
+    duals = seeds([parameter.value for parameter in chosen], len(chosen) + further)
+    places = [(parameter.path, dual) for parameter, dual in zip(chosen, duals, strict=True)]
+    carrying: Robot = _with_numbers(robot, places)
+    return carrying
+
+
+def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Dual]]) -> Any:
+    """A record or list with other numbers at some paths."""
+    inside: dict[str | int, list[tuple[NumberPath, Dual]]] = {}
+    for path, dual in places:
+        if not path:
+            return dual
+        word = path[0].number if isinstance(path[0], Entry) else path[0]
+        inside.setdefault(word, []).append((path[1:], dual))
+    if isinstance(content, tuple):
+        return _in_list(content, inside)
+    fields: dict[str, Any] = {
+        str(word): _with_numbers(getattr(content, str(word)), deeper) for word, deeper in inside.items()
+    }
+    return _remade(content, fields)
+
+
+def _in_list(
+    entries: tuple[Any, ...], inside: Mapping[str | int, list[tuple[NumberPath, Dual]]]
+) -> tuple[Any, ...]:
+    """Of a pair whose sides are one, a path goes on without a number: it changes both."""
+    both = [
+        ((word, *path), dual)
+        for word, deeper in inside.items()
+        if isinstance(word, str)
+        for path, dual in deeper
+    ]
+    if both:
+        return (_with_numbers(entries[0], both),) * len(entries)
+    return tuple(
+        _with_numbers(entry, inside[index]) if index in inside else entry
+        for index, entry in enumerate(entries)
+    )
+
+
+def apart(joint: Joint) -> Joint:
+    """The joint with an actuator that is no other's, as one may be of several robots."""
+    return _remade(joint, {"actuator": _remade(joint.actuator, {})})
+
+
+def _remade(record: _Record, contents: Mapping[str, Any]) -> _Record:
+    """A record with other values in some fields, without its checks and without what it keeps of them."""
+    new = object.__new__(type(record))
+    for field in dataclasses.fields(record):  # type: ignore[arg-type]  # declared fields are those of dataclasses
+        object.__setattr__(new, field.name, contents.get(field.name, getattr(record, field.name)))
+    return new

@@ -1,0 +1,168 @@
+"""What a sensitivity analysis says, as text and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from vsacli.base.json_records import Published, named
+from vsacli.base.tables import aligned
+from vsacli.studies.sensitivities.band import JointBand
+from vsacli.studies.sensitivities.monte_carlo import MonteCarlo
+
+SHOWN = 15
+"""Numbers in the table, the most important first."""
+
+
+@dataclass(frozen=True)
+class JointEffect(Published):
+    """What a change of a number does to a joint.
+
+    Attributes:
+        torque: largest change of a motor torque, N m (N), in size.
+        share: that over the joint's largest motor torque.
+        time: when, s.
+        motor: of which, 1 or 2.
+        margin: change of the smallest margin; NaN if there is none.
+        spent: change of the energy that its motors spend, J.
+    """
+
+    torque: float
+    share: float
+    time: float
+    motor: int
+    margin: float
+    spent: float
+
+    shape: ClassVar = named("torque", "share", "time", "motor", "margin", "spent")
+
+
+@dataclass(frozen=True)
+class ParameterEffect(Published):
+    """What a change of a number does.
+
+    Attributes:
+        path: of the number, from the robot.
+        value, unit: of it, in SI units.
+        step: the change, in SI units.
+        words: the change as people say it.
+        joints: what it does to each joint that it does anything to, by name.
+        tolerance: standard deviation of the number, SI units; None if no tolerances were given.
+    """
+
+    path: str
+    value: float
+    unit: str
+    step: float
+    words: str
+    joints: dict[str, JointEffect]
+    tolerance: float | None = None
+
+    shape: ClassVar = {**named("path", "value", "unit", "step", "joints"), "tolerance?": "tolerance"}
+
+    @property
+    def most(self) -> tuple[str, JointEffect] | None:
+        """The joint whose motor torque changes most by its own measure, and how; None if none does."""
+        changed = [each for each in self.joints.items() if each[1].share > 0]
+        return max(changed, key=lambda each: each[1].share, default=None)
+
+    @property
+    def share(self) -> float:
+        """Of the largest motor torque of that joint."""
+        return 0.0 if self.most is None else self.most[1].share
+
+
+@dataclass(frozen=True)
+class Sensitivity(Published):
+    """How much a run depends on each number of its robot.
+
+    Attributes:
+        robot, trajectory: names of both.
+        parameters: the numbers, the most important first.
+        band: what tolerances do to each joint, by name; empty if none were given.
+        monte_carlo: what became of robots drawn from the tolerances; None if none were.
+        units: of the torques of each joint, by name.
+    """
+
+    robot: str
+    trajectory: str
+    parameters: tuple[ParameterEffect, ...]
+    band: dict[str, JointBand] = field(default_factory=dict)
+    monte_carlo: MonteCarlo | None = None
+    units: dict[str, str] = field(default_factory=dict)
+
+    format: ClassVar[str] = "vsacli-sensitivity/1"
+    shape: ClassVar = {
+        "format": "format",
+        **named("robot", "trajectory", "parameters"),
+        "band?": "band",
+        "monte_carlo?": "monte_carlo",
+    }
+
+    def __str__(self) -> str:
+        title = f"{self.robot}, {self.trajectory}: {len(self.parameters)} numbers"
+        return "\n".join([title, *aligned(list(self._rows())), *self._more(), *self._bands(), *self._drawn()])
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        yield ("number", "change", "peak motor torque", "", "at", "smallest margin", "energy spent")
+        for each in self.parameters[:SHOWN]:
+            if each.most is None:
+                continue
+            joint, effect = each.most
+            spent = sum(of_joint.spent for of_joint in each.joints.values())
+            yield (
+                each.path,
+                each.words,
+                f"{joint} {100 * effect.share:.2g} %",
+                f"{effect.torque:.3g} {self.units[joint]}",
+                f"{effect.time:.3f} s",
+                _margins(each),
+                f"{spent:+.2g} J",
+            )
+
+    def _more(self) -> Iterator[str]:
+        rest = sum(each.most is not None for each in self.parameters[SHOWN:])
+        without = sum(each.most is None for each in self.parameters)
+        if rest:
+            last = self.parameters[SHOWN].share
+            yield f"and {rest} more, with {100 * last:.2g} % and less; all with --json"
+        if without:
+            yield f"{without} change no motor torque, or are zero"
+
+    def _bands(self) -> Iterator[str]:
+        for joint, band in self.band.items():
+            unit = self.units[joint]
+            line = (
+                f"{joint}: motor torque +- {band.torque:.3g} {unit} ({100 * band.share:.2g} % of its peak) "
+                f"at t = {band.time:.3f} s"
+            )
+            if math.isfinite(band.margin):
+                line += (
+                    f"; margin {100 * band.margin:.2f} +- {100 * band.margin_deviation:.2g} % at t = "
+                    f"{band.margin_time:.3f} s, lost with a probability of {_probability(band.lost)}"
+                )
+            yield line
+
+    def _drawn(self) -> Iterator[str]:
+        if self.monte_carlo is None:
+            return
+        drawn = self.monte_carlo
+        refused = f", {drawn.refused} of them no robots" if drawn.refused else ""
+        each = ", ".join(
+            f"{joint} +- {drawn.torque[joint]:.3g} {self.units[joint]}, {_probability(lost)} lost"
+            for joint, lost in drawn.lost.items()
+        )
+        yield f"of {drawn.drawn} robots drawn{refused}: {each}"
+
+
+def _margins(effect: ParameterEffect) -> str:
+    """The largest change of a smallest margin."""
+    changes = {name: each.margin for name, each in effect.joints.items() if math.isfinite(each.margin)}
+    joint = max(changes, key=lambda name: abs(changes[name]), default=None)
+    return "-" if joint is None or not changes[joint] else f"{joint} {100 * changes[joint]:+.2g} points"
+
+
+def _probability(share: float) -> str:
+    return f"{100 * share:.2g} %" if share >= 1e-6 else "less than 1e-4 %"
