@@ -12,6 +12,7 @@ from samples.mechanisms import DEVICES
 from samples.springs import SPRINGS
 
 from vsacli import Antagonistic, Elastic, Motor, load_robot, load_trajectory
+from vsacli.actuators.friction import Friction
 from vsacli.actuators.reach import margin
 from vsacli.actuators.serial import Serial
 from vsacli.actuators.transmission import Command
@@ -122,7 +123,10 @@ def variables(joint, demand):
     return {"tau_motor": driven.tau_motor, "theta": driven.theta, "margin": gap}
 
 
-MOTORS = (Motor(inertia=1.0, damping=0.1), Motor(inertia=0.02, damping=0.002, gear_ratio=-7.0))
+MOTORS = (
+    Motor(inertia=1.0, damping=0.1, friction=Friction(coulomb=(0.2, 0.3), offset=0.05, width=0.4)),
+    Motor(inertia=0.02, damping=0.002, gear_ratio=-7.0, friction=Friction(coulomb=(0.01, 0.02))),
+)
 
 
 def serial_command(device, samples=40):

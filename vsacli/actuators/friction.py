@@ -85,7 +85,7 @@ class FrictionLaws(NamedTuple):
             return None
         laws = [friction or NO_FRICTION for friction in frictions]
         rows = [(*law.coulomb, law.offset, law.width) for law in laws]
-        return cls(*np.array(rows).T)
+        return cls(*map(np.stack, zip(*rows, strict=True)))
 
     def with_axis_behind(self) -> FrictionLaws:
         """The same with a further axis, for samples, behind those there are."""

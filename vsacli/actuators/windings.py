@@ -34,7 +34,7 @@ class Windings(NamedTuple):
         if all(constant is None for constant, _ in rows):
             return None
         known = [[math.nan if value is None else value for value in row] for row in rows]
-        return cls(*np.array(known).T)
+        return cls(*map(np.stack, zip(*known, strict=True)))
 
     def with_axis_behind(self) -> Windings:
         """The same with a further axis, for samples, behind those there are."""

@@ -57,13 +57,13 @@ __all__ = [
 ]
 
 _ABOVE_ZERO = {"exclusiveMinimum": 0}
-POSITIVE = Check(lambda value: value > 0 and math.isfinite(value), "positive", _ABOVE_ZERO)
+POSITIVE = Check(lambda value: 0 < value < math.inf, "positive", _ABOVE_ZERO)
 POSITIVE_OR_INFINITE = Check(lambda value: value > 0, "positive", _ABOVE_ZERO)
-NON_NEGATIVE = Check(lambda value: value >= 0 and math.isfinite(value), "zero or positive", {"minimum": 0})
+NON_NEGATIVE = Check(lambda value: 0 <= value < math.inf, "zero or positive", {"minimum": 0})
 NON_ZERO = Check(
-    lambda value: value != 0 and math.isfinite(value), "finite and not zero", {"not": {"const": 0}}
+    lambda value: value != 0 and abs(value) < math.inf, "finite and not zero", {"not": {"const": 0}}
 )
-FINITE = Check(math.isfinite, "finite")
+FINITE = Check(lambda value: abs(value) < math.inf, "finite")
 
 
 def _declare(field: Field, default: Any, **options: Any) -> Any:

@@ -48,7 +48,7 @@ class Check:
         """Why a number is refused, by the condition or for its size; None if it is not."""
         if not self.holds(number):
             return f"must be {self.requirement}, not {number:g}"
-        if math.isfinite(number) and abs(number) > LARGEST:
+        if LARGEST < abs(number) < math.inf:
             return f"must be at most {LARGEST:g} in size, not {number:g}"
         if 0 < abs(number) < SMALLEST and not self.holds(0.0):
             return f"must be at least {SMALLEST:g} in size, not {number:g}"
