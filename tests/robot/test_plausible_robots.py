@@ -56,6 +56,9 @@ MEANT = {
         0.2,
         pair(Motor(inertia=60, damping=2e3, max_torque=2e5), Cubic(k=2e5, k_c=2e6)),
     ),
+    "joints behind a spring that hardly hardens": arm(
+        2, 2, 0.3, 0.03, Elastic(motor=Motor(inertia=0.2), spring=Cubic(k=400, k_c=5))
+    ),
     "a space manipulator": arm(
         6, 60, 3.5, 0.15, Elastic(motor=Motor(inertia=1e-3, gear_ratio=1800), stiffness=1e5), (0, 0, 0)
     ),

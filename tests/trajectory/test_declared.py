@@ -105,6 +105,15 @@ def test_a_stiffness_swings_within_a_ramp():
         assert not commanded[name][[0, -1]].any()
 
 
+def test_small_and_fast_swings_of_the_stiffness_are_plausible():
+    """Amplitudes are no stiffness, and their frequency is not that of the motion."""
+    rest = LASTING + "position: {type: polynomial, degree: 7, start: 0, end: [1, 0.1]}\n"
+    swing = SWINGING.replace("0.25", "200") + "  sine: [{arm: 0.01, slide: 1}, 0]\n"
+    assert not load(rest + swing).warnings
+    [warning] = load(rest + swing.replace("900,", "9,")).warnings
+    assert "stiffness.offset.arm" in warning
+
+
 def test_only_joints_with_a_stiffness_swing():
     robot = load_robot(ROOT / "robots" / "mixed_3r.yaml")
     swing = "stiffness: {type: sinusoids, frequency: 1, offset: 900, sine: [{elbow: 50}], cosine: [20]}\n"

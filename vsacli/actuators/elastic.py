@@ -10,11 +10,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
-from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.laws.rows import SpringRows
-from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.limit_check import LimitCheck, OfJoint
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import Reach
@@ -180,88 +179,9 @@ class Elastic(Actuator):
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
         """The springs of several joints."""
+        from vsacli.actuators.single_springs import LinearRows, SingleSprings
+
         linear = [actuator.stiffness for actuator in actuators if actuator.stiffness]
         if len(linear) == len(actuators):
-            return _Springs(_LinearRows(linear))
-        return _Springs(SpringRows([(actuator.law,) for actuator in actuators]))
-
-
-class _LinearRows:
-    """Linear springs, one at each joint, all evaluated at a time; else as `SpringRows`."""
-
-    def __init__(self, stiffness: Sequence[float]) -> None:
-        self._stiffness = np.array(stiffness)[:, None]
-
-    def torque(self, phi: FloatArray) -> FloatArray:
-        """K phi."""
-        torque: FloatArray = phi * self._stiffness
-        return torque
-
-    def energy(self, phi: FloatArray) -> FloatArray:
-        """K phi^2/2."""
-        energy: FloatArray = phi * phi * (self._stiffness / 2)
-        return energy
-
-    def state(self, phi: FloatArray) -> SpringState:
-        """K phi, whose derivatives are constants."""
-        torque, none = self.torque(phi), np.zeros_like(phi)
-        return SpringState(torque, np.broadcast_to(self._stiffness, torque.shape), none, none)
-
-
-class _Springs(Elasticity):
-    """One spring at each joint."""
-
-    def __init__(self, rows: SpringRows | _LinearRows) -> None:
-        self._rows = rows
-
-    def torques(self, phi: FloatArray) -> Torques:
-        """The spring pulls link and motor alike."""
-        tau = self._rows.torque(phi)
-        return Torques(tau[..., 0], tau)
-
-    def energy(self, phi: FloatArray) -> FloatArray:
-        """That of the spring."""
-        return self._rows.energy(phi)[..., 0]
-
-    def state(self, phi: FloatArray) -> ElasticState:
-        """The spring with its derivatives."""
-        return _State(self._rows.state(phi))
-
-
-class _State(ElasticState):
-    """One spring of each joint, arrays (..., joints, 1)."""
-
-    def __init__(self, springs: SpringState) -> None:
-        self._springs = springs
-        self._one = SpringState(*(each[..., 0] for each in springs))
-
-    @property
-    def tau_e(self) -> FloatArray:
-        """Torque of the spring."""
-        return self._one.tau
-
-    @property
-    def stiffness(self) -> FloatArray:
-        """Its stiffness."""
-        return self._one.sigma
-
-    @property
-    def tau_spring(self) -> FloatArray:
-        """Torque of the spring."""
-        return self._springs.tau
-
-    def torque_rate(self, dphi: FloatArray) -> FloatArray:
-        """Sigma phi'."""
-        return self._one.sigma * dphi[..., 0]
-
-    def stiffness_rate(self, dphi: FloatArray) -> FloatArray:
-        """Zeta phi'; of a linear spring zero, not -0."""
-        return self._one.zeta * dphi[..., 0] + 0.0
-
-    def motor_accelerations(
-        self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
-    ) -> FloatArray:
-        """(tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
-        squared = dphi[..., 0] * dphi[..., 0]
-        divisor = np.where(self.stiffness == 0, np.nan, self.stiffness)
-        return ((ddtau_e - self._one.zeta * squared) / divisor + ddq)[..., None]
+            return SingleSprings(LinearRows(linear))
+        return SingleSprings(SpringRows([(actuator.law,) for actuator in actuators]))

@@ -32,7 +32,7 @@ class Flag(enum.IntFlag):
     meaning: str
     quantity: str | None
 
-    INFEASIBLE = 1, "the stiffness cannot be reached while the joint carries its elastic torque", None
+    INFEASIBLE = 1, "the springs cannot carry the elastic torque, or not with this stiffness", None
     SINGULAR = (
         2,
         "the decoupling matrix is singular: deflection rates and motor torques are undefined",
