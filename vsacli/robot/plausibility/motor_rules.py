@@ -22,7 +22,7 @@ GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
 """Rules on what the motors' sizes behind the gear follow from, and what they are compared with."""
 
 
-class _Driven(NamedTuple):
+class Driven(NamedTuple):
     """A motor with its joint."""
 
     number: int
@@ -38,42 +38,42 @@ class _Driven(NamedTuple):
         return Measured(path, getattr(self.motor, name), unit, size)
 
 
-def _motors(facts: Facts) -> Iterator[_Driven]:
+def driven_motors(facts: Facts) -> Iterator[Driven]:
     """All motors, unless they only stand in for others."""
     for number, joint in enumerate(() if facts.placeholder else facts.joints):
         for at, motor in motors(joint):
-            yield _Driven(number, joint, at, motor)
+            yield Driven(number, joint, at, motor)
 
 
 def _gear_ratios(facts: Facts, *, revolute: bool) -> Iterator[Measured]:
-    for driven in _motors(facts):
+    for driven in driven_motors(facts):
         if driven.motor.gear_ratio is not None and driven.joint.is_revolute == revolute:
             yield driven.measured("gear_ratio", abs(driven.motor.gear_ratio))
 
 
 def _rotors(facts: Facts) -> Iterator[Measured]:
-    for driven in _motors(facts):
+    for driven in driven_motors(facts):
         size = ratio(driven.motor.at_joint.inertia, float(facts.sizes.inertias[driven.number]))
         yield driven.measured("inertia", size)
 
 
 def _heavy_rotors(facts: Facts) -> Iterator[Measured]:
     """Rotors of robots that are not tiny; those of fingers outweigh them by far behind their gears."""
-    for driven in _motors(facts) if facts.sizes.extent > TINY else ():
+    for driven in driven_motors(facts) if facts.sizes.extent > TINY else ():
         lever = facts.sizes.extent if driven.joint.is_revolute else 1.0
         size = ratio(driven.motor.at_joint.inertia, facts.sizes.mass * lever**2)
         yield driven.measured("inertia", size)
 
 
 def _motor_damping(facts: Facts) -> Iterator[Measured]:
-    for driven in _motors(facts):
+    for driven in driven_motors(facts):
         size = driven.motor.damping / driven.motor.inertia
         yield driven.measured("damping", size)
 
 
-def _velocities(facts: Facts) -> Iterator[tuple[Measured, _Driven]]:
+def _velocities(facts: Facts) -> Iterator[tuple[Measured, Driven]]:
     """Limits of velocity in rad/s, each with its motor and as its own size."""
-    for driven in _motors(facts):
+    for driven in driven_motors(facts):
         measured = driven.measured("max_velocity", driven.motor.max_velocity)
         if measured.unit == "rad/s" and math.isfinite(measured.value):
             yield measured, driven
@@ -94,7 +94,7 @@ def _output_velocities(facts: Facts) -> Iterator[Measured]:
 
 def _torques(facts: Facts, *, least: bool) -> Iterator[Measured]:
     """Largest torque at the joint, over what its weight can ask of it, or over the weight at full reach."""
-    for driven in _motors(facts):
+    for driven in driven_motors(facts):
         torque = driven.motor.at_joint.max_torque
         load = float(facts.sizes.loads[driven.number]) if least else facts.sizes.scale(driven.joint)
         if math.isfinite(torque) and (any(facts.gravity) or not least):
@@ -108,7 +108,7 @@ def _joint_damping(facts: Facts) -> Iterator[Measured]:
 
 def _braking(facts: Facts) -> Iterator[Measured]:
     """What damping takes at the largest velocity of the joint, over the largest torque; 0 without a limit."""
-    for driven in _motors(facts):
+    for driven in driven_motors(facts):
         joint, motor = driven.joint, driven.motor.at_joint
         velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))
         if velocity < FASTEST:
