@@ -11,7 +11,7 @@ import pytest
 import yaml
 from samples.command_line import REPOSITORY, contents
 
-from vsacli.actuators.kinds import ACTUATORS, EXAMPLES
+from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
@@ -169,7 +169,7 @@ def test_lines_are_not_too_long() -> None:
 def test_every_kind_of_actuator_can_be_had() -> None:
     robot_command = new.commands["robot"]
     (option,) = (each for each in robot_command.params if each.name == "actuator")
-    assert set(EXAMPLES) == set(option.type.choices)
+    assert {*ACTUATORS, *MECHANISMS} == set(option.type.choices)
 
 
 @pytest.mark.parametrize("joints", ["", "X", "RRX", "R R", "R" * (MOST_JOINTS + 1)])

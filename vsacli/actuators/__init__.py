@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING
 from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from vsacli.actuators import laws
+    from vsacli.actuators import laws, mechanisms
     from vsacli.actuators.antagonistic import Antagonistic
     from vsacli.actuators.elastic import Elastic
     from vsacli.actuators.friction import Friction
     from vsacli.actuators.motor import Motor
     from vsacli.actuators.rigid import Rigid
+    from vsacli.actuators.serial import Serial
 
 __all__ = [
     "Antagonistic",
@@ -18,6 +19,8 @@ __all__ = [
     "Friction",
     "Motor",
     "Rigid",
+    "Serial",
     "laws",
+    "mechanisms",
 ]
 __getattr__, __dir__ = lazy_exports(__name__)

@@ -27,15 +27,11 @@ ACTUATORS = LazyRegistry(
 """Kinds of actuator by the name they have in a robot file."""
 
 
-EXAMPLES = (*ACTUATORS, *MECHANISMS)
-"""Names of what a new robot can be driven by: a kind of actuator, or a serial one with a mechanism."""
-
-
 def example(name: str, joint_type: str) -> dict[str, Any]:
     """Plausible values of a joint's key `actuator`.
 
     Args:
-        name: one of `EXAMPLES`.
+        name: a kind, or a mechanism of serial ones.
         joint_type: of the joint.
 
     Raises:

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 import click
 
-from vsacli.actuators.kinds import EXAMPLES
+from vsacli.actuators.kinds import ACTUATORS
+from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
@@ -38,7 +39,7 @@ def new() -> None:
 )
 @click.option(
     "--actuator",
-    type=click.Choice(EXAMPLES),
+    type=click.Choice((*ACTUATORS, *MECHANISMS)),
     default="antagonistic",
     show_default=True,
     help="What drives the joints: a kind of actuator, or a mechanism of serial ones.",

@@ -57,7 +57,7 @@ def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-
 
     Args:
         joints: a letter for each joint from the base to the tip, R (revolute) or P (prismatic).
-        actuator: of every joint, one of `EXAMPLES`: a kind, or a mechanism of serial ones.
+        actuator: of every joint, a kind, or a mechanism of serial ones.
         name: of the robot.
 
     Raises:

@@ -1,11 +1,29 @@
-"""Mechanisms of serial actuators: springs between a motor that carries the load and one that sets them.
+"""Mechanisms of serial actuators, and what a mechanism of one's own needs.
 
 Adding a mechanism is adding a class derived from `Mechanism` and its line in `MECHANISMS`.
 """
 
 from __future__ import annotations
 
-from vsacli.base.lazy import LazyRegistry
+from typing import TYPE_CHECKING
+
+from vsacli.base.lazy import LazyRegistry, lazy_exports
+
+if TYPE_CHECKING:
+    from vsacli.actuators.laws.pair import PairSolution
+    from vsacli.actuators.mechanisms.mechanism import Mechanism
+    from vsacli.actuators.mechanisms.potential import Potential
+    from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
+    from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
+    from vsacli.actuators.mechanisms.ratios.awas import Awas
+    from vsacli.actuators.mechanisms.ratios.lever import Lever
+    from vsacli.actuators.mechanisms.ratios.scales import PolynomialScale, Power
+    from vsacli.actuators.mechanisms.ratios.sine import Sine
+    from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
+    from vsacli.actuators.mechanisms.shifted_cams import ShiftedCams
+    from vsacli.actuators.mechanisms.state import Partials
+    from vsacli.base.units import DIMENSIONLESS, LEAD, LENGTH, LINEAR_STIFFNESS, POSITION, STIFFNESS, TORQUE
+    from vsacli.documents.fields import NON_ZERO, POSITIVE, interval, number
 
 MECHANISMS = LazyRegistry(
     {
@@ -19,3 +37,32 @@ MECHANISMS = LazyRegistry(
     }
 )
 """Mechanisms by the name they have in a robot file."""
+
+__all__ = [
+    "DIMENSIONLESS",
+    "LEAD",
+    "LENGTH",
+    "LINEAR_STIFFNESS",
+    "MECHANISMS",
+    "NON_ZERO",
+    "POSITION",
+    "POSITIVE",
+    "STIFFNESS",
+    "TORQUE",
+    "Awas",
+    "Cam",
+    "Lever",
+    "Maccepa",
+    "Mechanism",
+    "PairSolution",
+    "Partials",
+    "PolynomialScale",
+    "Potential",
+    "Power",
+    "ShiftedCams",
+    "Sine",
+    "VariableRatio",
+    "interval",
+    "number",
+]
+__getattr__, __dir__ = lazy_exports(__name__)

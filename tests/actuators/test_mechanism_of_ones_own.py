@@ -1,4 +1,4 @@
-"""A kind of actuator that only `samples.own_kind` knows, through the whole command line."""
+"""A mechanism that only `samples.own_mechanism` knows, through the whole command line."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import h5py
 import numpy as np
 import pytest
 from samples.marks import needs, needs_compiler
-from samples.own_kind import AdjustableArm
+from samples.own_mechanism import AdjustableArm
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
 from vsacli import load_robot
-from vsacli.actuators.kinds import ACTUATORS
+from vsacli.actuators.mechanisms import MECHANISMS
 
 TRAJECTORY = """
 format: vsacli-trajectory/1
@@ -29,9 +29,9 @@ stiffness: {type: polynomial, degree: 7, start: 500, end: 900}
 
 @pytest.fixture
 def arm(vsacli, tmp_path, monkeypatch):
-    """The command line once the kind is registered, with a robot of one such joint that it has written."""
-    monkeypatch.setitem(ACTUATORS.homes, "adjustable_arm", "samples.own_kind:AdjustableArm")
-    monkeypatch.delitem(sys.modules, "vsacli.cli.new", raising=False)  # offers the kinds known at its import
+    """The command line once it is registered, with a robot of one such joint that it has written."""
+    monkeypatch.setitem(MECHANISMS.homes, "adjustable_arm", "samples.own_mechanism:AdjustableArm")
+    monkeypatch.delitem(sys.modules, "vsacli.cli.new", raising=False)  # offers what is known at its import
     (tmp_path / "move.yaml").write_text(TRAJECTORY)
     made = vsacli("new", "robot", "--joints", "R", "--actuator", "adjustable_arm", "-o", "arm.yaml")
     assert made.code == 0, made.err
@@ -44,9 +44,9 @@ def ok(outcome):
     return outcome
 
 
-def test_a_robot_file_has_the_kind_and_describes_it(arm):
+def test_a_robot_file_has_it_and_describes_it(arm):
     robot = load_robot("arm.yaml")
-    assert isinstance(robot.joints[0].actuator, AdjustableArm)
+    assert isinstance(robot.joints[0].actuator.mechanism, AdjustableArm)
     assert "adjustable_arm" in ok(arm("schema", "robot")).out
     described = json.loads(ok(arm("info", "arm.yaml", "--json")).out)["joints"][0]
     assert described["stiffness_range"]["unloaded"] == [80, 8000]
