@@ -55,7 +55,7 @@ def test_files_are_checked_and_described(joint):
     vsacli, kind = joint
     ok(vsacli("validate", "elbow.yaml"))
     [described] = json.loads(ok(vsacli("info", "elbow.yaml", "--json")))["joints"]
-    shown = {"tendon": "exponential", "coupled": "cubic, coupling sinh"}
+    shown = {"tendon": "exponential", "coupled": "cubic (coupling sinh)"}
     assert shown[kind] in ok(vsacli("info", "elbow.yaml"))
     if kind == "tendon":
         assert described["stiffness_range"]["unloaded"] == [9, 9]

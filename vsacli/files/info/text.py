@@ -65,17 +65,21 @@ def _drives(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
     for joint in joints:
         kind, actuator, ranges = joint["type"], joint["actuator"], joint["stiffness_range"]
         unit = STIFFNESS.unit(kind)
-        springs = " ".join(dict.fromkeys(spring["type"] for spring in _springs(actuator.get("spring"))))
-        if actuator.get("coupling"):
-            springs += f", coupling {actuator['coupling']['type']}"
         reachable = (_span(ranges[name], unit) if ranges else "-" for name in ("unloaded", "loaded"))
         load = f"{_short(joint['static_load']['torque'])} {TORQUE.unit(kind)}"
-        yield joint["name"], actuator["type"], springs or "-", load, *reachable
+        yield joint["name"], actuator["type"], _springs(actuator) or "-", load, *reachable
 
 
-def _springs(written: Any) -> Sequence[Description]:
-    """None, one, or those of both sides."""
-    return written if isinstance(written, list) else [written] if written else []
+def _springs(actuator: Description) -> str:
+    """The types of mechanism, springs and coupling, as far as there are any."""
+    mechanism = actuator.get("mechanism")
+    written = (mechanism or actuator).get("spring") or []
+    springs = written if isinstance(written, list) else [written]
+    words = [mechanism["type"]] if mechanism else []
+    words += dict.fromkeys(spring["type"] for spring in springs)
+    if actuator.get("coupling"):
+        words.append(f"(coupling {actuator['coupling']['type']})")
+    return " ".join(words)
 
 
 def _trajectory(trajectory: Description) -> Iterator[str]:
