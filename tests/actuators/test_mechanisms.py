@@ -30,6 +30,11 @@ def device(request: pytest.FixtureRequest) -> Device:
     return DEVICES[request.param]
 
 
+@pytest.fixture(params=slow_but([*FIRST.values(), *TESTED_APART], DEVICES))
+def any_device(request: pytest.FixtureRequest) -> Device:
+    return DEVICES[request.param]
+
+
 def test_every_mechanism_has_a_device() -> None:
     assert set(FIRST) | TESTED_APART == set(MECHANISMS)
 
@@ -51,14 +56,14 @@ def peak(values: FloatArray) -> float:
     return float(np.abs(values).max())
 
 
-def test_the_state_is_that_of_the_potential(device: Device) -> None:
+def test_the_state_is_that_of_the_potential(any_device: Device) -> None:
     """Torques, stiffness and their rates along any motion, and the motion back from them."""
-    phi, s, q = states(device, 1000)
+    phi, s, q = states(any_device, 1000)
     rng = np.random.default_rng(8)
     motion = np.stack([(at, *rng.uniform(-5, 5, (2, len(at)))) for at in (q, q + phi, s)])
-    (tau_e, dtau_e, ddtau_e), (sigma, dsigma, ddsigma), *motors = along(device.potential, motion)
+    (tau_e, dtau_e, ddtau_e), (sigma, dsigma, ddsigma), *motors = along(any_device.potential, motion)
     (_, dq, ddq), (_, dtheta_1, ddtheta_1), (_, ds, dds) = motion
-    state = device.mechanism.state(coordinates(phi, s, q))
+    state = any_device.mechanism.state(coordinates(phi, s, q))
     rates = coordinates(dtheta_1 - dq, ds, dq)
     found = {
         "tau_e": (state.tau_e, tau_e),
@@ -85,10 +90,10 @@ def test_the_state_is_that_of_the_potential(device: Device) -> None:
         np.testing.assert_allclose(ours[regular], theirs[regular], rtol=0, atol=1e-8 * peak(theirs))
 
 
-def test_the_energy_is_the_potential(device: Device) -> None:
-    phi, s, q = states(device, 50)
-    energy = [float(device.potential(*at)) for at in zip(q, q + phi, s, strict=True)]
-    np.testing.assert_allclose(device.mechanism.state(coordinates(phi, s, q)).energy, energy, rtol=1e-11)
+def test_the_energy_is_the_potential(any_device: Device) -> None:
+    phi, s, q = states(any_device, 50)
+    energy = [float(any_device.potential(*at)) for at in zip(q, q + phi, s, strict=True)]
+    np.testing.assert_allclose(any_device.mechanism.state(coordinates(phi, s, q)).energy, energy, rtol=1e-11)
 
 
 def test_there_and_back(device: Device) -> None:

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from oracles import potential_scan
 from samples.marks import slow_but
-from vsacli.actuators.mechanisms.awas import Awas
 
 from vsacli.actuators.laws import Cubic
 from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.mechanisms.potential import Potential, Ranges, Start
+from vsacli.actuators.mechanisms.potentials.potential import Potential, Ranges, Start
 from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
+from vsacli.actuators.mechanisms.ratios.awas import Awas
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.reach import reach_flags
 

@@ -15,8 +15,8 @@ from samples.law_energies import SAMPLES, Energy
 from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.mechanisms.mechanism import Mechanism
-from vsacli.actuators.mechanisms.potential import Potential as OwnPotential
-from vsacli.actuators.mechanisms.potential import Ranges, Start
+from vsacli.actuators.mechanisms.potentials.potential import Potential as OwnPotential
+from vsacli.actuators.mechanisms.potentials.potential import Ranges, Start
 from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
 from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
 from vsacli.actuators.mechanisms.ratios.awas import Awas
@@ -221,12 +221,12 @@ DEVICES = {
     "potential, two springs": Device(
         mechanism=OwnPotential(
             energy="k/2*((theta_1 - q)^2 + (theta_2 - q)^2) + k_c/4*((theta_1 - q)^4 + (theta_2 - q)^4)",
-            constants=(("k", 400), ("k_c", 2000)),
+            constants=(("k", 50), ("k_c", 1000)),
             start=Start(theta_1=0.2, theta_2=-0.2),
             range=Ranges(phi=(-1, 1), theta_2=(-5, 5)),
         ),
-        potential=_two_springs(400, 2000),
-        stiffness=(900, 1200),
+        potential=_two_springs(50, 1000),
+        stiffness=(220, 300),
         deflections=(0.1, 0.3),
         settings=(-0.3, -0.1),
     ),

@@ -31,7 +31,7 @@ MECHANISMS = LazyRegistry(
         "lever": "vsacli.actuators.mechanisms.ratios.lever:Lever",
         "variable_ratio": "vsacli.actuators.mechanisms.ratios.variable_ratio:VariableRatio",
         "maccepa": "vsacli.actuators.mechanisms.preloaded_cams.maccepa:Maccepa",
-        "potential": "vsacli.actuators.mechanisms.potential:Potential",
+        "potential": "vsacli.actuators.mechanisms.potentials.potential:Potential",
         "cam": "vsacli.actuators.mechanisms.preloaded_cams.cam:Cam",
         "shifted_cams": "vsacli.actuators.mechanisms.shifted_cams:ShiftedCams",
     }

@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.actuators.friction import Friction
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.documents.fields import Kind, Number, OneOf, Pair, Record, declared
+from vsacli.documents.fields import Kind, NamedNumbers, Number, OneOf, Pair, Record, declared
 from vsacli.robot.joint import Inertia, Joint, Link
 from vsacli.robot.model import Robot
 
@@ -93,6 +93,8 @@ class _Wrong:
                 return self._record(value)
             case Number():
                 return self._number(value)
+            case NamedNumbers():
+                return tuple((name, self._number(each)) for name, each in value)
         return value
 
     def _motor(self, motor: Motor) -> Motor:

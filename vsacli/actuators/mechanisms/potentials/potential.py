@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 
 from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.mechanisms.level_curve import Branch
 from vsacli.actuators.mechanisms.mechanism import Mechanism
-from vsacli.actuators.mechanisms.potential_energy import (
+from vsacli.actuators.mechanisms.potentials.continuation import Branch
+from vsacli.actuators.mechanisms.potentials.level_curve import LevelCurves
+from vsacli.actuators.mechanisms.potentials.potential_energy import (
     ACCELERATIONS,
     RESERVED,
     PotentialEnergy,
-    PotentialState,
     read_energy,
 )
+from vsacli.actuators.mechanisms.potentials.potential_state import PotentialState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
@@ -117,8 +118,8 @@ class Potential(Mechanism):
 
     @cached_property
     def _branch(self) -> Branch:
-        start = self.start.theta_1, self.start.theta_2
-        return Branch(self._potential, start, self.range.phi, self.range.theta_2)
+        curves = LevelCurves(self._potential, self.range.phi, self.range.theta_2)
+        return Branch(curves, self.start.theta_1, self.start.theta_2)
 
     def _problems(self) -> Iterator[FieldProblem]:
         """What is wrong with the energy; and with the branch, once the rest is right."""

@@ -1,0 +1,1 @@
+"""Mechanisms of one's own: the energy of the springs is written in the robot file."""
