@@ -198,11 +198,15 @@ def _robot_row(example: Example) -> tuple[str, ...]:
     joints = example.robot.joints
     kinds = Counter(joint.actuator_type for joint in joints)
     return (
-        f"[{example.name}](../robots/{example.path.name})",
+        f"[{example.name}](../{_below_root(example.path)})",
         "".join("R" if joint.is_revolute else "P" for joint in joints),
         ", ".join(f"{count} {kind}" for kind, count in kinds.items()),
-        ", ".join(f"[{each.name}](../trajectories/{each.path.name})" for each in example.trajectories),
+        ", ".join(f"[{each.name}](../{_below_root(each.path)})" for each in example.trajectories),
     )
+
+
+def _below_root(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
 
 
 def _origin(example: Example) -> str:

@@ -63,7 +63,7 @@ def test_what_is_installed_lists_and_copies_its_examples(wheel: zipfile.Path, tm
     }
     listed = subprocess.run(command, **options).stdout
     names = re.findall(r"^(\w+) \(", listed, re.MULTILINE)
-    assert names == sorted(path.stem for path in (REPOSITORY / "robots").glob("*.yaml"))
+    assert names == sorted(path.stem for path in (REPOSITORY / "robots").rglob("*.yaml"))
     subprocess.run([*command, "--copy", "mine"], **options)
     for folder in ("robots", "trajectories"):
         assert contents(tmp_path / "mine" / folder) == contents(REPOSITORY / folder)

@@ -15,7 +15,7 @@ from samples.marks import slow
 from vsacli import inverse_dynamics, load_trajectory
 from vsacli.base.errors import InputError
 from vsacli.files import examples as module
-from vsacli.files.examples import Example, ExampleTrajectory, examples
+from vsacli.files.examples import Example, ExampleTrajectory, examples, opening_comment
 
 EXAMPLES = examples()
 RUNS = [(example, trajectory) for example in EXAMPLES for trajectory in example.trajectories]
@@ -23,7 +23,7 @@ RUN_NAMES = [f"{example.name} {trajectory.name}" for example, trajectory in RUNS
 QUICK = ("mixed_3r", "tendon_1r")
 """Examples that every command takes soon; together they have joints of each kind."""
 
-TRAJECTORIES = Path(RUNS[0][1].path).parent
+ROOT = next(path.parent for path in EXAMPLES[0].path.parents if path.name == "robots")
 
 in_every_example = pytest.mark.parametrize("example", EXAMPLES, ids=[each.name for each in EXAMPLES])
 in_every_run = pytest.mark.parametrize(("example", "trajectory"), RUNS, ids=RUN_NAMES)
@@ -31,7 +31,7 @@ in_every_run = pytest.mark.parametrize(("example", "trajectory"), RUNS, ids=RUN_
 
 def test_every_robot_has_a_trajectory_and_every_trajectory_a_robot():
     assert all(example.trajectories for example in EXAMPLES)
-    assert {trajectory.path for _, trajectory in RUNS} == set(TRAJECTORIES.glob("*.yaml"))
+    assert {trajectory.path for _, trajectory in RUNS} == set((ROOT / "trajectories").rglob("*.yaml"))
     assert {name for _, trajectory in RUNS for name in trajectory.robots} == {each.name for each in EXAMPLES}
 
 
@@ -45,8 +45,7 @@ def test_example_can_be_done_with_a_margin(example: Example, trajectory: Example
 
 @in_every_example
 def test_example_says_where_its_numbers_come_from(example: Example):
-    text = example.path.read_text(encoding="utf-8")
-    assert re.search(r"our own choice|is ours|are ours|Table I", text)
+    assert re.search(r"our own choice|of our own|is ours|are ours|Table I", opening_comment(example.path))
     assert example.robot.description
 
 
@@ -57,7 +56,7 @@ def test_example_says_where_its_numbers_come_from(example: Example):
 )
 def test_every_command_takes_it(example: Example, trajectory: ExampleTrajectory, vsacli: Callable[..., Any]):
     assert vsacli("examples", example.name, "--copy", ".").code == 0
-    robot, motion = Path("robots", example.path.name), Path("trajectories", trajectory.path.name)
+    robot, motion = (each.path.relative_to(ROOT) for each in (example, trajectory))
     motion.write_text(re.sub(r"rate: \d+", "rate: 100", motion.read_text()))
     assert vsacli("invdyn", robot, motion, "-o", "result.h5").code == 0
     assert vsacli("check-feasibility", robot, motion).code == 0
@@ -99,9 +98,8 @@ def test_a_copy_has_the_tables_of_springs_with_it(vsacli: Callable[..., Any], tm
     names = ["robots/measured_1r.yaml", "robots/measured_spring.csv", "trajectories/measured_1r.yaml"]
     assert list(contents(tmp_path)) == [f"mine/of these/{name}" for name in names]
     assert outcome.err.splitlines() == [f"wrote mine/of these/{name}" for name in names]
-    shipped = TRAJECTORIES.parent
     copies = tmp_path / "mine/of these"
-    assert all((copies / name).read_bytes() == (shipped / name).read_bytes() for name in names)
+    assert all((copies / name).read_bytes() == (ROOT / name).read_bytes() for name in names)
 
 
 def test_files_that_exist_are_kept(vsacli: Callable[..., Any], tmp_path: Path):

@@ -68,10 +68,10 @@ def examples(names: Iterable[str] = ()) -> list[Example]:
     Raises:
         InputError: for each name that is no robot's, the nearest one that is.
     """
-    trajectories = [_trajectory(path) for path in sorted((_root() / "trajectories").glob("*.yaml"))]
+    trajectories = [_trajectory(path) for path in sorted((_root() / "trajectories").rglob("*.yaml"))]
     found = {
         path.stem: Example(path, tuple(each for each in trajectories if path.stem in each.robots))
-        for path in sorted((_root() / "robots").glob("*.yaml"))
+        for path in sorted((_root() / "robots").rglob("*.yaml"), key=lambda path: path.stem)
     }
     wanted = set(names)
     if unknown := sorted(wanted - found.keys()):
@@ -114,7 +114,7 @@ def opening_comment(path: Path) -> str:
 
 
 def _every_file() -> list[Path]:
-    found = (path for folder in ("robots", "trajectories") for path in (_root() / folder).iterdir())
+    found = (path for folder in ("robots", "trajectories") for path in (_root() / folder).rglob("*"))
     return sorted(path for path in found if path.is_file() and not path.name.startswith("."))
 
 
@@ -130,5 +130,5 @@ def _trajectory(path: Path) -> ExampleTrajectory:
     It names all the robots before the first colon.
     """
     made_for, _, text = opening_comment(path).partition(": ")
-    robots = tuple(re.findall(r"robots/(\w+)\.yaml", made_for))
+    robots = tuple(re.findall(r"robots/(?:\w+/)*(\w+)\.yaml", made_for))
     return ExampleTrajectory(path, robots, text.partition(". ")[0].removesuffix("."))
