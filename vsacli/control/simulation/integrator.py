@@ -136,29 +136,26 @@ class Integrator:
     ) -> tuple[FloatArray, FloatArray, Ending | None]:
         deadline = Deadline(self._budget.limit, is_due, float(times[-1]), self._progress)
         events = [deadline, *self._boundaries, *self._switches]
-        time = float(times[0])
-        parts: list[tuple[FloatArray, FloatArray]] = []
+        first, at, state, parts = times[:1], float(times[0]), start, []
         while True:
-            solution = self._until_event(derivative, (time, times), start, events, options)
-            if parts:
-                parts.append(_evaluated(solution, start))
-            else:  # over no time at all, and where the first step fails, `solve_ivp` returns no states
-                parts.append(_evaluated(solution, start) if len(solution.t) else (times[:1], start[None]))
-            reached, states = (np.concatenate(each) for each in zip(*parts, strict=True))
-            if solution.status < 0:
-                reason = "the motion became too fast to integrate"
-                return reached, states, Ending(float(reached[-1]), reason)
-            hits = zip(events, solution.t_events, solution.y_events, strict=True)
-            event, when, where = next(((event, *hit) for event, *hit in hits if len(hit[0])), (None, (), ()))
-            if event is None:
-                return reached, states, None
+            solution = self._until_event(derivative, (at, times), state, events, options)
+            parts.append(_evaluated(solution, start))
+            event, at, state = _terminal_event(events, solution)
             if not isinstance(event, Switch):
-                ending = event.ending(float(when[-1]), where[-1])
-                return np.append(reached, when[-1:]), np.concatenate((states, where[-1:])), ending
-            time, start = float(when[-1]), event.passed(float(when[-1]), where[-1])
-            times = times[times > time]
+                break
+            state, times = event.passed(at, state), times[times > at]
             if not times.size:
-                return reached, states, None
+                event = None
+                break
+        reached, states = (np.concatenate(each) for each in zip(*parts, strict=True))
+        if not len(reached):  # over no time at all, and where the first step fails
+            reached, states = first, start[None]
+        if solution.status < 0:
+            reason = "the motion became too fast to integrate"
+            return reached, states, Ending(float(reached[-1]), reason)
+        if event is None:
+            return reached, states, None
+        return np.append(reached, at), np.concatenate((states, state[None])), event.ending(at, state)
 
     def _until_event(
         self,
@@ -190,3 +187,11 @@ def _evaluated(solution: Any, start: FloatArray) -> tuple[FloatArray, FloatArray
     if not len(solution.t):
         return np.empty(0), np.empty((0, len(start)))
     return solution.t, solution.y.T
+
+
+def _terminal_event(events: Sequence[Any], solution: Any) -> tuple[Any, float, FloatArray]:
+    """The event that ended a solution, its time and state; None if the solution reached its last time."""
+    for event, times, states in zip(events, solution.t_events, solution.y_events, strict=True):
+        if len(times):
+            return event, float(times[-1]), states[-1]
+    return None, math.nan, np.empty(0)
