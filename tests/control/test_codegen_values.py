@@ -32,6 +32,15 @@ pytestmark = needs_compiler
 SAMPLES = 150
 
 
+def lossy() -> Robot:
+    """The PUMA 560 with its friction, friction between its links, and windings."""
+    shaft = {"torque_constant": 0.25, "resistance": 1.6, "max_current": 6.0, "max_voltage": 20.0}
+    changes: dict[str, object] = {"joints.*.friction": {"coulomb": 0.8, "offset": 0.1, "width": 0.2}}
+    changes |= {f"joints.waist.actuator.motor.{name}": value for name, value in shaft.items()}
+    changes["joints.elbow.actuator.motor.friction"] = {"coulomb": [0.1, 0.2], "width": 3.0}
+    return shipped_robot("puma_560").replace(changes)
+
+
 def margins(block: Block) -> FloatArray:
     with np.errstate(invalid="ignore"):
         room = np.minimum(block.stiffness - block.stiffness_lower, block.stiffness_upper - block.stiffness)
@@ -68,6 +77,12 @@ def test_inverse_dynamics_with_springs_of_each_law(law: str, tmp_path: Path) -> 
 @pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "mixed_3r", slow("lwr_7r_vsa"), "tendon_1r"])
 def test_inverse_dynamics_of_arms(name: str, tmp_path: Path) -> None:
     check_inverse_dynamics(shipped_robot(name), tmp_path)
+
+
+def test_inverse_dynamics_with_losses(tmp_path: Path) -> None:
+    block = check_inverse_dynamics(lossy(), tmp_path)
+    for flag in (Flag.CURRENT_LIMIT, Flag.VOLTAGE_LIMIT):
+        assert 0 < np.count_nonzero(block.flags & flag) < SAMPLES
 
 
 def test_border_steps_are_singular_or_nearly_so(tmp_path: Path) -> None:
@@ -150,6 +165,15 @@ CONTROLLED = {
     "sinh": (with_springs("sinh"), 4),
     "elastic among antagonistic": (with_actuators(random_robot("RPR", 4), {1: elastic()}), 4),
     "rigid": (all_rigid("RPR", 5), 2),
+    "friction": (
+        shipped_robot("vsa_3r").replace(
+            {
+                "joints.*.actuator.motor.friction": {"coulomb": [3, 2], "offset": 0.1},
+                "joints.elbow.friction": {"coulomb": 0.5, "width": 0.1},
+            }
+        ),
+        4,
+    ),
 }
 """Robots, and the order of the dynamics of their position error."""
 
@@ -179,6 +203,20 @@ def test_a_singular_joint_is_flagged_and_the_others_are_not(tmp_path: Path) -> N
     assert np.isfinite(found["tau_motor"][:, [0, 2]]).all()
     np.testing.assert_array_equal(found["flags"], np.broadcast_to([0, Flag.SINGULAR, 0], (40, 3)))
     assert set(returned) == {int(Flag.SINGULAR)}
+
+
+def test_currents_of_a_controlled_robot_are_flagged(tmp_path: Path) -> None:
+    shaft = {"inertia": 3e-3, "gear_ratio": -30, "torque_constant": 0.3, "resistance": 2.0}
+    motor = {**shaft, "max_current": 300.0, "max_voltage": 700.0}
+    robot = shipped_robot("vsa_3r").replace("joints.base.actuator.motor", motor)
+    state, *others = loop_inputs(robot, 4)
+    found, _ = call(robot, tmp_path, state, *others)
+    current = found["tau_motor"][:, 0] / (-30 * 0.3)
+    voltage = 2.0 * current + 0.3 * -30 * state.dtheta[:, 0]
+    for values, bound, flag in ((current, 300, Flag.CURRENT_LIMIT), (voltage, 700, Flag.VOLTAGE_LIMIT)):
+        beyond = (np.abs(values) > bound).any(axis=-1)
+        assert 0 < np.count_nonzero(beyond) < beyond.size
+        np.testing.assert_array_equal((found["flags"][:, 0] & flag) != 0, beyond)
 
 
 def test_limits_of_a_controlled_robot(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from samples.marks import slow
 from samples.plants import with_actuators
 from samples.robots import vsa_3r
-from samples.simulated import short_motion
+from samples.simulated import error_course, short_motion
 from samples.single_joint import LINK_INERTIA, single_joint, step_of
 from scipy.integrate import solve_ivp
 
@@ -165,6 +165,18 @@ def test_feedback_compensates_what_moves():
     smooth = with_friction(vsa_3r(), Friction(coulomb=(3.0, 2.0), offset=0.5, width=0.05))
     past = simulate(smooth, trajectory, gains=GAINS, initial_error=error).history
     np.testing.assert_allclose(past.q_error, plain.q_error, rtol=0, atol=1e-8)
+
+
+def test_feedback_moves_a_block_only_if_the_error_demands_more_than_its_friction():
+    """What slides is compensated, so that the error decays as without friction; what is held stays."""
+    gains, poles, mass = Gains.from_poles([-20.0] * 2), [-20.0] * 2, LINK_INERTIA + ROTOR
+    held, loose = 0.99 * 3.0 / (400 * mass), 1.01 * 3.0 / (400 * mass)  # 400 1/s^2 is the gain
+    for start in (held, loose):
+        past = simulate(block(), step_of(0.0), gains=gains, initial_error=InitialError(start)).history
+        expected = start if start == held else error_course(poles, start, past.time)
+        # the integration is good to 1e-9 of what moves
+        np.testing.assert_allclose(past.q_error[:, 0], expected, rtol=0, atol=1e-10)
+        assert (past.dq_actual == 0).all() == (start == held)
 
 
 def test_feedback_lets_a_motor_stick_until_the_error_breaks_it_loose():

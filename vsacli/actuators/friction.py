@@ -56,7 +56,7 @@ class Friction:
         backward, forward = (abs(ratio) * size for size in self.coulomb)
         return Friction(
             coulomb=(backward, forward) if ratio > 0 else (forward, backward),
-            offset=ratio * self.offset,
+            offset=ratio * self.offset or 0.0,
             width=self.width / abs(ratio),
         )
 

@@ -48,7 +48,8 @@ def feedback_linearization(
 ) -> FloatArray:
     """Motor torques that make the errors obey the linear dynamics (33), as long as A is regular.
 
-    A control loop keeps a `FeedbackLinearization`, which prepares the robot once.
+    A control loop keeps a `FeedbackLinearization`, which prepares the robot once. Dry friction of motors is
+    added at their velocities; of a motor that rests it is not known where it has no width, and left out.
 
     Args:
         robot: either all of its joints have springs, of any kinds mixed at will, or none

@@ -71,6 +71,8 @@ def state_derivative(
 ) -> Rates:
     """Time derivative of the full state under motor torques: (5) solved for q'' and theta''.
 
+    A motor that rests stays at rest as long as its dry friction without a width can hold it.
+
     Args:
         robot: the robot.
         state: its state, at one instant or over samples.
