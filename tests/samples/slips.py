@@ -573,6 +573,15 @@ REST = [
         "3e+08 N mm/rad",
     ),
     Slip(
+        "N mm of a hardening spring behind one motor",
+        "hardening_1r",
+        "hardening_1r",
+        {"k: 40, k_c: 8000": "k: 40e3, k_c: 8e6"},
+        "stiff transmissions",
+        "actuator.spring",
+        "is it in N mm/",
+    ),
+    Slip(
         "rpm of a motor",
         "scara_4",
         "scara_4",

@@ -41,6 +41,12 @@ class Command(NamedTuple):
         own = {name: arrays[name] for name in cls._fields[:-1]}
         return cls(**own, commanded=commanded)
 
+    @classmethod
+    def at_rest(cls, tau_e: FloatArray, q: FloatArray) -> Command:
+        """Of a joint that stands still and carries torques, (samples,); no signal is commanded."""
+        still = np.zeros_like(tau_e)
+        return cls(q, still, still, tau_e, still, still, {})
+
     def arrays(self) -> dict[str, FloatArray]:
         """All arrays by their names."""
         return {**dict(zip(self._fields[:-1], self[:-1], strict=True)), **self.commanded}

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.transmission import Command, Transmission
+from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.documents.fields import declared
@@ -87,7 +86,8 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
     tau_e = np.array([0.0, load, -load])
     with np.errstate(all="ignore"):  # a load may be beyond all numbers
         if "stiffness" not in joint.actuator.commanded:
-            held = _held(joint.actuator, tau_e, q).stiffness
+            at_rest = Command.at_rest(tau_e, np.full(3, q))
+            held = joint.actuator.transmit(at_rest, NEAR_SINGULAR_MARGIN, None).stiffness
             return {
                 "unloaded": [float(held[0])] * 2,
                 "loaded": [float(held[1:].min()), float(held[1:].max())],
@@ -97,13 +97,6 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
         "unloaded": [float(solution.lower[0]), float(solution.upper[0])],
         "loaded": [float(solution.lower.max()), float(solution.upper.min())],
     }
-
-
-def _held(actuator: Actuator, tau_e: FloatArray, q: float) -> Transmission:
-    """What lies between joint and motors at rest, (samples,), of an actuator that takes no stiffness."""
-    rest = {name: np.zeros_like(tau_e) for name in Command.names(())}
-    command = Command.of({**rest, "tau_e": tau_e, "q": np.full_like(tau_e, q)})
-    return actuator.transmit(command, NEAR_SINGULAR_MARGIN, None)
 
 
 def gravity_torques(robot: Robot, q: FloatArray) -> FloatArray:

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws import SpringLaw
+from vsacli.actuators.transmission import Command, Transmission
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.documents.plausibility import Entry, Measured, NumberPath, Rule, Slip
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.body_rules import DEGREES, SIZES, TURN
@@ -63,27 +65,31 @@ def _travel(facts: Facts, joint: Joint) -> float:
 
 
 def _stiff_transmissions(facts: Facts) -> Iterator[Measured]:
-    """Stiffness over the weight at full reach, per rad."""
-    for _, joint, measured in _constant_springs(facts):
+    """Stiffness at rest over the weight at full reach, per rad."""
+    for joint, measured, held in _single_springs(facts):
         if joint.is_revolute:
-            yield measured._replace(size=ratio(measured.value, facts.sizes.scale(joint)))
+            yield measured._replace(size=ratio(float(held.stiffness[0]), facts.sizes.scale(joint)))
 
 
 def _soft_transmissions(facts: Facts) -> Iterator[Measured]:
-    """Stiffness over what the weight can ask, if there is any, per rad or per reach."""
-    for number, joint, measured in _constant_springs(facts) if any(facts.gravity) else ():
-        load = float(facts.sizes.loads[number])
-        yield measured._replace(size=ratio(measured.value * _travel(facts, joint), load))
+    """A rad, or the reach, over the deflection under what the weight can ask, if there is any."""
+    for joint, measured, held in _single_springs(facts) if any(facts.gravity) else ():
+        yield measured._replace(size=ratio(_travel(facts, joint), float(held.phi[0, 1])))
 
 
-def _constant_springs(facts: Facts) -> Iterator[tuple[int, Joint, Measured]]:
-    """Each elastic joint with its number and stiffness, whose size is to be replaced."""
+def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, Transmission]]:
+    """Each joint whose stiffness is not commanded, with its spring at rest and under what the weight can ask.
+
+    What is measured is the stiffness or the law; its size is to be replaced.
+    """
     for number, joint in enumerate(() if facts.placeholder else facts.joints):
-        stiffness = getattr(joint.actuator, "stiffness", None)
-        if stiffness is not None:
+        if joint.actuator.sprung and "stiffness" not in joint.actuator.commanded:
+            command = Command.at_rest(np.array([0.0, facts.sizes.loads[number]]), np.zeros(2))
+            held = joint.actuator.transmit(command, NEAR_SINGULAR_MARGIN, None)
             unit = "N m/rad" if joint.is_revolute else "N/m"
-            path = joint_path(number, joint, "actuator", "stiffness")
-            yield number, joint, Measured(path, stiffness, unit, math.nan)
+            constant = getattr(joint.actuator, "stiffness", None)
+            path = joint_path(number, joint, "actuator", "spring" if constant is None else "stiffness")
+            yield joint, Measured(path, math.nan if constant is None else constant, unit, math.nan), held
 
 
 def _springs(facts: Facts) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
@@ -150,9 +156,9 @@ SPRING_RULES: tuple[Rule[Facts], ...] = (
     ),
     Rule(
         name="stiff transmissions",
-        fields="`stiffness`",
+        fields="`stiffness`, `spring` of elastic joints",
         measure=_stiff_transmissions,
-        size="times 1 rad, of revolute joints, over the weight of the robot at its reach",
+        size="stiffness at rest times 1 rad, of revolute joints, over the weight of the robot at its reach",
         high=5000,
         usual=300,
         finding="is {size} times the weight of the robot at its reach per rad",
@@ -163,9 +169,9 @@ SPRING_RULES: tuple[Rule[Facts], ...] = (
     ),
     Rule(
         name="soft transmissions",
-        fields="`stiffness`",
+        fields="`stiffness`, `spring` of elastic joints",
         measure=_soft_transmissions,
-        size="times 1 rad or the reach, over what the weight of the stretched arm can ask",
+        size="1 rad or the reach over the deflection under what the weight of the stretched arm can ask",
         low=4,
         usual=50,
         finding="yields by more than 0.25 rad (of the reach) to what the weight of the stretched arm can ask",
