@@ -34,6 +34,10 @@ LEAST_CURVATURE_SHARE = 1e-3
 """Share of the lift's curvature at rest below which it makes no first guess."""
 
 
+AT_REST_SHARE = 1e-40
+"""Share of the stiffness below which k l'^2 tells that the deflection will leave the range of numbers."""
+
+
 class End(NamedTuple):
     """An end of the branch: deflection from rest, and joint stiffness; arrays (samples,)."""
 
@@ -202,11 +206,9 @@ class CamSolver:
         return phi, *self.lift(phi)
 
     def _compression(self, lift: Lift, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
-        """Compression of the spring: near rest, where the torque says little, from the stiffness."""
-        squared = self.k * lift.l1 * lift.l1
-        near_rest = 2 * squared <= demand
-        divisor = np.where(near_rest, self.k * lift.l2, self.k * lift.l1)
-        return np.where(near_rest, demand - squared, tau_e) / np.where(divisor == 0, 1.0, divisor)
+        """Compression of the spring, from the torque; at rest, where there is none, from the stiffness."""
+        at_rest = self.k * lift.l1 * lift.l1 <= AT_REST_SHARE * demand
+        return np.where(at_rest, demand / lift.l2, tau_e / lift.l1) / self.k
 
 
 def _distance(phi: FloatArray, last: FloatArray) -> LinearInTorque:
