@@ -38,7 +38,7 @@ FEEDBACK = ("--controller", "feedback-linearization")
 Run = Callable[..., Outcome]
 
 
-@pytest.fixture(params=slow_but(QUICK, DEVICES))
+@pytest.fixture(params=slow_but(QUICK, MECHANISMS))
 def device(request: pytest.FixtureRequest, tmp_path: Path) -> Device:
     """A device, with `arm.yaml` and `move.yaml` in the folder."""
     device = DEVICES[request.param]

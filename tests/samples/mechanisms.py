@@ -288,7 +288,7 @@ DEVICES = {
     ),
     "variable_ratio, sine": Device(
         mechanism=VariableRatio(
-            setting=(0, 4), scale=PolynomialScale(coefficients=(1, 0.3, 0, 0.05)), torque=Sine(k=300, ratio=3)
+            setting=(0, 4), scale=PolynomialScale(c0=1, c1=0.3, c3=0.05), torque=Sine(k=300, ratio=3)
         ),
         potential=_ratio(lambda s: 1 + 0.3 * s + 0.05 * s**3, lambda phi: 300 / 9 * (1 - sympy.cos(3 * phi))),
         stiffness=(500, 900),

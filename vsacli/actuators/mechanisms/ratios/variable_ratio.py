@@ -124,7 +124,7 @@ class VariableRatio(Mechanism):
             phi = self._deflection(ratio, *ends)
             scale = np.minimum(np.maximum(demand / self.torque.state(phi).sigma, least), most)
             setting = self.scale.setting(scale, self.setting)
-        never = np.zeros_like(soft.critical)
+        never = np.zeros_like(tau_e, dtype=bool)
         return PairSolution(
             lower=lower,
             upper=upper,
