@@ -69,7 +69,7 @@ def pushed(
     springs = loop.plant.drivetrain.sprung.sum()
     start = loop.packing.pack(np.array([q]), np.array([dq]), np.full(springs, q), np.full(springs, dq))
     start = slides.start(0.0, start)
-    integrator = Integrator([], Tolerances(), Budget(None, times), lambda _: None, slides.switches)
+    integrator = Integrator([], Tolerances(), Budget(None, times), lambda _: None, slides)
     reached, states, ending = integrator.over(loop.derivative, times, start)
     assert ending is None
     np.testing.assert_array_equal(reached, times)
@@ -106,6 +106,7 @@ def test_a_block_is_held_until_the_force_is_too_large_and_slides_back():
     assert q[-1] == pytest.approx(2 * q[200], rel=1e-9)  # the second swing is as the first
 
 
+@pytest.mark.slow
 def test_the_sharp_law_is_the_limit_of_smooth_ones():
     """An elastic joint that is pulled to and fro; smooth friction creeps where sharp friction holds."""
     times = np.linspace(0, 2, 201)
@@ -157,6 +158,7 @@ def test_feedforward_follows(friction):
         assert was.energy.dissipated == pytest.approx(planned.energy.dissipated, rel=1e-3)  # trapezoids
 
 
+@pytest.mark.slow
 def test_feedback_compensates_what_moves():
     """Away from rest the errors are those of linear theory, whatever the friction."""
     trajectory = short_motion(3, duration=0.5, size=0.2, stiffness=(1100, 1200))
@@ -179,6 +181,7 @@ def test_feedback_moves_a_block_only_if_the_error_demands_more_than_its_friction
         assert (past.dq_actual == 0).all() == (start == held)
 
 
+@pytest.mark.slow
 def test_feedback_lets_a_motor_stick_until_the_error_breaks_it_loose():
     robot = with_friction(vsa_3r(), SHARP)
     trajectory = short_motion(3, duration=0.5, size=0.2, stiffness=(1100, 1200))
@@ -192,6 +195,15 @@ def test_feedback_lets_a_motor_stick_until_the_error_breaks_it_loose():
     np.testing.assert_allclose(past.q_actual, again.q_actual, rtol=0, atol=1e-5)
 
 
+def test_held_torques_break_a_block_loose():
+    """The controller acts at samples: what it asks for then may at once be more than friction can hold."""
+    trajectory, gains = step_of(0.15, duration=0.5, rate=100), Gains.from_poles([-10.0] * 2)
+    past = simulate(block(), trajectory, gains=gains, measured="positions").history
+    assert (past.dq_actual[:5] == 0).all()  # 100 1/s^2 times the error are less than 2 N
+    assert past.q_actual[-1, 0] > 0.3  # of 0.35
+
+
+@pytest.mark.slow
 def test_measured_positions_and_another_model_run():
     robot = with_friction(vsa_3r(), SHARP)
     trajectory = short_motion(3, duration=0.3, size=0.1, rate=1000, stiffness=(1100, 1200))

@@ -143,6 +143,7 @@ def files(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_from_the_file_to_result_figures_and_columns(files):
     found = run("invdyn", "robot.yaml", "swing.yaml", "-o", "r.h5", "--plot", ".", cwd=files)
     assert found.returncode in (0, 3), found.stderr
@@ -165,6 +166,7 @@ def test_files_name_line_and_remedy(files):
         load_robot(files / "robot.yaml")
 
 
+@pytest.mark.slow
 @needs("cc", "gcc")
 def test_the_generated_code_tests_itself(files):
     made = run("codegen", "robot.yaml", "-o", "code", cwd=files)

@@ -16,7 +16,7 @@ from vsacli.base.json_records import Stored
 from vsacli.control.simulation.boundaries import Boundary
 from vsacli.control.simulation.budget import Budget, Deadline, Derivative, Progress
 from vsacli.control.simulation.ending import INCOMPLETE, Ending
-from vsacli.control.simulation.sliding import Switch
+from vsacli.control.simulation.sliding import Sliding, Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
 
 EXPLICIT = "DOP853"
@@ -76,7 +76,7 @@ class Integrator:
         tolerances: of each step.
         budget: of the run.
         progress: called with the time reached, s.
-        switches: at which it goes on under other equations of motion.
+        sliding: of motors with sharp friction, at whose switches other equations of motion take over.
     """
 
     def __init__(
@@ -85,9 +85,9 @@ class Integrator:
         tolerances: Tolerances,
         budget: Budget,
         progress: Progress,
-        switches: Sequence[Switch] = (),
+        sliding: Sliding | None = None,
     ) -> None:
-        self._boundaries, self._switches = boundaries, switches
+        self._boundaries, self._sliding = boundaries, sliding
         self._tolerances = tolerances
         self._progress = progress
         self._budget = budget
@@ -135,7 +135,9 @@ class Integrator:
         **options: Any,
     ) -> tuple[FloatArray, FloatArray, Ending | None]:
         deadline = Deadline(self._budget.limit, is_due, float(times[-1]), self._progress)
-        events = [deadline, *self._boundaries, *self._switches]
+        events = [deadline, *self._boundaries, *(self._sliding.switches if self._sliding else ())]
+        if self._sliding:  # torques may be others than before
+            self._sliding.settle(float(times[0]), start)
         first, at, state, parts = times[:1], float(times[0]), start, []
         while True:
             solution = self._until_event(derivative, (at, times), state, events, options)
@@ -177,7 +179,7 @@ class Integrator:
                 t_eval=times,
                 events=events,
                 rtol=self._tolerances.rtol,
-                max_step=min((switch.longest_step for switch in self._switches), default=math.inf),
+                max_step=self._sliding.longest_step if self._sliding else math.inf,
                 **options,
             )
 

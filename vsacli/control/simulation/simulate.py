@@ -24,7 +24,7 @@ from vsacli.control.simulation.joint_tracking import joint_trackings, stiffness_
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.rounding import check_rounding
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
-from vsacli.control.simulation.sliding import Switch, sliding
+from vsacli.control.simulation.sliding import sliding
 from vsacli.control.simulation.state_trajectory import StateTrajectory, continuous, sampled
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block, fitted
@@ -228,13 +228,13 @@ def _integrate(
     if last is not None and last.time <= times[0]:
         raise InputError.one("the controller's model cannot execute the start of the trajectory")
     vector = loop.packing.pack(*loop.plant.unpacked(start))
-    slides, switches = sliding(loop), list[Switch]()
+    slides = sliding(loop)
     if slides is not None:
-        vector, switches = slides.start(float(times[0]), vector), slides.switches
+        vector = slides.start(float(times[0]), vector)
     check_rounding(robot, loop, vector, float(times[0]), _peak_torque(robot, trajectory))
     reached = times if last is None else times[times <= last.time]
     budget = Budget(limit, reached)
-    integrator = Integrator(list(boundaries(loop, vector)), tolerances, budget, progress, switches)
+    integrator = Integrator(list(boundaries(loop, vector)), tolerances, budget, progress, slides)
     integrate = continuous if measured == "state" else sampled
     integrated = integrate(loop, integrator, reached, vector)
     return integrated if integrated.ending is not None else integrated._replace(ending=last)

@@ -28,11 +28,6 @@ class Switch:
         """Velocity of the slide, or friction that is left to hold the motor; zero where it switches."""
         return float(self._sliding.distances(time, vector)[self._motor])
 
-    @property
-    def longest_step(self) -> float:
-        """Longest step in which it is not missed, s."""
-        return LONGEST_HELD if self._sliding.holds(self._motor) else math.inf
-
     def passed(self, time: float, vector: FloatArray) -> FloatArray:
         """The state in which the run goes on."""
         return self._sliding.switched(time, vector, self._motor)
@@ -47,26 +42,28 @@ class Sliding:
     Args:
         loop: the robot under its controller.
         laws: friction of its motors.
+
+    Attributes:
+        switches: one for each motor with sharp friction.
     """
 
     def __init__(self, loop: ClosedLoop, laws: FrictionLaws) -> None:
         self._loop, self._laws = loop, laws
         self._velocity = loop.packing.motor_velocities
+        self.switches = [Switch(self, motor) for motor in np.flatnonzero(laws.sharp).tolist()]
+        self._known: tuple[float, FloatArray, FloatArray, FloatArray] | None = None
 
     @property
-    def switches(self) -> list[Switch]:
-        """One for each motor with sharp friction."""
-        return [Switch(self, motor) for motor in np.flatnonzero(self._laws.sharp).tolist()]
-
-    def holds(self, motor: int) -> bool:
-        """Whether a motor is held."""
-        return bool(self._slip[motor] == 0)
+    def longest_step(self) -> float:
+        """Longest step in which no switch is missed, s."""
+        return LONGEST_HELD if np.any(self._slip == 0) else math.inf
 
     def start(self, time: float, vector: FloatArray) -> FloatArray:
         """Begin in a state; returns it with the motors that rest at no velocity at all."""
         direction = direction_of(vector[self._velocity])
         self._loop.slip = np.where(self._laws.sharp, direction, np.nan)
-        return self._settled(time, self._stopped(vector, self._laws.sharp & (direction == 0)))
+        self.settle(time, vector)
+        return self._stopped(vector, self._laws.sharp & (direction == 0))
 
     def switched(self, time: float, vector: FloatArray, motor: int) -> FloatArray:
         """The state after a motor stopped, or broke loose, with the new directions of friction."""
@@ -74,11 +71,25 @@ class Sliding:
         stops = slip[motor] != 0
         holding = self._friction(time, vector) - self._laws.offset
         self._loop.slip = np.where(chosen, 0.0 if stops else np.sign(holding), slip)
-        return self._settled(time, self._stopped(vector, chosen) if stops else vector)
+        state = self._stopped(vector, chosen) if stops else vector
+        self.settle(time, state)
+        return state
 
     def distances(self, time: float, vector: FloatArray) -> FloatArray:
-        """Of each motor, (motors,): what falls to zero at its next switch."""
+        """Of each motor, (motors,): what falls to zero at its next switch.
+
+        All switches ask for it in the same state, one after the other.
+        """
         slip = self._slip
+        if self._known is not None:
+            known_time, known_vector, known_slip, distances = self._known
+            if known_time == time and known_vector is vector and known_slip is slip:
+                return distances
+        distances = self._distances(time, vector, slip)
+        self._known = time, vector, slip, distances
+        return distances
+
+    def _distances(self, time: float, vector: FloatArray, slip: FloatArray) -> FloatArray:
         friction = self._friction(time, vector) - self._laws.offset
         left = np.fmin(self._laws.forward - friction, self._laws.backward + friction)
         return np.where(slip == 0, left, slip * vector[self._velocity])
@@ -93,12 +104,12 @@ class Sliding:
         stopped[self._velocity[motors]] = 0.0
         return stopped
 
-    def _settled(self, time: float, vector: FloatArray) -> FloatArray:
-        """Let those motors slide, one after the other, that friction cannot hold; the state is as it was."""
+    def settle(self, time: float, vector: FloatArray) -> None:
+        """Let those motors slide, one after the other, that friction cannot hold under the torques of now."""
         while True:
             beyond = self._laws.beyond(self._friction(time, vector)) * (self._slip == 0)
             if not beyond.any():
-                return vector
+                return
             motor = int(np.argmin(np.where(beyond != 0, self.distances(time, vector), np.inf)))
             slip = self._slip.copy()
             slip[motor] = beyond[motor]
