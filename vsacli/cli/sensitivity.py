@@ -3,11 +3,35 @@
 from __future__ import annotations
 
 import json
+import shlex
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.cli.command_parts import example, json_option, load_inputs, robot_argument, trajectory_argument
+from vsacli.cli.command_parts import (
+    Inputs,
+    example,
+    hdf5_name,
+    json_option,
+    load_inputs,
+    overwrite_option,
+    robot_argument,
+    run_stem,
+    trajectory_argument,
+)
 from vsacli.cli.console import Talk, say, talk_options
+
+if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs, Staged
+    from vsacli.results.store.sensitivity import SensitivityWriter
+    from vsacli.robot.model import Robot
+    from vsacli.studies.sensitivities import Sensitivity, SensitivityRun
+
+SHOWN_FROM = 20_000
+"""Steps from which on a progress bar is shown; each takes some twenty times those of a run."""
 
 
 @click.command(
@@ -37,7 +61,14 @@ from vsacli.cli.console import Talk, say, talk_options
     help="Compute so many robots drawn from the tolerances as well.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of these draws.")
+@click.option(
+    "-o", "--output", metavar="FILE", callback=hdf5_name, help="Write the derivatives over time as HDF5."
+)
+@click.option(
+    "--plot", "folder", metavar="FOLDER", help="Save figures of the ranking, and of the bands, there."
+)
 @json_option
+@overwrite_option
 @talk_options
 def sensitivity(
     robot: str,
@@ -46,7 +77,10 @@ def sensitivity(
     tolerances: str | None,
     runs: int | None,
     seed: int,
+    output: str | None,
+    folder: str | None,
     as_json: bool,
+    overwrite: bool,
     talk: Talk,
 ) -> None:
     """Say how much motor torques, margins and energy of TRAJECTORY depend on each number of ROBOT.
@@ -54,19 +88,75 @@ def sensitivity(
     The table begins with the number of which a change of 1 % (1 mm, 1 degree) moves a motor torque most.
     With --tolerances it says how far torques and margins may be off.
     """
-    from vsacli.studies.sensitivities import sensitivity as analysed
-
     if runs is not None and tolerances is None:
         raise click.UsageError("--monte-carlo draws from tolerances: give --tolerances, e.g. 2%")
+    from vsacli.base.outputs import Outputs
+
     inputs = load_inputs(robot, trajectory, talk)
-    with talk.progress(inputs.trajectory.samples + (runs or 0), shown_from=20_000) as progress:
+    with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
+        file = None if output is None else outputs.file(Path(output))
+        found = _analysed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
+        if folder is not None:
+            _draw(found, inputs.robot, folder, run_stem(robot, trajectory), outputs)
+    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    talk.wrote(outputs)
+
+
+def _analysed(
+    inputs: Inputs,
+    patterns: tuple[str, ...],
+    tolerances: str | None,
+    runs: int,
+    seed: int,
+    file: Staged | None,
+    talk: Talk,
+) -> Sensitivity:
+    """Analyse, and write the derivatives as they come if there is a file for them."""
+    from vsacli.studies.sensitivities import SensitivityRun, analysed
+
+    run = SensitivityRun(*inputs, patterns)
+    with ExitStack() as stack:
+        writer = None if file is None else stack.enter_context(_writer(file, run))
+        steps = inputs.trajectory.samples + runs
+        progress = stack.enter_context(talk.progress(steps, shown_from=SHOWN_FROM))
         found = analysed(
-            inputs.robot,
-            inputs.trajectory,
-            patterns,
+            run,
             tolerances,
-            runs=runs or 0,
+            runs=runs,
             seed=seed,
             progress=progress.update,
+            keep=unheard if writer is None else writer.write,
         )
-    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+        if writer is not None:
+            writer.finish({**found.as_json(), "complete": True})
+    return found
+
+
+def unheard(_: object) -> None:
+    """What is done with derivatives that are not kept."""
+
+
+def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
+    from vsacli.results.store.sensitivity import Number, SensitivityWriter
+
+    numbers = [Number(str(each), each.value, each.unit) for each in run.parameters]
+    provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]])}
+    return SensitivityWriter(file, run.robot, run.trajectory, numbers, run.slopes, provenance=provenance)
+
+
+def _draw(found: Sensitivity, robot: Robot, folder: str, stem: str, outputs: Outputs) -> None:
+    """The ranking, and with tolerances the bands of the motor torques."""
+    from vsacli.results.plots import Bar, FigureFiles, Torque, band_figure, ranking_figure
+
+    title = f"{found.robot}, {found.trajectory}"
+    bars = [Bar(f"{each.words} of {each.path}", each.share, each.most[0]) for each in found.top if each.most]
+    figures = {"ranking": ranking_figure(bars, title)}
+    if found.curves is not None:
+        time, values, deviation = found.curves
+        torques = [
+            Torque(joint.name, joint.type, motor, values[:, index, motor - 1], deviation[:, index, motor - 1])
+            for index, joint in enumerate(robot.joints)
+            for motor in range(1, joint.actuator.motor_count + 1)
+        ]
+        figures["band"] = band_figure(time, torques, title)
+    FigureFiles(figures, folder, stem, "png", outputs).save(figures)

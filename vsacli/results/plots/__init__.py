@@ -26,6 +26,7 @@ from vsacli.results.plots.figures import (
 )
 from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
 from vsacli.results.plots.measured_figure import MeasuredCurve, measured_figure
+from vsacli.results.plots.sensitivity_figures import Bar, Torque, band_figure, ranking_figure
 
 __all__ = [
     "COMPARISON",
@@ -33,8 +34,11 @@ __all__ = [
     "FEASIBILITY_VARIABLES",
     "FORMATS",
     "RESULT_DRAWINGS",
+    "Bar",
     "FigureFiles",
     "MeasuredCurve",
+    "Torque",
+    "band_figure",
     "check_drawable",
     "compare_files",
     "drawable_figures",
@@ -43,6 +47,7 @@ __all__ = [
     "omitted_figures",
     "plot_feasibility",
     "plot_stored",
+    "ranking_figure",
     "result_drawings",
     "save_figures",
     "simulation_drawings",

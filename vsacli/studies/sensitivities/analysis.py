@@ -14,7 +14,7 @@ from vsacli.studies.sensitivities.effects import Effects
 from vsacli.studies.sensitivities.monte_carlo import monte_carlo
 from vsacli.studies.sensitivities.parameters import Parameter
 from vsacli.studies.sensitivities.sensitivity_report import JointEffect, ParameterEffect, Sensitivity
-from vsacli.studies.sensitivities.sensitivity_run import SensitivityRun
+from vsacli.studies.sensitivities.sensitivity_run import Derivatives, SensitivityRun
 from vsacli.studies.sensitivities.steps import step_of, words_of
 from vsacli.studies.sensitivities.tolerances import deviations, tolerances_of
 from vsacli.trajectory.trajectory import Trajectory
@@ -28,7 +28,6 @@ def sensitivity(
     *,
     runs: int = 0,
     seed: int = 0,
-    progress: Callable[[int], None] = lambda _: None,
 ) -> Sensitivity:
     """How much motor torques, margins and energy depend on each number of a robot.
 
@@ -43,34 +42,61 @@ def sensitivity(
             distribution for paths, such as `joints.*.link.mass: {normal: 2 %}`.
         runs: how many robots are drawn from the tolerances and run as well.
         seed: of these draws.
-        progress: is told how many further steps, and robots, are done.
 
     Raises:
         InputError: the trajectory does not fit the robot, a pattern fits no number, or a tolerance is none.
     """
-    run = SensitivityRun(robot, trajectory, parameters)
-    steps = np.array([step_of(each) for each in run.parameters])
-    given = None if tolerances is None else tolerances_of(tolerances, run.parameters)
-    sizes = None if given is None else deviations(given)
-    effects, band = Effects(steps, len(robot.joints)), None if sizes is None else Band(sizes)
+    return analysed(SensitivityRun(robot, trajectory, parameters), tolerances, runs=runs, seed=seed)
+
+
+def analysed(
+    run: SensitivityRun,
+    tolerances: str | None,
+    *,
+    runs: int,
+    seed: int,
+    progress: Callable[[int], None] = lambda _: None,
+    keep: Callable[[Derivatives], None] = lambda _: None,
+) -> Sensitivity:
+    """As `sensitivity`, of a run that was made already.
+
+    Args:
+        run: the run.
+        tolerances: as there.
+        runs: as there.
+        seed: as there.
+        progress: is told how many further steps, and robots, are done.
+        keep: gets the derivatives, block by block.
+
+    Raises:
+        InputError: a tolerance is none.
+    """
+    robot, given = run.robot, None if tolerances is None else tolerances_of(tolerances, run.parameters)
+    effects = Effects(np.array([step_of(each) for each in run.parameters]), len(robot.joints))
+    sizes = np.zeros(len(run.parameters)) if given is None else deviations(given)
+    band = None if given is None else Band(sizes)
     for part in run:
         effects.add(part)
         if band is not None:
             band.add(part)
-        progress(len(part.block.time))
-    found = [
-        _effect(robot, parameter, place, effects, None if sizes is None else float(sizes[place]))
-        for place, parameter in enumerate(run.parameters)
-    ]
+        keep(part)
+        progress(len(part.time))
     drawn = None
     if given is not None and runs:
-        drawn = monte_carlo(robot, trajectory, run.parameters, given, runs, seed=seed, progress=progress)
+        drawn = monte_carlo(robot, run.trajectory, run.parameters, given, runs, seed=seed, progress=progress)
+    found = [
+        _effect(robot, parameter, place, effects, None if given is None else float(sizes[place]))
+        for place, parameter in enumerate(run.parameters)
+    ]
     return Sensitivity(
         robot=robot.name,
-        trajectory=trajectory.name,
+        trajectory=run.trajectory.name,
+        verdict=effects.verdict,
+        failed=effects.failed,
         parameters=tuple(sorted(found, key=lambda each: -each.share)),
         band={} if band is None else dict(zip(robot.joint_names, band.joints(), strict=True)),
         monte_carlo=drawn,
+        curves=None if band is None else band.curves(),
         units={joint.name: TORQUE.unit(joint.type) for joint in robot.joints},
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -40,12 +40,21 @@ class JointBand(Published):
     shape: ClassVar = named("torque", "share", "time", "margin", "margin_deviation", "margin_time", "lost")
 
 
-class Band:
-    """Variances over a run; independent parameters, first order. `add` its blocks in order.
+class TorqueCurves(NamedTuple):
+    """Motor torques over a run.
 
     Attributes:
-        deviation: standard deviation of tau_motor, (samples, joints, 2), of the blocks so far.
+        time: (samples,), s.
+        tau_motor, deviation: (samples, joints, 2), N m (N).
     """
+
+    time: FloatArray
+    tau_motor: FloatArray
+    deviation: FloatArray
+
+
+class Band:
+    """Variances over a run; independent parameters, first order. `add` its blocks in order."""
 
     def __init__(self, deviations: FloatArray) -> None:
         self._variances = deviations**2
@@ -68,10 +77,10 @@ class Band:
         counted = self._variances > 0
         return np.asarray(np.sqrt(np.einsum("p...,p->...", slopes[counted] ** 2, self._variances[counted])))
 
-    @property
-    def deviation(self) -> FloatArray:
-        """Of tau_motor."""
-        return np.concatenate([part[3] for part in self._parts])
+    def curves(self) -> TorqueCurves:
+        """Torques and their deviations so far."""
+        time, torque, _, deviation, _ = (np.concatenate(parts) for parts in zip(*self._parts, strict=True))
+        return TorqueCurves(time, torque, deviation)
 
     def joints(self) -> list[JointBand]:
         """What was found, of each joint."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.studies.sensitivities.drive_derivatives import MARGIN
 from vsacli.studies.sensitivities.sensitivity_run import Derivatives
 
@@ -37,6 +38,7 @@ class Effects:
         time, motor: when, s, and of which motor, 1 or 2; likewise.
         smallest: the smallest margins.
         spent: change of the energy that the motors spend by each parameter's step, (parameters, joints), J.
+        failed: how many steps of joints are infeasible or singular.
     """
 
     def __init__(self, steps: FloatArray, joints: int) -> None:
@@ -52,14 +54,24 @@ class Effects:
         self.largest, self.time, self.spent = np.zeros((3, *shape))
         self.motor = np.ones(shape, dtype=int)
         self.smallest = Smallest(np.full(joints, np.inf), np.zeros(joints), np.zeros(shape))
+        self.failed = 0
+        self._flags = np.zeros(1, dtype=np.uint16)
         self._last: tuple[float, FloatArray] | None = None
 
     def add(self, part: Derivatives) -> None:
         """Merge the next block."""
-        time = np.asarray(part.block.time)
+        time, flags = np.asarray(part.block.time), np.asarray(part.block.flags)
+        self._flags |= np.bitwise_or.reduce(flags, axis=None)
+        self.failed += int(np.count_nonzero(has(flags, Flag.INFEASIBLE | Flag.SINGULAR)))
         self._add_torque(time, np.asarray(part.block.tau_motor), part.by_name["tau_motor"])
         self._add_margin(time, part)
         self._add_energy(time, np.asarray(part.block.motor_power), part.by_name["motor_power"])
+
+    @property
+    def verdict(self) -> str:
+        """On the run with the numbers as they are."""
+        judged = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "over_limit": LIMITS}
+        return next((verdict for verdict, bits in judged.items() if has(self._flags, bits).any()), "ok")
 
     def _add_torque(self, time: FloatArray, torque: FloatArray, slopes: FloatArray) -> None:
         self.peak = np.fmax(self.peak, np.fmax.reduce(np.abs(torque), axis=(0, 2)))

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import aligned
-from vsacli.studies.sensitivities.band import JointBand
+from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
 from vsacli.studies.sensitivities.monte_carlo import MonteCarlo
 
 SHOWN = 15
@@ -80,36 +80,48 @@ class Sensitivity(Published):
 
     Attributes:
         robot, trajectory: names of both.
+        verdict: on the run with the numbers as they are: ok, over_limit, singular or infeasible.
+        failed: how many of its steps are infeasible or singular, each joint by itself, and do not count.
         parameters: the numbers, the most important first.
         band: what tolerances do to each joint, by name; empty if none were given.
+        curves: motor torques and their deviations; None without tolerances, and not in JSON.
         monte_carlo: what became of robots drawn from the tolerances; None if none were.
         units: of the torques of each joint, by name.
     """
 
     robot: str
     trajectory: str
+    verdict: str
+    failed: int
     parameters: tuple[ParameterEffect, ...]
     band: dict[str, JointBand] = field(default_factory=dict)
     monte_carlo: MonteCarlo | None = None
+    curves: TorqueCurves | None = field(default=None, repr=False)
     units: dict[str, str] = field(default_factory=dict)
 
     format: ClassVar[str] = "vsacli-sensitivity/1"
     shape: ClassVar = {
         "format": "format",
-        **named("robot", "trajectory", "parameters"),
+        **named("robot", "trajectory", "verdict", "failed", "parameters"),
         "band?": "band",
         "monte_carlo?": "monte_carlo",
     }
 
     def __str__(self) -> str:
         title = f"{self.robot}, {self.trajectory}: {len(self.parameters)} numbers"
+        if self.failed:
+            title += f"; {self.failed} steps of joints are {self.verdict} and do not count"
         return "\n".join([title, *aligned(list(self._rows())), *self._more(), *self._bands(), *self._drawn()])
+
+    @property
+    def top(self) -> tuple[ParameterEffect, ...]:
+        """The numbers that are shown."""
+        return tuple(each for each in self.parameters[:SHOWN] if each.most is not None)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         yield ("number", "change", "peak motor torque", "", "at", "smallest margin", "energy spent")
-        for each in self.parameters[:SHOWN]:
-            if each.most is None:
-                continue
+        for each in self.top:
+            assert each.most is not None
             joint, effect = each.most
             spent = sum(of_joint.spent for of_joint in each.joints.values())
             yield (

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import command_of, compute_block, fitted
 from vsacli.robot.model import Robot
-from vsacli.studies.sensitivities.drive_derivatives import OF_MOTORS, drive_derivatives
+from vsacli.studies.sensitivities.drive_derivatives import MARGIN, OF_MOTORS, drive_derivatives
 from vsacli.studies.sensitivities.link_derivatives import batches, torque_derivatives
 from vsacli.studies.sensitivities.parameters import Parameter, parameters
 from vsacli.trajectory.motion import Motion
@@ -36,6 +37,12 @@ class Derivatives:
     block: Block
     by_name: dict[str, FloatArray] = field(repr=False)
 
+    @property
+    def time(self) -> FloatArray:
+        """Times of the steps, (samples,), s."""
+        time: FloatArray = self.block.time
+        return time
+
 
 class SensitivityRun:
     """Iterates over a trajectory.
@@ -47,10 +54,13 @@ class SensitivityRun:
 
     Attributes:
         parameters: the numbers, in the order of the derivatives.
+        slopes: names of the variables that are differentiated, each with whether it is one of motors.
 
     Raises:
         InputError: the trajectory does not fit the robot, or a pattern fits no number.
     """
+
+    slopes: ClassVar[Mapping[str, bool]] = {**dict.fromkeys(OF_MOTORS, True), MARGIN: False}
 
     def __init__(self, robot: Robot, trajectory: Trajectory, patterns: Sequence[str] = ()) -> None:
         self.robot, self.trajectory = robot, fitted(robot, trajectory)
@@ -63,8 +73,8 @@ class SensitivityRun:
     def _derivatives(self, motion: Motion) -> Derivatives:
         block, joints = compute_block(self.robot, motion), len(self.robot.joints)
         found = {
-            name: np.zeros((len(self.parameters), joints, *shape, len(motion.time)))
-            for name, shape in _SHAPES.items()
+            name: np.zeros((len(self.parameters), joints, *([2] * of_motors), len(motion.time)))
+            for name, of_motors in self.slopes.items()
         }
         by_torques = [self._of_drive(block, index, found) for index in range(joints)]
         for places in batches(self.parameters):
@@ -85,9 +95,6 @@ class SensitivityRun:
         for name, slopes in derived.by_numbers.items():
             found[name][own, index] = slopes
         return derived.by_torques
-
-
-_SHAPES: dict[str, tuple[int, ...]] = {**dict.fromkeys(OF_MOTORS, (2,)), "margin": ()}
 
 
 def _drives(parameter: Parameter, joint: int) -> bool:

@@ -1,0 +1,123 @@
+"""The sensitivity file: a result file that also holds derivatives by numbers of the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import h5py
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.outputs import Staged
+from vsacli.base.variables import MOTORS, Block
+from vsacli.results.store.schema import TEXT, chunk_rows
+from vsacli.results.store.writer import ResultWriter
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+FORMAT = "vsacli-sensitivity/1"
+
+
+class Number(NamedTuple):
+    """A number of the robot: the path to it, its value in SI units, and its unit."""
+
+    path: str
+    value: float
+    unit: str
+
+
+class Sloped(Protocol):
+    """Consecutive steps with derivatives by name, (numbers, samples, joints[, 2])."""
+
+    @property
+    def time(self) -> FloatArray:
+        """Times, (samples,), s."""
+
+    @property
+    def block(self) -> Block:
+        """The variables themselves."""
+
+    @property
+    def by_name(self) -> Mapping[str, FloatArray]:
+        """Their derivatives."""
+
+
+class SensitivityWriter(ResultWriter):
+    """Writes a sensitivity file.
+
+    Args:
+        numbers: by which is differentiated.
+        slopes: names of the variables that are, each with whether it is one of motors.
+    """
+
+    _format = FORMAT
+
+    def __init__(
+        self,
+        file: Staged,
+        robot: Robot,
+        trajectory: Trajectory,
+        numbers: Sequence[Number],
+        slopes: Mapping[str, bool],
+        *,
+        provenance: Mapping[str, str],
+    ) -> None:
+        super().__init__(file, robot, trajectory, _COMPUTED, provenance=provenance)
+        self._numbers, self._wanted = numbers, slopes
+
+    def _create(self) -> None:
+        super()._create()
+        with self._hdf5():
+            paths, _, unit_names = zip(*self._numbers, strict=True)
+            scale = self._labels("parameter", paths, "number of the robot file")
+            scale.make_scale("parameter")
+            values = self._file.create_dataset("parameter_value", data=[each.value for each in self._numbers])
+            units = self._labels("parameter_unit", unit_names, "SI unit of the number")
+            for dataset in (values, units):
+                dataset.dims[0].attach_scale(scale)
+            self._slopes = {
+                name: self._slope(name, of_motors, scale) for name, of_motors in self._wanted.items()
+            }
+
+    def _labels(self, name: str, texts: Iterable[str], words: str) -> h5py.Dataset:
+        dataset = self._file.create_dataset(name, data=np.array(list(texts), dtype=TEXT), dtype=TEXT)
+        dataset.attrs["long_name"] = words
+        return dataset
+
+    def _slope(self, name: str, of_motors: bool, scale: h5py.Dataset) -> h5py.Dataset:
+        row = (len(self._numbers), len(self._robot.joints), *((len(MOTORS),) if of_motors else ()))
+        samples = self._trajectory.samples
+        dataset = self._file.create_dataset(
+            f"{name}_slope",
+            shape=(samples, *row),
+            maxshape=(samples, *row),
+            dtype="<f8",
+            chunks=(chunk_rows(samples, 8 * int(np.prod(row))), *row),
+        )
+        dataset.attrs["units"] = f"units of {name}, per parameter_unit"
+        dataset.attrs["long_name"] = f"derivative of {name} by each number of the robot file"
+        scales = [self._file["time"], scale, self._file["joint"], self._file["motor"]]
+        for axis, each in enumerate(scales[: dataset.ndim]):
+            dataset.dims[axis].attach_scale(each)
+        return dataset
+
+    def _append(self, block: Any) -> None:
+        """The variables, and their derivatives.
+
+        Args:
+            block: as `Sloped`.
+        """
+        start = self._written
+        super()._append(block.block)
+        for name, dataset in self._slopes.items():
+            dataset[start : self._written] = np.moveaxis(block.by_name[name], 0, 1)
+
+    def _size(self) -> int:
+        columns = sum(len(MOTORS) if of_motors else 1 for of_motors in self._wanted.values())
+        slopes = 8 * columns * len(self._numbers) * len(self._robot.joints)
+        return super()._size() + self._trajectory.samples * slopes
+
+
+_COMPUTED = ("q", "dq", "ddq", "tau_e", "theta", "tau_motor", "motor_power", "flags")
+"""Variables beside their derivatives."""
