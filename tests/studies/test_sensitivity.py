@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 
+import h5py
 import numpy as np
 import pytest
 from samples.command_line import REST_TO_REST, ROBOT, rest_to_rest
@@ -13,6 +14,7 @@ from vsacli import load_robot, load_trajectory, sensitivity
 from vsacli.actuators.reach import margin
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.inverse import compute_block
+from vsacli.studies.sensitivities import SensitivityRun
 from vsacli.studies.sensitivities.parameters import parameters
 
 
@@ -141,3 +143,44 @@ def test_what_cannot_be_used_is_said(vsacli, tmp_path, sentence):
     done = vsacli("sensitivity", ROBOT, "coarse.yaml", *BAD[sentence])
     assert (done.code, done.out) == (2, "")
     assert sentence in done.err
+
+
+def test_the_file_has_the_derivatives_over_time(vsacli, tmp_path, arm):
+    motion = load_trajectory(rest_to_rest(tmp_path / "coarse.yaml"), arm)
+    done = vsacli(
+        "sensitivity", ROBOT, "coarse.yaml", "-o", "s.h5", "--parameters", "joints.elbow.*", "--json"
+    )
+    assert done.code == 0
+    (part,) = SensitivityRun(arm, motion, ["joints.elbow.*"])
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert file.attrs["format"] == "vsacli-sensitivity/1"
+        assert file.attrs["verdict"] == json.loads(done.out)["verdict"] == "ok"
+        paths = file["parameter"].asstr()[...].tolist()
+        values = dict(zip(paths, file["parameter_value"][...].tolist(), strict=True))
+        assert values["joints.elbow.link.mass"] == 5.0894
+        assert file["parameter_unit"].asstr()[paths.index("joints.elbow.link.mass")] == "kg"
+        np.testing.assert_array_equal(file["tau_motor"][...], part.block.tau_motor)
+        for name, slopes in part.by_name.items():
+            stored = file[f"{name}_slope"]
+            np.testing.assert_array_equal(stored[...], np.moveaxis(slopes, 0, 1))
+            dims = [stored.dims[axis].keys()[0] for axis in range(stored.ndim)]
+            assert dims == ["time", "parameter", "joint", "motor"][: stored.ndim]
+
+
+def test_figures_show_ranking_and_bands(vsacli, tmp_path):
+    rest_to_rest(tmp_path / "coarse.yaml")
+    assert vsacli("sensitivity", ROBOT, "coarse.yaml", "--tolerances", "2%", "--plot", "figures").code == 0
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {
+        "vsa_3r-coarse-ranking.png",
+        "vsa_3r-coarse-band.png",
+    }
+    assert vsacli("sensitivity", ROBOT, "coarse.yaml", "--plot", "figures").code == 4
+    assert vsacli("sensitivity", ROBOT, "coarse.yaml", "--plot", "others").code == 0
+    assert [path.name for path in (tmp_path / "others").iterdir()] == ["vsa_3r-coarse-ranking.png"]
+
+
+def test_steps_that_cannot_be_done_do_not_count(vsacli, tmp_path):
+    rest_to_rest(tmp_path / "soft.yaml", 790)
+    out = vsacli("sensitivity", ROBOT, "soft.yaml").out
+    assert "steps of joints are infeasible and do not count" in out.splitlines()[0]
+    assert "nan" not in out
