@@ -26,7 +26,7 @@ from vsacli.cli.console import Talk, say, talk_options
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
-    from vsacli.results.store.sensitivity import SensitivityWriter
+    from vsacli.results.store.sensitivity_file import SensitivityWriter
     from vsacli.robot.model import Robot
     from vsacli.studies.sensitivities import Sensitivity, SensitivityRun
 
@@ -137,7 +137,7 @@ def unheard(_: object) -> None:
 
 
 def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
-    from vsacli.results.store.sensitivity import Number, SensitivityWriter
+    from vsacli.results.store.sensitivity_file import Number, SensitivityWriter
 
     numbers = [Number(str(each), each.value, each.unit) for each in run.parameters]
     provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]])}

@@ -15,8 +15,8 @@ from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import open_stored
 from vsacli.studies.measured.agreement import Agreement, straight_line
 from vsacli.studies.measured.alignment import Alignment, Pairing, align, lag_of
-from vsacli.studies.measured.columns import Measured, Recording, recording_of
 from vsacli.studies.measured.comparison_report import SHOWN_LAG, Comparison
+from vsacli.studies.measured.measured_columns import Measured, Recording, recording_of
 from vsacli.studies.measured.slips import slips
 
 POSITIONS = ("q", "theta")

@@ -19,8 +19,8 @@ from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import evaluate
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.yaml_tree import parse_yaml
+from vsacli.studies.sensitivities.parameter_steps import SMALL_CHANGES
 from vsacli.studies.sensitivities.parameters import Parameter
-from vsacli.studies.sensitivities.steps import SMALL_CHANGES
 
 FORM = "e.g. {normal: 5 %} or {uniform: 0.001}"
 _SHARE = re.compile(r"(?P<number>.*\S)\s*%")
