@@ -50,7 +50,7 @@ def test_gear_ratios_reflect_it_with_their_signs() -> None:
 
 @pytest.mark.parametrize("coupling", [0.08, -0.08, np.sqrt(0.3 * 0.02)])
 def test_an_inertia_that_no_rotors_have_is_refused(coupling: float) -> None:
-    with pytest.raises(InvalidRecordError, match=r"coupled_inertia: makes .* positive definite"):
+    with pytest.raises(InvalidRecordError, match=r"coupled_inertia: is .* positive definite"):
         dataclasses.replace(DEVICE.actuator, coupled_inertia=coupling)
 
 

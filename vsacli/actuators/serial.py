@@ -60,8 +60,8 @@ class Serial(Actuator):
         largest = math.sqrt(first * second)
         if not abs(self.coupled_rotors) < largest:
             reason = (
-                f"makes {abs(self.coupled_rotors):g} on the joint side, must be below {largest:g}, root of "
-                f"the product of both motors' inertias there, or B is not positive definite"
+                f"is {self.coupled_rotors:g} on the joint side of the gears; its size must be below "
+                f"{largest:.4g}, the root of the product of both inertias, or B is not positive definite"
             )
             problems.append(FieldProblem(("coupled_inertia",), reason))
         check_fields(self, *problems)

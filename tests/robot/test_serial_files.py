@@ -1,0 +1,64 @@
+"""Serial actuators in robot files: what is refused, where, and why."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from vsacli import load_robot
+from vsacli.base.errors import InputError
+
+HEAD = """
+format: vsacli-robot/1
+name: arm
+joints:
+  - name: elbow
+    type: revolute
+    dh: {a: 0.3, alpha: 0}
+    link: {mass: 2, inertia: {xx: 0.002, yy: 0.015, zz: 0.015}, com: [-0.15, 0, 0]}
+    actuator:
+      type: serial
+      motor: [{inertia: 0.3}, {inertia: 0.02}]
+"""
+AWAS = "mechanism: {type: awas, k: 60000, arm: [0.02, 0.1], lead: 0.01}"
+LEVER = "mechanism: {type: lever, k: 500, length: 0.1, pivot: [0.02, 0.1], lead: 1}"
+RATIO = "mechanism: {type: variable_ratio, setting: [0, 2], torque: {type: sine, k: 300}, scale: "
+
+
+def load(*lines: str) -> object:
+    Path("arm.yaml").write_text(HEAD.lstrip() + "".join(f"      {line}\n" for line in lines))
+    return load_robot("arm.yaml").joints[0].actuator
+
+
+@pytest.mark.usefixtures("own_folder")
+@pytest.mark.parametrize(
+    ("lines", "reason"),
+    [
+        ((AWAS.replace("0.02, 0.1", "0, 0.1"),), "mechanism: arm: must have two ends above zero"),
+        ((AWAS.replace("[0.02, 0.1]", "0.1"),), "mechanism: arm: must have two ends above zero"),
+        ((AWAS.replace("[0.02, 0.1]", "[0.02, .inf]"),), "arm: "),
+        ((AWAS.replace("lead: 0.01", "lead: 0"),), "lead: must be finite and not zero, not 0"),
+        ((AWAS.replace("k: 60000", "k: 0"),), "k: must be positive, not 0"),
+        ((LEVER,), "mechanism: pivot: must have two ends between zero and the length 0.1 m"),
+        ((f"{RATIO}{{type: power, exponent: 2}}}}",), "scale: is not positive at theta_2 = 0"),
+        ((f"{RATIO}{{type: power, exponent: -1, lead: -1, offset: 1}}}}",), "not positive at theta_2 = 1"),
+        ((f"{RATIO}{{type: polynomial, c0: 1, c1: 2, c2: -1}}}}",), "it has no slope near theta_2 = 1"),
+        ((f"{RATIO}{{type: polynomial, c0: 1}}}}",), "scale: must rise or fall over all of `setting`"),
+        ((AWAS.replace("awas", "awass"),), "mechanism.type: unknown word 'awass'; did you mean 'awas'?"),
+        ((AWAS, "coupled_inertia: -0.2"), "is -0.2 on the joint side of the gears; its size must be below"),
+        ((AWAS, "preload: negative"), "unknown key 'preload'"),
+        (("coupled_inertia: 0",), "actuator: missing key 'mechanism'"),
+    ],
+)  # fmt: skip
+def test_what_is_refused(lines: tuple[str, ...], reason: str) -> None:
+    with pytest.raises(InputError, match=rf"arm\.yaml:\d+: .*{re.escape(reason)}"):
+        load(*lines)
+
+
+@pytest.mark.usefixtures("own_folder")
+def test_two_motors_and_their_coupling_are_read() -> None:
+    actuator = load(AWAS, "coupled_inertia: 0.004")
+    assert [motor.inertia for motor in actuator.motors] == [0.3, 0.02]
+    assert actuator.coupled_rotors == 0.004
