@@ -9,7 +9,7 @@ import pytest
 from samples.driven_arm import ARM, LINK, assert_follows, motion_of, robot_of
 from samples.full_model import Drive, springs_of
 from samples.law_energies import SAMPLES
-from samples.marks import needs_compiler
+from samples.marks import needs_compiler, slow_but
 
 from vsacli import inverse_dynamics
 from vsacli.actuators.antagonistic import Antagonistic
@@ -40,7 +40,7 @@ def drive_of(coupling: str | None) -> Drive:
     )
 
 
-@pytest.mark.parametrize("coupling", COUPLINGS)
+@pytest.mark.parametrize("coupling", slow_but(["sinh"], COUPLINGS))
 def test_the_full_model_follows(coupling: str) -> None:
     law, drive = SAMPLES[coupling].law, drive_of(coupling)
     coupled = assert_follows(LINK, [pair(law)], [drive], [RANGE])
@@ -57,6 +57,7 @@ def test_the_full_model_follows(coupling: str) -> None:
     np.testing.assert_allclose(added[..., 0], law.torque(apart), rtol=1e-13, atol=rounding)
 
 
+@pytest.mark.slow
 def test_arms_with_and_without_couplings_follow() -> None:
     names = ("sinh", None, "cubic")
     actuators = [pair(SAMPLES[name].law if name else None, "negative") for name in names]

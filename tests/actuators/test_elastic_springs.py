@@ -62,6 +62,7 @@ def test_the_full_model_follows(name: str) -> None:
     assert np.isnan([result.stiffness_lower, result.stiffness_upper, result.det_A]).all()
 
 
+@pytest.mark.slow
 def test_an_arm_of_springs_of_several_laws_follows() -> None:
     linear = Elastic(motor=MOTOR, stiffness=300)
     of_linear = Drive(0.2, [0.1], springs_of(lambda q, theta: 150 * (theta - q) ** 2, 1))
@@ -138,6 +139,7 @@ def test_the_compiled_engine_agrees() -> None:
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-12 * np.nanmax(np.abs(one)))
 
 
+@pytest.mark.slow
 def test_one_spring_beside_pairs() -> None:
     pair = Antagonistic(motor=(MOTOR, MOTOR), spring=(Cubic(k=60, k_c=900),) * 2)
     energy = SAMPLES["cubic"].energy

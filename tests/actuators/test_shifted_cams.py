@@ -52,6 +52,7 @@ def test_unlike_cams_and_tendons_drive_the_full_model(
     assert_follows(LINK, [serial(first, second, preload)], [drive_of(first, second)], [stiffness])
 
 
+@pytest.mark.slow
 def test_an_arm_with_a_pair_and_cams_follows() -> None:
     pair = Antagonistic(motor=(MOTORS[0],) * 2, spring=(SAMPLES["cubic"].law,) * 2)
     energy = SAMPLES["cubic"].energy

@@ -89,7 +89,7 @@ def test_results_are_drawn_and_computed_again(joint):
     ("options", "final"),
     [
         (("feedforward",), 1e-8),  # the tolerance of the integration, 1e-9 a step
-        (("feedback-linearization", "--initial-error", 0.02), 1e-8),  # 0.02 (30^3/6) exp(-30)
+        slow(("feedback-linearization", "--initial-error", 0.02), 1e-8),  # 0.02 (30^3/6) exp(-30)
         slow(("feedback-linearization", "--perturb", 0.01, "--tolerance", 1), 0.1),
     ],
 )
