@@ -40,10 +40,10 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
     """Draw the figures of a result or a simulation, or compare several of a kind.
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
-    <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque; where motors have a torque
-    constant, both give <stem>-motor-current and <stem>-motor-voltage. Two or more FILEs give one figure
-    <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid joint by
-    joint.
+    <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give <stem>-losses if the
+    robot has dry friction, and <stem>-motor-current and <stem>-motor-voltage if its motors have what that
+    takes. Two or more FILEs give one figure <stem>-<stem>-compare: motor torques of results, or position
+    errors of simulations, overlaid joint by joint.
     """
     from vsacli.base.outputs import Outputs
 

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from vsacli.base.errors import InputError
-from vsacli.base.units import CURRENT, ENERGY, POSITION, STIFFNESS, TORQUE, VOLTAGE, Quantity
+from vsacli.base.units import CURRENT, ENERGY, POSITION, POWER, STIFFNESS, TORQUE, VOLTAGE, Quantity
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.results.plots.corridor_figure import MOST_ROWS, compliant_joints, draw_corridors
 from vsacli.results.plots.curves import Failures
@@ -129,6 +129,14 @@ def _work_label(motor: int, _joint_type: str) -> str:
 _WORK_LABELS = [partial(_work_label, motor) for motor in MOTORS]
 
 
+def _losses(result: StoredResult, failures: Failures) -> Figure:
+    return grouped_figure(result, failures, "dissipated_power", [_loss_label])
+
+
+def _loss_label(_joint_type: str) -> str:
+    return f"friction and damping [{POWER}]"
+
+
 def _current(result: StoredResult, failures: Failures) -> Figure:
     return grouped_figure(result, failures, "current", _CURRENT_LABELS, "max_current")
 
@@ -151,6 +159,7 @@ RESULT_DRAWINGS: dict[str, Drawing] = {
     "motor-torque": Drawing(("tau_motor",), _motor_torque),
     "elastic-torque": Drawing(("tau_e",), _elastic_torque),
     "energy": Drawing(("elastic_energy", "motor_energy"), _energy),
+    "losses": Drawing(("dissipated_power",), _losses),
     "motor-current": Drawing(("current",), _current),
     "motor-voltage": Drawing(("voltage",), _voltage),
 }
@@ -194,6 +203,7 @@ _FIGURES: dict[str, tuple[Any, ...]] = {
     "position-error": ("q_error", [_position_error]),
     "stiffness-error": ("stiffness_error", [_stiffness_error]),
     "motor-torque": ("tau_motor_actual", MOTOR_LABELS),
+    "losses": ("dissipated_power_actual", [_loss_label]),
     "motor-current": ("current_actual", _CURRENT_LABELS, "max_current"),
     "motor-voltage": ("voltage_actual", _VOLTAGE_LABELS, "max_voltage"),
 }

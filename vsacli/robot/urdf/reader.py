@@ -174,7 +174,7 @@ class _Reader:
         )
 
     def _left_out(self, joint: Element) -> Iterator[str]:
-        """What a robot file has no place for."""
+        """What is not taken over: a robot file has no place for it, or the URDF does not say which."""
         for dynamics in joint.all("dynamics"):
             if self._non_negative(dynamics, "friction", 0.0):
                 yield "dry friction"
