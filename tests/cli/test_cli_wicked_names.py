@@ -1,4 +1,4 @@
-"""Names that would act on what shows them: a terminal, a C compiler, a reader of Markdown."""
+"""Names that would act on what shows them: refused with their line; of no effect in C and in old results."""
 
 from __future__ import annotations
 
@@ -10,82 +10,19 @@ from typing import Any
 
 import h5py
 import pytest
-import yaml
 from samples.command_line import REPOSITORY, ROBOT
 from samples.marks import needs_compiler, slow_but
+from samples.wicked import PRINTABLE, UNPRINTABLE, as_yaml, clean
 
 TRAJECTORY = REPOSITORY / "trajectories" / "rest_to_rest.yaml"
-
-PRINTABLE = {
-    "comment": '*/ int main(void){return system("id");} /*',
-    "preprocessor": "arm \\ ??/ //",
-    "markdown": "[a](http://b) <script>x</script> `c` **d** # e",
-    "mathematics": "$\\frac{a}{b}$ _{",
-    "spreadsheet": "=HYPERLINK(1)",
-    "format": "%s %n {0} {name}",
-    "letters": "Ärm 腕",
-    "long": "x" * 200,
-}
-"""Names that are allowed and must do nothing."""
-
-UNPRINTABLE = {
-    "escape": "\x1b[2J\x1b[1;1Hall feasible",
-    "command": "\x1b]0;title\x07",
-    "return": "arm\rINFEASIBLE",
-    "break": "arm\n: 4001 steps, 4 s   OK",
-    "null": "a\x00b",
-    "tab": "a\tb",
-    "c1": "a\x9b31mb",
-    "bidirectional": "a\u202eelbisaefni",
-    "isolate": "a\u2066b\u2069",
-    "separator": "a\u2028b",
-    "zero width": "a\u200bb",
-    "surrogate": "a\ud800b",
-    "long": "x" * 201,
-    "nothing": "",
-}
-"""Names that are refused in files, and shown encoded where an older result holds them."""
-
-
-def quoted(name: str) -> str:
-    """As a YAML scalar; a lone surrogate as its escape."""
-    return json.dumps(name)
 
 
 def renamed(path: Path, folder: Path, name: str) -> Path:
     """A copy of a file whose `name` is another."""
     copy = folder / path.name
     text = path.read_text(encoding="utf-8")
-    copy.write_text(re.sub(r"(?m)^name: .*$", lambda _: f"name: {quoted(name)}", text), encoding="utf-8")
+    copy.write_text(re.sub(r"(?m)^name: .*$", lambda _: f"name: {as_yaml(name)}", text), encoding="utf-8")
     return copy
-
-
-def clean(text: str) -> bool:
-    """Whether a terminal shows every letter as a letter."""
-    return all(letter.isprintable() or letter == "\n" for letter in text)
-
-
-@pytest.mark.parametrize("kind", slow_but({"comment"}, PRINTABLE))
-def test_a_printable_name_goes_everywhere_and_does_nothing(vsacli: Any, tmp_path: Path, kind: str) -> None:
-    name = PRINTABLE[kind]
-    robot, trajectory = (renamed(path, tmp_path, name) for path in (ROBOT, TRAJECTORY))
-    motion = yaml.safe_load(trajectory.read_text(encoding="utf-8"))
-    trajectory.write_text(yaml.safe_dump({**motion, "rate": 25}, allow_unicode=True), encoding="utf-8")
-    for arguments in (
-        ("validate", robot, trajectory),
-        ("info", robot),
-        ("invdyn", robot, trajectory, "-o", "r.h5", "--plot", "figures"),
-        ("info", "r.h5"),
-        ("export", "r.h5"),
-        ("plot", "r.h5", "r.h5", "-o", "compared"),
-        ("codegen", robot, "-o", "code"),
-    ):
-        done = vsacli(*arguments)
-        assert done.code == 0, (arguments, done)
-        assert clean(done.out + done.err)
-    readme = (tmp_path / "code" / "README.md").read_text(encoding="utf-8").splitlines()[0]
-    assert re.sub(r"\\(.)", r"\1", readme) == f"# {name} in C"
-    assert not re.search(r"(?<!\\)[`*\[<]", readme)
 
 
 def bare(code: str) -> str:
@@ -126,7 +63,7 @@ def test_a_description_may_have_lines_but_no_control_characters(vsacli: Any, tmp
     for description, code in (("a\nb " * 200, 0), ("a\x1b[2J", 2)):
         copy = tmp_path / "arm.yaml"
         copy.write_text(
-            re.sub(r"(?m)^description: .*$", lambda _, d=description: f"description: {quoted(d)}", text)
+            re.sub(r"(?m)^description: .*$", lambda _, d=description: f"description: {as_yaml(d)}", text)
         )
         done = vsacli("validate", copy)
         assert done.code == code

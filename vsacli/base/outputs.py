@@ -20,7 +20,7 @@ from vsacli.base.streams import STANDARD
 
 @dataclass(frozen=True)
 class Staged:
-    """A file to be.
+    """A file to be, or a folder of them.
 
     Attributes:
         path: what it is called by the user.
@@ -88,7 +88,7 @@ class Outputs:
         self._overwrite = overwrite
         self._inputs = tuple(inputs)
         self._files: list[Staged] = []
-        self._folders: dict[Path, Path] = {}
+        self._folders: dict[Path, Staged] = {}
         self._temporaries: list[Path] = []
 
     def __enter__(self) -> Self:
@@ -143,8 +143,8 @@ class Outputs:
                 if first.exists():
                     what = "is a file" if first == target else f"{first.name} is a file"
                     raise StorageError(path, f"{what}; name a folder")
-                self._folders[first] = self._staging(first)
-                staged = self._folders[first] / target.relative_to(first)
+                self._folders[first] = Staged(Path(path), first, self._staging(first))
+                staged = self._folders[first].temporary / target.relative_to(first)
             staged.mkdir(parents=True, exist_ok=True)
 
     @property
@@ -154,9 +154,9 @@ class Outputs:
 
     def _in_new_folder(self, target: Path) -> Path | None:
         """Where a file or folder is staged as part of a folder that is new."""
-        for folder, staged in self._folders.items():
-            if target.is_relative_to(folder):
-                return staged / target.relative_to(folder)
+        for folder in self._folders.values():
+            if target.is_relative_to(folder.target):
+                return folder.temporary / target.relative_to(folder.target)
         return None
 
     def _staging(self, target: Path) -> Path:
@@ -187,10 +187,10 @@ class Outputs:
             with reporting_storage_errors(file.path):
                 _sync(file.temporary, os.O_RDWR)
         with interrupts_deferred() as interrupts, contextlib.ExitStack() as undo:
-            for folder, staged in self._folders.items():
-                with reporting_storage_errors(folder):
-                    staged.rename(folder)
-                undo.callback(folder.rename, staged)
+            for folder in self._folders.values():
+                with reporting_storage_errors(folder.path):
+                    folder.temporary.rename(folder.target)
+                undo.callback(folder.target.rename, folder.temporary)
             for file in self._files:
                 if file.temporary in self._temporaries:
                     with reporting_storage_errors(file.path):

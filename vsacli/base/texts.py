@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,11 +10,20 @@ from typing import Any
 _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&$])")
 
 
+MOST_LETTERS = 200
+"""Of a name."""
+
+
 def one_line(text: str) -> str:
     r"""A text in one line: what moves a cursor, or turns letters round, stands as in "\x1b"."""
     if text.isprintable():
         return text
     return "".join(each if each.isprintable() else _escaped(each) for each in text)
+
+
+def as_name(text: str) -> str:
+    """What becomes a name although it was not chosen as one, such as that of a file."""
+    return one_line(text)[:MOST_LETTERS]
 
 
 def for_terminal(text: str) -> str:
@@ -24,6 +34,12 @@ def for_terminal(text: str) -> str:
 def for_comment(text: str) -> str:
     """For a comment in C, which it neither ends nor begins."""
     return one_line(text).replace("*/", "* /").replace("/*", "/ *")
+
+
+def for_yaml(text: str) -> str:
+    """In double quotes, letters as they are if they can be printed; YAML knows no surrogates as JSON does."""
+    quoted = json.dumps(text, ensure_ascii=False)
+    return "".join(each if each.isprintable() else f"\\U{ord(each):08x}" for each in quoted)
 
 
 def for_markdown(text: str) -> str:

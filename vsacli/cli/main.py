@@ -7,7 +7,6 @@ import io
 import os
 import sys
 from collections.abc import Mapping, MutableMapping, Sequence
-from contextlib import suppress
 from typing import Any, NoReturn, cast
 
 import click
@@ -107,9 +106,9 @@ def run(arguments: Sequence[str]) -> int:
         with reporting_stdout_errors():
             code = vsacli.main(args=list(arguments), prog_name="vsacli", standalone_mode=False)
     except click.ClickException as error:
-        with suppress(OSError):
-            error.show()
-        return Exit.USAGE
+        shown = io.StringIO()
+        error.show(shown)
+        return _fail(shown.getvalue().rstrip("\n"), Exit.USAGE)
     except Interrupted as error:
         return _fail(str(error), 128 + error.number)  # as shells call a process that a signal ended
     except (click.Abort, KeyboardInterrupt):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from typing import TypeAlias
 
 import yaml
 
 from vsacli.base.errors import InputError
+from vsacli.base.texts import for_yaml
 
 _Words: TypeAlias = tuple[str, ...]
 
@@ -84,4 +84,4 @@ def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
 
 def _quoted(value: str) -> str:
     """A text as YAML may hold it: words plain, others in quotes."""
-    return value if value.isidentifier() else json.dumps(value, ensure_ascii=False)
+    return value if value.isidentifier() else for_yaml(value)

@@ -10,6 +10,7 @@ from typing import Any
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
+from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.units import DIMENSIONLESS, Quantity
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import ANGLES, BOOLEANS, MAX_LENGTH, evaluate
@@ -33,9 +34,6 @@ ANGLE = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*(deg)?[ \t]*$"
 """How expressions look, for JSON Schema."""
 
 TRUTHS = ("true", "false")
-
-MOST_LETTERS = 200
-"""Of a name."""
 
 PRINTABLE = r"^[^\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
 """How names look, for JSON Schema."""

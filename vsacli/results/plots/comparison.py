@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from vsacli.base.arrays import BoolArray
 from vsacli.base.errors import InputError
+from vsacli.base.texts import one_line
 from vsacli.base.units import POSITION, TORQUE
 from vsacli.base.variables import MOTORS
 from vsacli.results.plots.curves import Failures, read_curves
@@ -163,6 +164,6 @@ def distinct_labels(results: Sequence[StoredResult]) -> list[str]:
 
 _LABELS: tuple[Callable[[StoredResult], str], ...] = (
     lambda result: result.trajectory_name,
-    lambda result: f"{result.trajectory_name} ({Path(result.path).stem})",
-    lambda result: f"{result.trajectory_name} ({result.path})",
+    lambda result: f"{result.trajectory_name} ({one_line(Path(result.path).stem)})",
+    lambda result: f"{result.trajectory_name} ({one_line(str(result.path))})",
 )

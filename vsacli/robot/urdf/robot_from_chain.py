@@ -13,6 +13,7 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError
+from vsacli.base.texts import as_name, one_line
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
 from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Inertia, Joint, Limits, Link, Pose
@@ -72,7 +73,7 @@ def _robot(
     parts = zip(names, chain.joints, frames.rows, links, actuators, strict=True)
     x, y, z = (-STANDARD_GRAVITY * tidy(chain.up, 1.0) + 0.0).tolist()
     return Robot(
-        name=chain.robot_name,
+        name=as_name(chain.robot_name),
         description=_description(path, chain),
         placeholder=True,
         gravity=(x, y, z),
@@ -85,7 +86,7 @@ def _robot(
 def _description(path: str, chain: SerialChain) -> str:
     """Where the robot comes from, and which joints stand elsewhere than at zero without following others."""
     held = [f", {each}" for each in chain.held if each.position != 0 and not each.follows]
-    origin = f"converted from {os.path.basename(path)}, from link {chain.base} to link {chain.tip}"
+    origin = f"converted from {one_line(os.path.basename(path))}, from link {chain.base} to link {chain.tip}"
     return f"{origin}{''.join(held)}"
 
 

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from vsacli.base.texts import for_yaml
 from vsacli.base.units import TORQUE
 from vsacli.documents.fields import Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
 from vsacli.robot.file import FORMAT
@@ -27,8 +28,8 @@ def robot_text(conversion: Conversion) -> str:
         "# A URDF says nothing about motors and springs: replace what is marked as placeholder, then remove",
         "# `placeholder: true`.",
         f"format: {FORMAT}",
-        f"name: {json.dumps(robot.name)}",
-        f"description: {json.dumps(robot.description)}",
+        f"name: {for_yaml(robot.name)}",
+        f"description: {for_yaml(robot.description)}",
         "placeholder: true",
         _commented(f"gravity: {_numbers(robot.gravity)}", "# m/s^2, in the axes of the base link"),
         _commented(f"base: {_pose(robot.base)}", "# DH frame 0 in the base link; m, rad"),

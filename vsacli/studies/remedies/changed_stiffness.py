@@ -8,6 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import STIFFNESS
+from vsacli.base.texts import as_name
 from vsacli.trajectory.curves import ClosedForm
 from vsacli.trajectory.fits import INTERPOLATE
 from vsacli.trajectory.profile import Profile
@@ -55,5 +56,5 @@ def _fixed(trajectory: Trajectory, times: Times, stiffness: Profile) -> Trajecto
         trajectory.position,
         {**trajectory.commanded, STIFFNESS.key: stiffness},
         wrench=trajectory.wrench,
-        name=f"{trajectory.name}-fixed",
+        name=as_name(f"{trajectory.name}-fixed"),
     )

@@ -13,6 +13,7 @@ import numpy as np
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.base.texts import for_yaml
 from vsacli.base.wrench import wrench_columns
 from vsacli.dynamics.inverse import usual_block
 from vsacli.studies.remedies.fixed_robot import robot_text
@@ -87,7 +88,7 @@ def _document(
 ) -> Iterator[str]:
     """Lines of the trajectory file."""
     yield f"format: {FORMAT}\n"
-    yield f"name: {json.dumps(trajectory.name)}\n"
+    yield f"name: {for_yaml(trajectory.name)}\n"
     if None not in formulas.values():
         assert isinstance(trajectory.times, UniformTimes), "see _formulas"
         yield f"duration: {trajectory.times.duration!r}\nrate: {trajectory.times.rate!r}\n"
@@ -107,7 +108,7 @@ def _in_one_line(content: Any) -> str:
             return "[" + ", ".join(map(_in_one_line, content)) + "]"
         case str() if content.isidentifier():
             return content
-    return json.dumps(content)
+    return for_yaml(content) if isinstance(content, str) else json.dumps(content)
 
 
 def _write_table(

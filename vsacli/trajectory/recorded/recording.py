@@ -13,6 +13,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.base.texts import as_name
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
@@ -199,7 +200,7 @@ def recorded_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -
         recording.times,
         profiles[POSITION.key],
         profiles,
-        name=Path(path).stem,
+        name=as_name(Path(path).stem),
         warnings=recording.warnings,
         notes=recording.notes,
         sources=[recording.source],
