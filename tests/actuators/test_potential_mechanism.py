@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import pytest
 from oracles import potential_scan
 from samples.marks import slow_but
 
+from vsacli import load_robot
 from vsacli.actuators.laws import Cubic
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.mechanisms.potentials.potential import Potential, Ranges, Start
@@ -19,6 +21,23 @@ from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
 from vsacli.actuators.mechanisms.ratios.awas import Awas
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.reach import reach_flags
+from vsacli.base.errors import InputError, InvalidRecordError
+
+ROBOT = """
+format: vsacli-robot/1
+name: own
+joints:
+  - name: elbow
+    type: revolute
+    dh: {{a: 0.3, alpha: 0, d: 0, theta: 0}}
+    link: {{mass: 1, com: [0, 0, 0], inertia: {{xx: 0.01, yy: 0.01, zz: 0.01, xy: 0, xz: 0, yz: 0}}}}
+    actuator:
+      type: serial
+      motor: {{inertia: 0.1}}
+      mechanism: {{type: potential, constants: {{k: 5e4, r: 0.5 deg}}, start: {{theta_1: 0, theta_2: 8}},
+        energy: "{}",
+        range: {{phi: 0.8, theta_2: [5, 12]}}}}
+"""
 
 AWAS = Potential(
     energy="k*(r*theta_2)^2*sin(theta_1 - q)^2",
@@ -153,3 +172,175 @@ def assert_ends(ends: np.ndarray, crossings: list[potential_scan.Crossings], ext
             assert abs(end - stiffness[last]) <= 3 * resolution[last]
         else:
             assert math.isnan(end)
+
+
+def random_potential(number: int) -> Potential:
+    """Level curves that wind and fold, and a start somewhere on them."""
+    draw = np.random.default_rng(number).uniform
+    constants = tuple((f"c{index}", float(each)) for index, each in enumerate(draw(-1, 1, 8)))
+    energy = (
+        "10*(2 + c0*sin(2*theta_2) + c1*cos(theta_2))*phi^2*(1 + c2*phi + 2*c3*phi^2)"
+        "+ 3*c4*phi*sin(2*theta_2 + c5) + 2*c6*sin(3*phi + theta_2) + c7*exp(phi*theta_2)"
+    )
+    for _ in range(20):
+        try:
+            return Potential(
+                energy=energy,
+                constants=constants,
+                start=Start(theta_1=float(draw(-0.6, 0.6)), theta_2=float(draw(-1.5, 1.5))),
+                range=Ranges(phi=(-1, 1), theta_2=(-2, 2)),
+            )
+        except InvalidRecordError:
+            continue
+    raise AssertionError("no state of this potential can be the start")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(4))
+def test_no_corridor_reaches_beyond_its_branch(number: int) -> None:
+    """Where a torque has several pieces on the branch it is one of them."""
+    potential = random_potential(number)
+    oracle = potential_scan.Potential(potential.energy, dict(potential.constants))
+    scan = potential_scan.Scan(oracle, 0.0, potential.range.phi, potential.range.theta_2, nodes=400)
+    branch = scan.branch(potential.start.theta_1, potential.start.theta_2)
+    carried = scan.point.tau_e[branch]
+    torques = np.random.default_rng(number).uniform(carried.min(), carried.max(), 60)
+    solution = potential.solve(torques, np.ones(60), np.zeros(60))
+    reached = np.isfinite(solution.lower)
+    assert reached.sum() > 20
+    for index in np.flatnonzero(reached):
+        stiffness, resolution = scan.reached(torques[index], branch)
+        if stiffness.size:
+            assert solution.lower[index] >= stiffness.min() - 3 * resolution[stiffness.argmin()]
+            assert solution.upper[index] <= stiffness.max() + 3 * resolution[stiffness.argmax()]
+        for end, critical in (
+            (solution.lower, solution.lower_critical),
+            (solution.upper, solution.upper_critical),
+        ):
+            assert (
+                critical[index]
+                or end[index] == 0
+                or at_an_end_of_a_range(potential, torques[index], end[index])
+            )
+
+
+def at_an_end_of_a_range(potential: Potential, torque: float, stiffness: float) -> bool:
+    """Whether the branch has this stiffness where phi or theta_2 is at an end of its range."""
+    found = potential.solve(np.array([torque]), np.array([stiffness]), np.zeros(1))
+    ends = zip((found.phi_1[0], found.phi_2[0]), (potential.range.phi, potential.range.theta_2), strict=True)
+    return any(min(abs(at - low), abs(high - at)) < 1e-9 * (high - low) for at, (low, high) in ends)
+
+
+def test_a_sample_is_solved_as_if_it_were_alone() -> None:
+    demand = Demand(2, (0.02, 5), samples=200)
+    together = MACCEPA.solve(*demand.arrays)
+    for part in (slice(0, 1), slice(17, 40)):
+        alone = MACCEPA.solve(*(array[part] for array in demand.arrays))
+        for mine, theirs in zip(alone, together, strict=True):
+            np.testing.assert_array_equal(mine, theirs[part])
+
+
+def test_the_last_torques_are_kept_and_no_others() -> None:
+    tau_e, stiffness, q = Demand(2, (0.02, 5), samples=50).arrays
+    fresh = [replace(MACCEPA).solve(torques, stiffness, q) for torques in (tau_e, -tau_e)]
+    shared = replace(MACCEPA)
+    changed = tau_e.copy()
+    first = shared.solve(changed, stiffness, q)
+    changed *= -1
+    for found, expected in zip((first, shared.solve(changed, stiffness, q)), fresh, strict=True):
+        np.testing.assert_array_equal(found, expected)
+
+
+def test_equal_potentials_are_one_mechanism() -> None:
+    assert replace(AWAS) == AWAS
+    assert hash(replace(AWAS)) == hash(AWAS)
+    assert replace(AWAS, constants=(("k", 50000.0), ("r", 0.02))) != AWAS
+
+
+REFUSED = {
+    "a mistyped word": (
+        {"energy": "k*(r*thta_2)^2*sin(phi)^2"},
+        "energy: unknown word 'thta_2' at character 6; did you mean 'theta_2'?",
+    ),
+    "no closing parenthesis": (
+        {"energy": "k*(r*theta_2)^2*sin(phi"},
+        "energy: expected an operator or ), found the end at character 24",
+    ),
+    "nested without end": ({"energy": "(" * 500}, "energy: nested deeper than 200 levels at character 201"),
+    "endless": ({"energy": "k+r+" * 1000}, "energy: longer than 2000 characters"),
+    "an idle constant": (
+        {"constants": (("k", 5.0), ("r", 0.01), ("b", 1.0))},
+        "constants.b: does not occur in the energy",
+    ),
+    "a constant called q": (
+        {"constants": (("k", 5.0), ("r", 0.01), ("q", 1.0))},
+        "constants.q: has a meaning of its own in the energy; choose another name",
+    ),
+    "a constant that is no word": (
+        {"constants": (("k", 5.0), ("r", 0.01), ("b-c", 1.0))},
+        "constants.b-c: is no word: letters, digits and _, of which the first is no digit",
+    ),
+    "an infinite constant": ({"constants": (("k", math.inf), ("r", 0.01))}, "constants.k: must be finite"),
+    "no second motor": ({"energy": "k*r*phi^2"}, "energy: does not depend on theta_2"),
+    "no link": ({"energy": "k*r*theta_1*theta_2"}, "energy: does not depend on q"),
+    "a range without width": (
+        {"range": Ranges(phi=(0, 0), theta_2=(5, 12))},
+        "range.phi: must have two finite ends, the lower one first",
+    ),
+    "a start outside": (
+        {"start": Start(theta_1=0, theta_2=13)},
+        "start.theta_2: must lie within the range of theta_2, 5 to 12, not at 13",
+    ),
+    "a negative stiffness": (
+        {"energy": "-k*(r*theta_2)^2*phi^2"},
+        "start: the stiffness, the second derivative over q, must be positive here, not -640; choose",
+    ),
+    "a constant stiffness": (
+        {"energy": "k*phi^2 + r*theta_2*phi"},
+        "start: the matrix A is singular here: motors that keep the torque cannot change the stiffness; ",
+    ),
+    "a kink at the start": (
+        {"energy": "k*r*theta_2^2*(phi^2)^1.5"},
+        "start: the energy or one of its first four derivatives is no finite number here; choose",
+    ),
+    "a division by zero": (
+        {"energy": "k*(r*theta_2)^2*phi^2/0"},
+        "start: the energy or one of its first four derivatives is no finite number here; choose",
+    ),
+    "a root of a negative number": (
+        {"energy": "(-2)^0.5*k*(r*theta_2)^2*phi^2"},
+        "start: the energy or one of its first four derivatives is no finite number here; choose",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_refused_and_why(case: str) -> None:
+    changes, message = REFUSED[case]
+    with pytest.raises(InvalidRecordError) as refused:
+        replace(AWAS, **changes)
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("written", "message"),
+    [
+        ("k*(r*thta_2)^2*phi^2", "13: mechanism: energy: unknown word 'thta_2' at character 6; did you mean"),
+        ("k*(r*theta_2)^2*phi^", "13: mechanism: energy: expected a number, a word or (, found the end"),
+    ],
+)
+def test_messages_say_file_and_line(written: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "own.yaml").write_text(ROBOT.format(written))
+    with pytest.raises(InputError) as refused:
+        load_robot(tmp_path / "own.yaml")
+    assert f"own.yaml:{message}" in str(refused.value)
+
+
+def test_constants_may_be_expressions_and_angles(tmp_path: Path) -> None:
+    (tmp_path / "own.yaml").write_text(ROBOT.format("k*(r*theta_2)^2*phi^2"))
+    mechanism = load_robot(tmp_path / "own.yaml").joints[0].actuator.mechanism
+    assert mechanism.constants == (("k", 50000.0), ("r", math.radians(0.5)))
+    changed = load_robot(tmp_path / "own.yaml").replace(
+        "joints.0.actuator.mechanism.constants", {"k": 40000, "r": 0.01}
+    )
+    assert changed.joints[0].actuator.mechanism.constants == (("k", 40000.0), ("r", 0.01))

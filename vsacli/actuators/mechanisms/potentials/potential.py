@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -84,10 +85,10 @@ class Potential(Mechanism):
         check_fields(self, *self._problems())
 
     @classmethod
-    def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
+    def example(cls, joint_type: str) -> dict[str, Any]:
         """A spring on an arm whose length motor 2 sets."""
         return {
-            "energy": "k/2 * (r*theta_2)^2 * sin(phi)^2",
+            "energy": f"k/2 * (r*theta_2)^2 * {'sin(phi)^2' if joint_type == 'revolute' else 'phi^2'}",
             "constants": {"k": 100000, "r": 0.01},
             "start": {"theta_1": 0, "theta_2": 8},
             "range": {"phi": [-0.7, 0.7], "theta_2": [5, 12]},
@@ -128,27 +129,17 @@ class Potential(Mechanism):
 
     def _word_problems(self) -> Iterator[FieldProblem]:
         constants = dict(self.constants)
-        for name in constants:
-            if not _WORD.fullmatch(name):
-                yield FieldProblem(
-                    ("constants", name), "must be made of letters, digits and _, not beginning with a digit"
-                )
-            elif name in RESERVED:
-                yield FieldProblem(
-                    ("constants", name), "has a meaning of its own in the energy; choose another name"
-                )
-        if RESERVED.intersection(constants):
+        wrong = {name: reason for name in constants if (reason := _why_no_word(name))}
+        yield from (FieldProblem(("constants", name), reason) for name, reason in wrong.items())
+        if wrong:
             return
         try:
             names = read_energy(self.energy, constants).names
         except ExpressionError as error:
             yield FieldProblem(("energy",), str(error))
             return
-        yield from (
-            FieldProblem(("constants", name), "does not occur in the energy")
-            for name in constants
-            if name not in names
-        )
+        for name in (name for name in constants if name not in names):
+            yield FieldProblem(("constants", name), "does not occur in the energy")
         for needed in (("theta_2",), ("theta_1", "phi"), ("q", "phi")):
             if names.isdisjoint(needed):
                 yield FieldProblem(("energy",), f"does not depend on {needed[0]}")
@@ -157,8 +148,8 @@ class Potential(Mechanism):
         at_start = {"phi": self.start.theta_1, "theta_2": self.start.theta_2}
         for name, position in at_start.items():
             low, high = getattr(self.range, name)
-            if not low < high:
-                yield FieldProblem(("range", name), "must have two ends, the lower one first")
+            if not -math.inf < low < high < math.inf:
+                yield FieldProblem(("range", name), "must have two finite ends, the lower one first")
             elif not low < position < high:
                 motor = "theta_1" if name == "phi" else name
                 reason = f"must lie within the range of {name}, {low:g} to {high:g}, not at {position:g}"
@@ -172,9 +163,7 @@ class Potential(Mechanism):
             at_start = np.array([[self.start.theta_1, self.start.theta_2, 0.0]])
             known = self._potential.derivatives(at_start, ACCELERATIONS).finite
         if not known.all():
-            reason = (
-                "the energy or one of its derivatives, of which four are needed, is no finite number here"
-            )
+            reason = "the energy or one of its first four derivatives is no finite number here"
         elif stiffness <= 0:
             reason = f"the stiffness, the second derivative over q, must be positive here, not {stiffness:g}"
         elif not sine > LEAST_START_SINE:
@@ -190,3 +179,10 @@ class Potential(Mechanism):
         start = self._branch.start
         solution = self.solve(start.tau_e, start.stiffness, np.zeros(1))
         return bool((solution.lower < solution.upper)[0])
+
+
+def _why_no_word(name: str) -> str:
+    """Why no constant may have a name; empty if one may."""
+    if not _WORD.fullmatch(name):
+        return "is no word: letters, digits and _, of which the first is no digit"
+    return "has a meaning of its own in the energy; choose another name" if name in RESERVED else ""
