@@ -127,6 +127,19 @@ def test_units_and_sides_of_the_gear_are_converted(computed, tmp_path):
     assert [signal.gain for signal in found.signals] == pytest.approx([1, 1, 1], abs=1e-3)
 
 
+def test_currents_are_compared(vsacli, tmp_path):
+    (tmp_path / "wave.yaml").write_text(MOTION)
+    driven = ("motor: {inertia: 3.20", "motor: {gear_ratio: 50, torque_constant: 0.1, inertia: 1.28e-3")
+    edited(ROBOT, tmp_path / "robot.yaml", driven)
+    assert vsacli("invdyn", "robot.yaml", "wave.yaml", "-o", "r.h5").code == 0
+    printed = vsacli("export", "r.h5", "--variables", "q,current").out
+    (tmp_path / "m.csv").write_text(printed.replace("base.current_1", "base.current_1 [mA]"))
+    found = {signal.column: signal for signal in compare(tmp_path / "r.h5", tmp_path / "m.csv").signals}
+    assert found["base.current_1"].gain == pytest.approx(1e-3)
+    assert found["base.current_2"].gain == pytest.approx(1)
+    assert found["base.current_2"].unit == "A"
+
+
 def test_report_figures_and_json(vsacli, computed, tmp_path):
     written(tmp_path / "m.csv", recorded(computed))
     done = vsacli("compare", "r.h5", "m.csv", "--plot", "figures")

@@ -28,6 +28,12 @@ BASES: dict[str, tuple[float, dict[str, int]]] = {
     "Nm": (1.0, {"N": 1, "m": 1}),
     "mNm": (1e-3, {"N": 1, "m": 1}),
     "Nmm": (1e-3, {"N": 1, "m": 1}),
+    "J": (1.0, {"N": 1, "m": 1}),
+    "W": (1.0, {"N": 1, "m": 1, "s": -1}),
+    "A": (1.0, {"A": 1}),
+    "mA": (1e-3, {"A": 1}),
+    "V": (1.0, {"V": 1}),
+    "mV": (1e-3, {"V": 1}),
 }
 """Size in SI and dimensions of each symbol; an angle counts as a dimension, so that N m is not N m/rad."""
 

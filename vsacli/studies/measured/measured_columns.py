@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
@@ -114,7 +113,7 @@ def known_columns(result: StoredResult) -> dict[str, Place]:
 def _names(result: StoredResult, variable: Variable) -> Iterator[tuple[str, Place]]:
     """Names of the columns of a variable, of those joints and motors that have it."""
     of_motors = "motor" in variable.dims
-    for joint, there in enumerate(existing(variable, result.actuators)):
+    for joint, there in enumerate(result.existing(variable)):
         unit = variable.quantity.unit(result.joint_types[joint])
         for number in (motor for motor, exists in zip(MOTORS, there, strict=False) if exists):
             motor = number if of_motors else None

@@ -105,8 +105,8 @@ def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Dual]]) -> An
     """A record or list with other numbers at some paths."""
     inside: dict[str | int, list[tuple[NumberPath, Dual]]] = {}
     for path, dual in places:
-        if not path:
-            return dual
+        if not path:  # of a pair of numbers that are one, both
+            return (dual,) * len(content) if isinstance(content, tuple) else dual
         word = path[0].number if isinstance(path[0], Entry) else path[0]
         inside.setdefault(word, []).append((path[1:], dual))
     if isinstance(content, tuple):
