@@ -16,9 +16,9 @@ from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.pairs.decoupling_matrix import Sides, beta, determinant, solve
+from vsacli.actuators.pairs.decoupling_matrix import beta, determinant, solve
 from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
-from vsacli.actuators.reach import Reach, reach
+from vsacli.actuators.reach import Reach, deflections_within_reach
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
@@ -128,24 +128,21 @@ class Antagonistic(Actuator):
     def transmit(self, command: Command, near_singular: float, integrated: FloatArray | None) -> Transmission:
         """Deflections on the actuator's branch, their rates, and motor accelerations."""
         solution = self.solve(command.tau_e, command.commanded["stiffness"], command.q)
-        reached = reach(command.commanded["stiffness"], solution, near_singular)
-        phi = (solution.phi_1, solution.phi_2)  # (61)
-        if integrated is not None:
-            phi = (integrated[0], integrated[1])
-            reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
+        stiffness = command.commanded["stiffness"]
+        phi, reached = deflections_within_reach(stiffness, solution, near_singular, integrated)
         moved = self._moved(command, solution, reached, phi)
         return moved if self.coupling is None else _coupled(moved, self.coupling)
 
     def _moved(
-        self, command: Command, solution: PairSolution, reached: Reach, deflections: Sides
+        self, command: Command, solution: PairSolution, reached: Reach, phi: FloatArray
     ) -> Transmission:
         """Motion of both motors and torques of both springs at given deflections, (62)-(72).
 
         NaN where the step is infeasible; what needs the inverse of A also where it is singular.
         """
-        phi_1, phi_2 = (np.where(reached.infeasible, np.nan, phi) for phi in deflections)
-        first, second = self.laws
-        (energy_1, one), (energy_2, two) = first.energy_and_state(phi_1), second.energy_and_state(phi_2)
+        (energy_1, one), (energy_2, two) = (
+            law.energy_and_state(side) for law, side in zip(self.laws, phi, strict=True)
+        )
         det_a = determinant(one, two)  # (67)
         divisor = np.where(reached.singular, np.nan, det_a)
         dphi = solve(one, two, divisor, command.dtau_e, command.commanded["dstiffness"])  # (68)
@@ -155,7 +152,7 @@ class Antagonistic(Actuator):
             stiffness=command.commanded["stiffness"],
             dstiffness=command.commanded["dstiffness"],
             ddstiffness=command.commanded["ddstiffness"],
-            phi=np.stack((phi_1, phi_2)),
+            phi=phi,
             dphi=np.stack(dphi),
             ddtheta=np.stack(ddtheta),
             tau_spring=np.stack((one.tau, two.tau)),

@@ -56,6 +56,20 @@ def reach(
     )
 
 
+def deflections_within_reach(
+    stiffness: FloatArray, solution: PairSolution, near_singular: float, integrated: FloatArray | None
+) -> tuple[FloatArray, Reach]:
+    """Deflections (61), (2, samples), NaN where the step is infeasible, and the reach of the steps.
+
+    Integrated deflections take the place of those of the solution; a step where they are NaN is infeasible.
+    """
+    reached = reach(stiffness, solution, near_singular)
+    if integrated is not None:
+        reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
+    phi = solution.deflections if integrated is None else integrated
+    return np.where(reached.infeasible, np.nan, phi), reached
+
+
 def reach_flags(
     stiffness: FloatArray, solution: PairSolution, near_singular: float = NEAR_SINGULAR_MARGIN
 ) -> FlagArray:

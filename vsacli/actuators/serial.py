@@ -20,7 +20,7 @@ from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.mechanisms.mechanism import Mechanism
 from vsacli.actuators.mechanisms.state import MechanismState
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import reach
+from vsacli.actuators.reach import deflections_within_reach
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -141,12 +141,7 @@ class Serial(Actuator):
             command.commanded[name] for name in ("stiffness", "dstiffness", "ddstiffness")
         )
         solution = self.solve(command.tau_e, stiffness, command.q)
-        reached = reach(stiffness, solution, near_singular)
-        phi = solution.deflections
-        if integrated is not None:
-            phi = integrated
-            reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
-        phi = np.where(reached.infeasible, np.nan, phi)
+        phi, reached = deflections_within_reach(stiffness, solution, near_singular, integrated)
         state = self._state(phi, command.q)
         rates = np.where(
             reached.singular[..., None], np.nan, state.rates(command.dtau_e, dstiffness, command.dq)
