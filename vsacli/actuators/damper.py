@@ -8,18 +8,25 @@ from typing import Any
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem
-from vsacli.documents.fields import check_fields, choice, interval
+from vsacli.documents.fields import check_fields, choice, interval, number
 
-LOCATIONS = ("link",)
+LOCATIONS = ("link", "transmission")
 
 
 @dataclass(frozen=True)
 class Damper:
     """A damper whose damping a trajectory commands as it does a stiffness."""
 
-    location: str = choice(LOCATIONS, "between the links of the joint", not_yet=("transmission",))
+    location: str = choice(LOCATIONS, "between the links of the joint, or beside its springs")
     range: tuple[float, float] = interval(
         units.DAMPING, "damping that it can have, from zero or above; flagged beyond"
+    )
+
+    start: float | None = number(
+        units.POSITION,
+        "sum of the deflections beside it at the first step, if it lies beside springs; by default that at "
+        "which these carry the joint alone",
+        default=None,
     )
 
     @staticmethod
@@ -33,4 +40,7 @@ class Damper:
         if not (lower >= 0 and math.isfinite(upper)):
             reason = f"must be [lower, upper] with 0 <= lower, such as [0, {abs(upper):g}]"
             problems.append(FieldProblem(("range",), reason))
+        if self.start is not None and self.location == "link":
+            reason = "a damper between the links moves with them; leave it out"
+            problems.append(FieldProblem(("start",), reason))
         check_fields(self, *problems)

@@ -84,6 +84,10 @@ class _State(ElasticState):
         """Zeta phi'; of a linear spring zero, not -0."""
         return self._one.zeta * dphi[..., 0] + 0.0
 
+    def stiffness_curvature(self, dphi: FloatArray) -> FloatArray:
+        """Eta phi'^2."""
+        return self._one.eta * dphi[..., 0] * dphi[..., 0]
+
     def motor_accelerations(
         self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
     ) -> FloatArray:

@@ -14,7 +14,7 @@ from vsacli.dynamics.inverse import Stop
 
 COUNTED = {
     "infeasible": Flag.INFEASIBLE,
-    "singular": Flag.SINGULAR,
+    "singular": Flag.SINGULAR | Flag.INTERNAL_INSTABILITY,
     "near_singular": Flag.NEAR_SINGULAR,
     "slack": Flag.SLACK,
     "over_limit": LIMITS,

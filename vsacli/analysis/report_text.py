@@ -179,6 +179,14 @@ def _not_finite(joint: JointReport, worst: Worst) -> str:
     )
 
 
+def _unstable(joint: JointReport, worst: Worst) -> str:
+    return (
+        f"what moves inside its transmission is unstable from t = {time_text(worst.time)} on: its damper "
+        f"carries {number(worst.value)} {worst.unit} that the springs cannot; raise the stiffness "
+        f"({_steps(joint, 'singular')})"
+    )
+
+
 def _limit(joint: JointReport, worst: Worst) -> str:
     return f"{excess(worst)} (first at {time_text(joint.first_time[worst.kind])})"
 
@@ -196,6 +204,7 @@ _SENTENCES = {
     "infeasible": _infeasible,
     "singular": _singular,
     "near_singular": _near_singular,
+    "internal_instability": _unstable,
 }
 
 

@@ -17,6 +17,7 @@ from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, has
+from vsacli.base.units import time_text
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, Tell, choose, unheard
 from vsacli.dynamics.energy import RunEnergy
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from vsacli.analysis.result import Result
     from vsacli.analysis.run_uncertainty import RunUncertainty
     from vsacli.dynamics.integrated_deflections import IntegratedDeflections
+    from vsacli.dynamics.internal_motion import InternalMotions
 
 DEFLECTIONS = ("root", "integrate")
 """How deflections are found: as the root of (14) at each step, or from that of the first step by (19)."""
@@ -84,7 +86,9 @@ class Run:
         self._block_samples = usual_block(len(robot.joints)) if block_samples is None else block_samples
         self._deflections = _integrated(deflections, robot, trajectory)
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        kernel = InverseDynamics(robot, frame, near_singular, integrated=self._deflections is not None)
+        self._internal = _internal_motions(robot, trajectory)
+        inside = () if self._internal is None else self._internal.joints
+        kernel = InverseDynamics(robot, frame, near_singular, self._deflections is not None, inside)
         self.choice = choose(engine, kernel, trajectory.samples, threads, tell)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
@@ -112,7 +116,10 @@ class Run:
 
     def _compute(self, motion: Motion) -> Block:
         integrated = None if self._deflections is None else self._deflections.at(motion.time)
-        return compute_block(self.robot, motion, self._near_singular, integrated, self.choice.engine)
+        internal = {} if self._internal is None else self._internal.at(motion.time - self.trajectory.start)
+        return compute_block(
+            self.robot, motion, self._near_singular, integrated, self.choice.engine, internal
+        )
 
     def _judged(self, block: Block) -> Block:
         """With the limits that are exceeded beyond what recorded signals leave uncertain."""
@@ -160,7 +167,7 @@ class Run:
             duration=self.trajectory.duration,
             complete=complete,
             warnings=(*self.robot.warnings, *self.trajectory.warnings),
-            notes=(*self.trajectory.notes, *self._between.notes),
+            notes=(*self.trajectory.notes, *self._between.notes, *self._internal_stops()),
             self_check=self._self_check(),
             joints=tuple(
                 summary.report(*of_joint, complete=complete)
@@ -173,10 +180,17 @@ class Run:
     def _uncertainties(self) -> Sequence[JointUncertainty | None]:
         return [None] * len(self._summaries) if self._uncertainty is None else self._uncertainty.report()
 
+    def _internal_stops(self) -> Iterator[str]:
+        """Where motions inside damped transmissions end before the trajectory does."""
+        for index, stop in self._internal.stops.items() if self._internal is not None else ():
+            joint = self.robot.joint_names[index]
+            when = f"cannot go on beyond t = {time_text(stop.time)}"
+            yield f"{joint}: what moves inside its damped transmission {when}: {stop.reason}"
+
     def _self_check(self) -> SelfCheck:
         """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
         bound = SPRING_BOUND if self._deflections is None else DRIFT_BOUND
-        error, error_bound = ladder(self.robot, self.trajectory, self.choice.engine)
+        error, error_bound = ladder(self.robot, self.trajectory, self.choice.engine, self._internal)
         return SelfCheck(self._spring_residual, error, bound, error_bound)
 
 
@@ -231,6 +245,15 @@ def _integrated(
     return integrate_deflections(robot, trajectory)
 
 
+def _internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions | None:
+    """What moves inside damped transmissions; None if there are none."""
+    if not any(joint.damper_at("transmission") for joint in robot.joints):
+        return None
+    from vsacli.dynamics.internal_motion import internal_motions
+
+    return internal_motions(robot, trajectory)
+
+
 def _uncertainty(
     robot: Robot, trajectory: Trajectory, asked: Collection[str], engine: Engine
 ) -> RunUncertainty | None:
@@ -247,7 +270,7 @@ def _drift_summaries(robot: Robot, deflections: IntegratedDeflections) -> list[D
     return [
         DriftSummary(joint, index, stop)
         for index, (joint, stop) in enumerate(pairs)
-        if joint.actuator.integrable
+        if joint.actuator.integrable and joint.damper_at("transmission") is None
     ]
 
 

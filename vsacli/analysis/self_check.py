@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.dynamics.internal_motion import InternalMotions
 
 SPRING_BOUND = 1e-11
 """Bound on the scaled residual of (14); solutions reach 1e-15, and 1e-12 is asked of them."""
@@ -124,23 +128,37 @@ def spring_residual(robot: Robot, block: Block) -> float:
         tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
         carried = joint.actuator.carried(of_joint)
         size = np.maximum(carried.size, np.finfo(float).tiny)
+        if joint.damper_at("transmission"):  # whose torque may be zero where nothing else is small
+            size = np.maximum(size, np.maximum(size, np.abs(tau_e)).max(initial=0.0))
+            tau_e = tau_e - of_joint["tau_damper"]
         errors += [np.abs(carried.tau_e - tau_e) / size, np.abs(carried.stiffness - stiffness) / stiffness]
     return float(np.max(np.concatenate([np.zeros(1), *errors])))
 
 
-def ladder(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> tuple[float, float]:
+def ladder(
+    robot: Robot,
+    trajectory: Trajectory,
+    engine: Engine = NUMPY,
+    internal: InternalMotions | None = None,
+) -> tuple[float, float]:
     """Largest error of a derivative of `RUNGS` against first differences, relative to its peak; its bound.
 
     Differences are taken at about 200 times with steps of their own, over which the trajectory is analytic.
     Motor motion is compared where it is smooth over the difference. Of the errors that is the largest which
-    is nearest to, or farthest beyond, what rounding admits with its step. The engine is that of the run.
+    is nearest to, or farthest beyond, what rounding admits with its step. The engine is that
+    of the run, and so is what moves inside damped transmissions.
     """
     trajectory = trajectory.from_zero()
     times, reach = trajectory.check_points(PROBES)
     steps = np.minimum(reach / 3, trajectory.duration / 500)
-    errors, everywhere = _ladder(robot, trajectory, engine, times, FIRST_SCALES[:, None] * steps)
+
+    def compute(time: FloatArray) -> Block:
+        inside = {} if internal is None else internal.at(time)
+        return compute_block(robot, trajectory.at(time), engine=engine, internal=inside)
+
+    errors, everywhere = _ladder(robot, trajectory, compute, times, FIRST_SCALES[:, None] * steps)
     if not (everywhere and errors.max() <= CLEAR):
-        errors, _ = _ladder(robot, trajectory, engine, times, STEP_SCALES[:, None] * steps)
+        errors, _ = _ladder(robot, trajectory, compute, times, STEP_SCALES[:, None] * steps)
     rounding = ROUNDING_GAIN * np.finfo(float).eps * trajectory.duration / (FIRST_SCALES[-1] * steps)
     bounds = np.maximum(LADDER_BOUND, rounding)
     worst = int(np.argmax(errors / bounds))
@@ -148,19 +166,23 @@ def ladder(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> tupl
 
 
 def _ladder(
-    robot: Robot, trajectory: Trajectory, engine: Engine, times: FloatArray, steps: FloatArray
+    robot: Robot,
+    trajectory: Trajectory,
+    compute: Callable[[FloatArray], Block],
+    times: FloatArray,
+    steps: FloatArray,
 ) -> tuple[FloatArray, bool]:
     """The errors at times by the best of some difference steps; whether all motors were compared at each.
 
     Args:
         robot: the robot.
         trajectory: what it is asked to do.
-        engine: what computes.
+        compute: gives everything at times.
         times: (times,), s.
         steps: (scales, times), s.
     """
     grid = times + steps[:, None, :] * np.arange(-3, 4)[None, :, None]
-    block = compute_block(robot, trajectory.at(grid.ravel()), engine=engine)
+    block = compute(grid.ravel())
     smooth = _motors_move_smoothly(block, grid.shape)
 
     def on_grid(name: str) -> FloatArray:

@@ -18,7 +18,7 @@ from vsacli.dynamics.inverse import Stop
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
 
-REACH = {kind: COUNTED[kind] for kind in ("infeasible", "singular", "near_singular")}
+REACH = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "near_singular": Flag.NEAR_SINGULAR}
 """Kinds of trouble whose worst step is the one with the smallest margin."""
 
 
@@ -50,6 +50,7 @@ class JointSummary:
         self._end = np.stack(_motors_at(block, -1, index))
         self._count(flags, block.time)
         self._record_not_finite(flags, block.time)
+        self._record_instability(flags, block)
         self._add_bounded(block)
         least, most = self._stiffness
         self._stiffness = (
@@ -182,6 +183,18 @@ class JointSummary:
         if hit.any():
             unit = VARIABLES["stiffness"].quantity.unit(self._joint.type)
             self._keep(0.0, Worst("singular", float(time[hit.argmax()]), 0.0, math.nan, unit))
+
+    def _record_instability(self, flags: FlagArray, block: Block) -> None:
+        """The first step counts: from there on it grows."""
+        hit, label = has(flags, Flag.INTERNAL_INSTABILITY), Flag.INTERNAL_INSTABILITY.label
+        if hit.any() and label not in self._first_time:
+            step = int(hit.argmax())
+            self._first_time[label] = first = float(block.time[step])
+            unit, torque = (
+                VARIABLES["tau_e"].quantity.unit(self._joint.type),
+                block.tau_damper[step, self._index],
+            )
+            self._keep(0.0, Worst(label, first, float(torque), math.nan, unit))
 
     def _record_limits(self, flags: FlagArray, block: Block) -> None:
         values = block.of_joint(self._index)

@@ -99,9 +99,15 @@ def position_order(robot: Robot, plant: Plant) -> int:
     """Order of the error dynamics (33a) of a robot's position.
 
     Raises:
-        InputError: the robot mixes rigid joints with others, for which there is no such law.
+        InputError: the robot mixes rigid joints with others, or a transmission is damped: there is none.
     """
     sprung = plant.drivetrain.sprung
+    damped = [joint.name for joint in robot.joints if joint.damper_at("transmission")]
+    if damped:
+        raise InputError.one(
+            "feedback linearization sets the fourth derivative of each joint, but motors act on the third "
+            f"where a damper lies parallel to the springs ({', '.join(damped)}); use feedforward"
+        )
     if sprung.any() and not sprung.all():
         raise InputError.one(_mixed(robot, plant))
     return POSITION_ORDER if sprung.all() else RIGID_ORDER

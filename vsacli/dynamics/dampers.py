@@ -6,16 +6,18 @@ from each motor that a spring lies behind to the link, as the springs pass their
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.signals import DAMPING
+from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.vector import Scalar, add, mul
 from vsacli.dynamics.recursion import TorqueDerivatives
+from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
 
@@ -34,6 +36,31 @@ def damper_torque(
         dtau=add(mul(d_d, v), mul(d, dv)),
         ddtau=add(add(mul(dd_d, v), mul(2, mul(d_d, dv))), mul(d, ddv)),
     )
+
+
+def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[Scalar]:
+    """Velocity of each damper of a joint, from its own and those of the deflections; or accelerations."""
+    if joint.damper_at("link"):
+        return [dq]
+    return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
+
+
+def motor_torques(robot: Robot, block: Block) -> tuple[FloatArray, FloatArray] | None:
+    """What dampers exert against the motors, and its rate, each (joints, 2, samples); None if none does."""
+    damped = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
+    if not damped:
+        return None
+    torque, rate = np.zeros((2, *by_joint(block.theta).shape))
+    for index in damped:
+        of_joint = block.of_joint(index)
+        damping, d_damping, dphi, ddtheta = (
+            of_joint[name] for name in ("damping", "ddamping", "dphi", "ddtheta")
+        )
+        for motor, there in enumerate(robot.joints[index].actuator.has(VARIABLES["phi"])):
+            if there:
+                torque[index, motor] = damping * dphi[motor]
+                rate[index, motor] = d_damping * dphi[motor] + damping * (ddtheta[motor] - of_joint["ddq"])
+    return torque, rate
 
 
 class Passed(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.limit_check import OfJoint
-from vsacli.actuators.transmission import Command
+from vsacli.actuators.transmission import Command, Transmission
 from vsacli.actuators.windings import Windings
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, finite, has, not_finite_flags
@@ -19,6 +19,9 @@ from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
+
+if TYPE_CHECKING:
+    from vsacli.actuators.damped_springs import InternalMotion
 
 
 class Drive(NamedTuple):
@@ -61,6 +64,7 @@ def drive(
     command: Command,
     near_singular: float = NEAR_SINGULAR_MARGIN,
     integrated: FloatArray | None = None,
+    internal: InternalMotion | None = None,
 ) -> Drive:
     """Motor motion and motor torques of a joint, (61)-(74).
 
@@ -70,8 +74,9 @@ def drive(
         near_singular: margin below which a step is near-singular.
         integrated: deflections of a joint to use instead of the root of (14), (2, samples); a
             step where they are NaN is infeasible.
+        internal: what moves inside a transmission that is damped.
     """
-    driven = driven_by(joint, command, near_singular, integrated)
+    driven = driven_by(joint, command, near_singular, integrated, internal)
     of_joint = {**command.arrays(), **driven.arrays()}
     exceeded = limit_flags(joint, of_joint, np.zeros_like(driven.flags))
     unexplained = not_finite_flags(_not_finite(joint, of_joint))
@@ -79,11 +84,18 @@ def drive(
 
 
 def driven_by(
-    joint: Joint, command: Command, near_singular: float, integrated: FloatArray | None = None
+    joint: Joint,
+    command: Command,
+    near_singular: float,
+    integrated: FloatArray | None = None,
+    internal: InternalMotion | None = None,
 ) -> Drive:
     """As `drive`, with the flags of reach alone; also with scalars that carry derivatives along."""
     actuator = joint.actuator
-    transmission = actuator.transmit(command, near_singular, integrated)
+    if internal is None:
+        transmission = actuator.transmit(command, near_singular, integrated)
+    else:
+        transmission = _damped(actuator, command, near_singular, internal)
     dtheta = actuator.motor_positions(transmission.dphi, command.dq)  # (69)
     motors = actuator.motors
     damping = _by_motor([motor.damping for motor in motors])
@@ -92,6 +104,9 @@ def driven_by(
     friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
     if friction is not None:
         tau_motor = tau_motor + friction.with_axis_behind().torque(dtheta)
+    tau_damper, beside = _damper_torques(joint, command, transmission.dphi)
+    if beside is not None:
+        tau_motor = tau_motor + beside
     windings = Windings.of(actuator.sides)
     electrical: dict[str, Any] = (
         {} if windings is None else windings.with_axis_behind().variables(tau_motor, dtheta)
@@ -102,9 +117,31 @@ def driven_by(
         dtheta=dtheta,
         tau_motor=tau_motor,
         motor_power=tau_motor * dtheta,
-        tau_damper=command.commanded[DAMPING.key] * command.dq if joint.damper else None,
+        tau_damper=tau_damper,
     )._replace(**electrical)
     return driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
+
+
+def _damped(
+    actuator: Actuator, command: Command, near_singular: float, internal: InternalMotion
+) -> Transmission:
+    from vsacli.actuators.damped_springs import DampedSprings
+
+    return DampedSprings(actuator).transmit(command, internal, near_singular)
+
+
+def _damper_torques(
+    joint: Joint, command: Command, dphi: FloatArray
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """What a damper exerts on the link, (samples,), and what against each motor, (2, samples), if it does."""
+    if joint.damper is None:
+        return None, None
+    damping = command.commanded[DAMPING.key]
+    if joint.damper_at("link"):
+        return damping * command.dq, None
+    behind = joint.actuator.has(VARIABLES["phi"])
+    passed = [damping * rate if there else 0 * damping for rate, there in zip(dphi, behind, strict=True)]
+    return passed[0] + passed[1], np.stack(passed)
 
 
 def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray, by_joint, over_time
 from vsacli.base.json_records import Stored, named
 from vsacli.base.variables import VARIABLES, Block
+from vsacli.dynamics.dampers import motor_torques
 from vsacli.dynamics.losses import LossMeter
 from vsacli.dynamics.quadrature import integrals, positive_part, work_on_each_other
 from vsacli.robot.model import Robot
@@ -176,6 +177,9 @@ class RunEnergy:
         torque += tau_spring
         rate = self._damping * ddtheta
         rate += spring_rates(self._robot, block)
+        if dampers := motor_torques(self._robot, block):
+            torque += dampers[0]
+            rate += dampers[1]
         rate *= dtheta
         rate += torque * ddtheta
         torque *= dtheta

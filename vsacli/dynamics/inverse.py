@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,8 +31,15 @@ from vsacli.trajectory.devices import with_uncommanded_devices
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
+if TYPE_CHECKING:
+    from vsacli.actuators.damped_springs import InternalMotion
+
 COMPUTED = (*TORQUES, *Drive._fields, "dissipated_power")
 """The variables that inverse dynamics computes, where the robot has them."""
+
+
+INTERNAL = ("internal_phi", "internal_velocity", "internal_acceleration")
+"""Rows that say what moves inside damped transmissions, as the fields of `InternalMotion`."""
 
 
 def usual_block(joints: int) -> int:
@@ -61,6 +68,8 @@ class InverseDynamics(RowKernel):
         frame: of the wrench; None if there is none.
         near_singular: margin below which a step is near-singular.
         integrated: whether deflections are given, else they are solved for.
+        internal: the joints whose transmission is damped, by index: what moves inside them is given.
+        driven: whether of that the deflections alone are given, and their rates follow from the damping.
         limits: those of each joint, since springs compare equal whatever their limits.
     """
 
@@ -68,6 +77,8 @@ class InverseDynamics(RowKernel):
     frame: str | None = None
     near_singular: float = NEAR_SINGULAR_MARGIN
     integrated: bool = False
+    internal: tuple[int, ...] = ()
+    driven: bool = False
     limits: tuple[tuple[LimitCheck, ...], ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -86,7 +97,10 @@ class InverseDynamics(RowKernel):
         names = (name for signal in self.robot.signals for name in signal.names)
         commanded = dict.fromkeys(names, (joints,))
         integrated = {"phi": (joints, SIDES)} if self.integrated else {}
-        return RowLayout({**self.links.arguments.shapes, **commanded, **integrated})
+        inside = (len(self.internal),)
+        shapes = ((*inside, SIDES),) if self.driven else ((*inside, SIDES), inside, inside)
+        internal = dict(zip(INTERNAL, shapes, strict=False)) if self.internal else {}
+        return RowLayout({**self.links.arguments.shapes, **commanded, **integrated, **internal})
 
     @cached_property
     def results(self) -> RowLayout:
@@ -112,13 +126,16 @@ class InverseDynamics(RowKernel):
                 Command.of({name: of_joints[name][index] for name in names}),
                 self.near_singular,
                 np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None,
+                self._internal(index, given),
             )
             for index, joint in enumerate(self.robot.joints)
         ]
         driven = {name: [getattr(each, name) for each in drives] for name in Drive._fields}
         if "dissipated_power" in self.results.shapes:
-            moved = zip(given["dq"], driven["dtheta"], strict=True)
-            motions = [{"dq": dq, "dtheta": dtheta} for dq, dtheta in moved]
+            names = ("dq", "dtheta", "dphi", "damping")
+            of_all = {**given, **driven}
+            moved = zip(*(of_all.get(name, [None] * len(drives)) for name in names), strict=True)
+            motions = [dict(zip(names, each, strict=True)) for each in moved]
             driven["dissipated_power"] = list(map(dissipated_power, self.robot.joints, motions))
         absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(drives[0].dtheta, np.nan)}
         computed: dict[str, Iterable[Scalar]] = {
@@ -126,6 +143,17 @@ class InverseDynamics(RowKernel):
             for name, of_all in driven.items()
         }
         return self.results.pack({**torques, **computed})
+
+    def _internal(self, index: int, given: Mapping[str, Sequence[Scalar]]) -> InternalMotion | None:
+        """What moves inside a joint, if its transmission is damped."""
+        if index not in self.internal:
+            return None
+        from vsacli.actuators.damped_springs import InternalMotion
+
+        place = self.internal.index(index)
+        deflections = np.stack(given[INTERNAL[0]][SIDES * place : SIDES * (place + 1)])
+        rates = [None, None] if self.driven else [given[name][place] for name in INTERNAL[1:]]
+        return InternalMotion(deflections, *rates)
 
 
 def _as_row(torque: Scalar, row: Scalar) -> Scalar:
@@ -139,6 +167,7 @@ def compute_block(
     near_singular: float = NEAR_SINGULAR_MARGIN,
     integrated: FloatArray | None = None,
     engine: Engine = NUMPY,
+    internal: Mapping[int, InternalMotion] | None = None,
 ) -> Block:
     """Inverse dynamics (36)-(74) of a block of steps.
 
@@ -150,17 +179,43 @@ def compute_block(
         integrated: deflections of the joints to use instead of the root of (14), (joints, 2, samples);
             a step where they are NaN is infeasible.
         engine: what computes.
+        internal: what moves inside the transmissions that are damped, by index of the joint; if None, all of
+            them are where their springs carry the joint alone, or where their damper is said to start.
     """
     frame = None if motion.wrench is None else motion.wrench.frame
-    kernel = InverseDynamics(robot, frame, near_singular, integrated is not None)
+    internal = internal_equilibrium(robot, motion) if internal is None else internal
+    kernel = InverseDynamics(robot, frame, near_singular, integrated is not None, tuple(internal))
     given = {name: array for name, array in motion.variables().items() if robot.has(VARIABLES[name])}
     rows = {name: by_joint(given[name]) for name in kernel.arguments.shapes if name in given}
     if integrated is not None:
         rows["phi"] = integrated.reshape(-1, integrated.shape[-1])
+    for name, values in zip(INTERNAL, zip(*internal.values(), strict=True), strict=False):
+        of_joints = np.concatenate(values) if name == INTERNAL[0] else np.stack(values)
+        rows[name] = np.ascontiguousarray(of_joints)
     found = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack(rows)))
     computed = {name: over_time(array) for name, array in found.items()}
     arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(np.uint16)}
     return Block(**arrays)
+
+
+def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMotion]:
+    """Where motions inside damped transmissions begin, with the rates that follow, by index of the joint."""
+    damped = {
+        index: joint
+        for index, joint in enumerate(robot.joints)
+        if joint.damper_at("transmission") and np.any(motion.commanded[DAMPING.key][:, index])
+    }
+    if not damped:
+        return {}
+    from vsacli.actuators.damped_springs import DampedSprings, InternalMotion
+
+    commanded = {**motion.variables(), **elastic_torques(robot, motion)}
+    found = {}
+    for index, joint in damped.items():
+        springs, command = DampedSprings(joint.actuator), command_of(index, commanded)
+        phi = springs.equilibrium(command, joint.damper_start)
+        found[index] = InternalMotion(phi, *springs.driven(phi, command))
+    return found
 
 
 def _rows(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:

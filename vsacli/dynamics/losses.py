@@ -1,4 +1,4 @@
-"""What friction, damping and windings take: power at a step, and energy between the steps of a run.
+"""What friction, dampers and windings take: power at a step, and energy between the steps of a run.
 
 Whatever takes energy at a joint adds a term to `dissipated_power` and to `LossMeter`.
 """
@@ -14,6 +14,7 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.variables import VARIABLES, Block
+from vsacli.dynamics.dampers import damper_velocities
 from vsacli.dynamics.quadrature import integrals, positive_part, trapezoids
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -21,15 +22,21 @@ from vsacli.robot.model import Robot
 MOTION = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta")
 """What losses follow from."""
 
+DAMPED = ("damping", "ddamping", "dphi")
+"""The same of dampers."""
+
 
 def dissipated_power(joint: Joint, motion: Mapping[str, Any]) -> FloatArray:
     """Power that friction and damping of a joint and its motors take, (samples,), W.
 
     Args:
         joint: the joint with its actuator.
-        motion: `dq`, (samples,), and `dtheta`, (2, samples), among other variables of the joint.
+        motion: `dq`, (samples,), and `dtheta`, (2, samples), among other variables of the joint; of one with
+            a damper `damping` and `dphi` as well.
     """
     power: FloatArray = _taken(joint.damping, FrictionLaws.of([joint.friction]), motion["dq"])
+    for velocity in damper_velocities(joint, motion["dq"], motion["dphi"]) if joint.damper else ():
+        power = power + motion["damping"] * velocity * velocity
     for index, motor in enumerate(joint.actuator.motors):
         power = power + _taken(motor.damping, FrictionLaws.of([motor.friction]), motion["dtheta"][index])
     return power
@@ -69,8 +76,10 @@ class LossMeter:
         self._there = np.array([side is not None for side in sides]).reshape(-1, SIDES)
         self._motor_damping = np.array([side.damping if side else 0.0 for side in sides]).reshape(-1, SIDES)
         self._joint_damping = np.array([joint.damping for joint in robot.joints])
+        self._robot = robot
         heated = robot.has(VARIABLES["copper_loss"])
-        self._names = (*MOTION, "copper_loss") if heated else MOTION
+        damped = robot.has(VARIABLES["damping"])
+        self._names = (*MOTION, *(["copper_loss"] if heated else []), *(DAMPED if damped else []))
         self._last: dict[str, FloatArray] = {}
 
     def add(self, block: Block) -> Lost:
@@ -90,6 +99,10 @@ class LossMeter:
         dissipated = np.sum(taken, axis=1, where=self._there[..., None])
         dissipated += _damping_work(self._joint_damping, intervals, *of_joints[1:])
         dissipated += _friction_work(self._of_joints, intervals, *of_joints)
+        for index, joint in enumerate(self._robot.joints):
+            if joint.damper is not None:
+                of_joint = {name: rows[name][index] for name in self._names if name != "time"}
+                dissipated[index] += _damper_work(joint, intervals, of_joint)
         heat = rows.get("copper_loss")
         return Lost(motor_friction, dissipated, None if heat is None else trapezoids(intervals, heat))
 
@@ -102,6 +115,17 @@ def _damping_work(
     damping: FloatArray, intervals: FloatArray, velocity: FloatArray, acceleration: FloatArray
 ) -> FloatArray:
     return damping[..., None] * integrals(intervals, velocity * velocity, 2 * velocity * acceleration)
+
+
+def _damper_work(joint: Joint, intervals: FloatArray, of_joint: Mapping[str, FloatArray]) -> FloatArray:
+    damping, d_damping, dq, ddq = (of_joint[name] for name in ("damping", "ddamping", "dq", "ddq"))
+    velocities = damper_velocities(joint, dq, of_joint["dphi"])
+    accelerations = damper_velocities(joint, ddq, of_joint["ddtheta"] - ddq)
+    work = np.zeros_like(intervals)
+    for velocity, acceleration in zip(velocities, accelerations, strict=True):
+        rate = (d_damping * velocity + 2 * damping * acceleration) * velocity
+        work += integrals(intervals, damping * velocity * velocity, rate)
+    return work
 
 
 def _friction_work(

@@ -9,6 +9,7 @@ standard deviation to both sides, all of them one batch of samples for the kerne
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from vsacli.base.variables import UNCERTAIN, Block
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.inverse import COMPUTED, compute_block, usual_block
+from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -166,7 +168,8 @@ def _values_and_gradients(
     robot: Robot, motion: Motion, shifts: Sequence[_Shift], engine: Engine
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Variables by name, (times, joints[, 2]), and their changes by the shifts, (shifts, times, ...)."""
-    shifted = compute_block(robot, _shifted(motion, shifts), engine=engine)
+    undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
+    shifted = compute_block(undamped, _shifted(motion, shifts), engine=engine)
     values, gradients = {}, {}
     for name, array in _uncertain(shifted).items():
         every = array.reshape(1 + 2 * len(shifts), len(motion.time), *array.shape[1:])
@@ -175,6 +178,14 @@ def _values_and_gradients(
         both = (ahead - behind) / 2
         gradients[name] = np.where(np.isnan(both), one_sided, both)
     return values, gradients
+
+
+def _without_inner_damper(joint: Joint) -> Joint:
+    """The joint without a damper parallel to its springs.
+
+    With one, motors follow what the links demand later and less: what is found without is more than that.
+    """
+    return replace(joint, damper=joint.damper_at("link"))
 
 
 def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:

@@ -192,6 +192,11 @@ class Joint:
         return self.damper if self.damper is not None and self.damper.location == location else None
 
     @property
+    def damper_start(self) -> float | None:
+        """Where the transmission of a damped one starts, if that is said."""
+        return None if self.damper is None else self.damper.start
+
+    @property
     def commanded(self) -> tuple[str, ...]:
         """Keys of the signals that a trajectory commands besides its motion."""
         devices = (

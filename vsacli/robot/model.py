@@ -106,7 +106,7 @@ class Robot:
     def has(self, variable: Variable) -> bool:
         """Whether results of the robot hold a variable of joints."""
         if variable.requires == LOSSES:
-            return any(joint.has_friction for joint in self.joints)
+            return any(joint.has_friction or joint.damper is not None for joint in self.joints)
         required_of_none = variable.requires in OF_ANY_ROBOT
         return required_of_none or any(any(joint.has(variable)) for joint in self.joints)
 

@@ -139,6 +139,11 @@ class DeflectionState(MechanismState):
         p = self._partials
         return p.T_pp * rates[..., 0] + p.T_ps * rates[..., 1]
 
+    def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
+        """T_ppp phi'^2 + 2 T_pps phi' s' + T_pss s'^2."""
+        p, dphi, ds = self._partials, rates[..., 0], rates[..., 1]
+        return p.T_ppp * dphi * dphi + 2 * p.T_pps * dphi * ds + p.T_pss * ds * ds
+
     def spring_rates(self, rates: FloatArray) -> FloatArray:
         """Rates of T and U_s."""
         p = self._partials

@@ -93,6 +93,11 @@ class _PairStates(ElasticState):
         rates = self._springs.zeta * dphi
         return rates[..., 0] + rates[..., 1]
 
+    def stiffness_curvature(self, dphi: FloatArray) -> FloatArray:
+        """Sum of eta_k phi_k'^2."""
+        bent = self._springs.eta * dphi * dphi
+        return bent[..., 0] + bent[..., 1]
+
     def motor_accelerations(
         self, dphi: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> FloatArray:

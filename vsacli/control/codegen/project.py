@@ -62,10 +62,10 @@ and what is too large in a command, from a sensor that failed for instance, coun
 ```c
 #include "{prefix}.h"
 
-void every_millisecond(const {prefix}_command *command)
+void every_millisecond({parameters})
 {{
     {prefix}_drive drive;
-    const unsigned flags = {prefix}_inverse_dynamics(command, &drive);
+    const unsigned flags = {prefix}_inverse_dynamics({call}, &drive);
     if (flags & ({upper}_INFEASIBLE | {upper}_SINGULAR)) {{
         brake(); /* there is no such torque: drive.flags[joint] says at which joint, and why */
         return;
@@ -90,11 +90,14 @@ def readme_text(
     prefix: str, robot: Robot, functions: Sequence[Function], precision: str, omitted: Sequence[str]
 ) -> str:
     """How to use the code."""
+    loop = next(function for function in functions if function.name == "inverse_dynamics")
     return _README.format(
         name=for_markdown(robot.name),
         warnings="".join(f"\nWarning: {for_markdown(sentence(warning))}\n" for warning in robot.warnings),
         prefix=prefix,
         upper=prefix.upper(),
+        call=", ".join(name for name, _ in loop.arguments),
+        parameters=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
         tolerance=TOLERANCE[precision],
         functions="\n".join(
             f"- `{signature(prefix, function)}`: {function.meaning}" for function in functions

@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, over_time
-from vsacli.base.signals import POSITION
+from vsacli.base.signals import DAMPING, POSITION
 from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.interface import Array, Function
 from vsacli.control.codegen.scalar import included
 from vsacli.control.gains import STIFFNESS_ORDER
 from vsacli.dynamics.elastic_torques import LinkTorques
-from vsacli.dynamics.inverse import compute_block
+from vsacli.dynamics.inverse import compute_block, internal_equilibrium
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 
@@ -43,6 +43,7 @@ class Reference:
             "motion": {name: command[name] for name in LinkTorques(robot).arguments.shapes},
             "command": command,
             "state": self._state(command),
+            "internal": self._internal(command),
             "integral": {name: self._drawn(scale) for name, scale in (("q", 1e-3), ("stiffness", 1.0))},
         }
 
@@ -78,6 +79,10 @@ class Reference:
         signals = (POSITION, *self._robot.signals)
         names = [name for signal in signals for name in signal.names if name != "stiffness"]
         drawn = {name: self._drawn(SCALES.get(name, 1.0)) for name in names}
+        dampers = [joint.damper for joint in self._robot.joints]
+        if any(dampers):
+            low, high = np.array([damper.range if damper else (0.0, 0.0) for damper in dampers]).T
+            drawn[DAMPING.key] = low + self._rng.uniform(0.2, 0.8, (CASES, len(dampers))) * (high - low)
         block = compute_block(self._robot, self._motion(drawn, np.ones_like(drawn["q"])))
         lower = np.nan_to_num(block.stiffness_lower)
         upper = np.minimum(np.nan_to_num(block.stiffness_upper, nan=0.0), 4 * lower)
@@ -87,6 +92,14 @@ class Reference:
 
     def _motion(self, arrays: Arrays, stiffness: FloatArray) -> Motion:
         return Motion.of(np.arange(float(CASES)), {**arrays, "stiffness": stiffness})
+
+    def _internal(self, command: Arrays) -> Arrays:
+        """Away from where the springs carry the joints alone."""
+        deflections = np.zeros((CASES, len(self._robot.joints), 2))
+        motion = self._motion(command, command["stiffness"])
+        for index, inside in internal_equilibrium(self._robot, motion).items():
+            deflections[:, index] = 0.9 * np.nan_to_num(over_time(inside.phi))
+        return {"internal_phi": deflections}
 
     def _state(self, command: Arrays) -> Arrays:
         block = compute_block(self._robot, self._motion(command, command["stiffness"]))

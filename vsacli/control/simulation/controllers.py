@@ -15,6 +15,7 @@ from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.state_vector import Phase
 from vsacli.control.simulation.tabulated import first_undefined, tabulate
+from vsacli.dynamics.internal_motion import internal_motions
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -49,11 +50,13 @@ class Feedforward:
     """The computed torques of the inverse dynamics, whatever the robot does."""
 
     def __init__(self, model: Robot, trajectory: Trajectory) -> None:
+        internal = internal_motions(model, trajectory)
         drivetrain = Drivetrain(model.actuators)
         self._friction = drivetrain.friction
 
         def columns(time: FloatArray) -> FloatArray:
-            block = compute_block(model, trajectory.at(time))
+            inside = internal.at(time - trajectory.start)
+            block = compute_block(model, trajectory.at(time), internal=inside)
             torque, velocity = map(drivetrain.of_motors, (block.tau_motor, block.dtheta))
             if self._friction is None:
                 return torque

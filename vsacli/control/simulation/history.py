@@ -7,6 +7,7 @@ import numpy as np
 from vsacli.base.arrays import FlagArray, FloatArray, of_joint
 from vsacli.base.simulation_variables import ERRORS, SIMULATION_VARIABLES, TRACKED, actual, error
 from vsacli.base.variables import VARIABLES, Block
+from vsacli.compute.vector import add
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.state_trajectory import StateTrajectory
@@ -53,7 +54,8 @@ def _actual(loop: ClosedLoop, integrated: StateTrajectory) -> dict[str, FloatArr
     phi, dphi = drivetrain.deflections(phase.q, phase.theta), drivetrain.deflections(phase.dq, phase.dtheta)
     springs = drivetrain.state(phase.q, phase.theta, phase.dq, phase.dtheta)
     passed_on = torque if friction is None else torque - friction
-    tau_e = plant.link_torque(phase.dq, ddq, springs.tau_e, passed_on)
+    dampers = plant.dampers.passed(loop.reference.damping(integrated.time), phase.dq, phase.dtheta)
+    tau_e = plant.link_torque(phase.dq, ddq, add(springs.tau_e, dampers.links), passed_on)
     still, deflected = np.zeros_like(phase.q), drivetrain.deflected
     theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)
     tau_motor = drivetrain.of_joints(torque)

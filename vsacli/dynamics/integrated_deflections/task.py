@@ -14,6 +14,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.dynamics.inverse import command_of, elastic_torques
+from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -24,6 +25,11 @@ REASONS = (
     "the integration cannot go on",
 )
 FOLLOWED, SINGULAR, UNREACHABLE, STALLED = range(len(REASONS))
+
+
+def integrable(joint: Joint) -> bool:
+    """Whether deflections of a joint can be integrated by (19); with a damper beside they are already."""
+    return joint.actuator.integrable and joint.damper_at("transmission") is None
 
 
 class Task:
@@ -38,7 +44,7 @@ class Task:
         self.trajectory = trajectory
         self._robot = robot
         self._actuators = {
-            index: joint.actuator for index, joint in enumerate(robot.joints) if joint.actuator.integrable
+            index: joint.actuator for index, joint in enumerate(robot.joints) if integrable(joint)
         }
         self.joints = tuple(self._actuators)
 

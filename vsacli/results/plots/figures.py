@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from vsacli.base.errors import InputError
-from vsacli.base.units import CURRENT, ENERGY, POSITION, POWER, STIFFNESS, TORQUE, VOLTAGE, Quantity
+from vsacli.base.units import CURRENT, DAMPING, ENERGY, POSITION, POWER, STIFFNESS, TORQUE, VOLTAGE, Quantity
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.results.plots.corridor_figure import MOST_ROWS, compliant_joints, draw_corridors
 from vsacli.results.plots.curves import Failures
@@ -154,12 +154,31 @@ _CURRENT_LABELS = [partial(_electrical_label, "i", CURRENT, motor) for motor in 
 _VOLTAGE_LABELS = [partial(_electrical_label, "u", VOLTAGE, motor) for motor in MOTORS]
 
 
+def _damper(result: StoredResult, failures: Failures) -> Figure:
+    """Damping at the left, beside it the torque that it makes."""
+    height = GROUP_HEIGHT * len(panel_groups(result.joint_types)) + 1
+    figure = Figure((2 * PANEL_WIDTH, height), layout="constrained")
+    grid = figure.add_gridspec(1, 2)
+    handles = draw_groups(grid[0], result, failures, "damping", [_damping_label])
+    handles += draw_groups(grid[1], result, failures, "tau_damper", [_damper_label])
+    return complete(figure, result_title(result), handles)
+
+
+def _damping_label(joint_type: str) -> str:
+    return f"damping $d$ [{DAMPING.unit(joint_type)}]"
+
+
+def _damper_label(joint_type: str) -> str:
+    return rf"{force(joint_type)} of the damper [{TORQUE.unit(joint_type)}]"
+
+
 RESULT_DRAWINGS: dict[str, Drawing] = {
     "motion": Drawing(("q", "stiffness"), _motion),
     "motor-torque": Drawing(("tau_motor",), _motor_torque),
     "elastic-torque": Drawing(("tau_e",), _elastic_torque),
     "energy": Drawing(("elastic_energy", "motor_energy"), _energy),
     "losses": Drawing(("dissipated_power",), _losses),
+    "damper": Drawing(("damping", "tau_damper"), _damper),
     "motor-current": Drawing(("current",), _current),
     "motor-voltage": Drawing(("voltage",), _voltage),
 }

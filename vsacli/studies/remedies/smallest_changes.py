@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
+from vsacli.dynamics.internal_motion import damped_joints, refuse_damped_transmissions
 from vsacli.dynamics.inverse import fitted
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
@@ -43,7 +44,8 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
         near_singular: the margin min(sigma - lower, upper - sigma)/sigma that every step shall have.
 
     Raises:
-        InputError: the trajectory is not for the robot, or `near_singular` is no possible margin.
+        InputError: the trajectory is not for the robot, a transmission is damped, or `near_singular` is no
+            possible margin.
         TypeError: robot or trajectory is none.
     """
     trajectory = fitted(robot, trajectory)
@@ -51,6 +53,10 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
     acceptance = Acceptance(robot, near_singular)
     asked = Task(acceptance, trajectory)
     as_it_is = Remedy(0.0, robot, trajectory)
+    if damped_joints(robot, trajectory):
+        if not asked.confirms(as_it_is):
+            refuse_damped_transmissions(robot, trajectory, "suggestions")
+        return Suggestions(near_singular)
     if not acceptance.refused_joints(trajectory).any() and asked.confirms(as_it_is):
         return Suggestions(near_singular)
     if reasons := acceptance.position_reasons(trajectory):

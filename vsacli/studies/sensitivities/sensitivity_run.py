@@ -10,6 +10,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import Block
+from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import command_of, compute_block, fitted
 from vsacli.robot.model import Robot
 from vsacli.studies.sensitivities.drive_derivatives import MARGIN, OF_MOTORS, drive_derivatives
@@ -57,13 +58,14 @@ class SensitivityRun:
         slopes: names of the variables that are differentiated, each with whether it is one of motors.
 
     Raises:
-        InputError: the trajectory does not fit the robot, or a pattern fits no number.
+        InputError: the trajectory does not fit, a pattern fits no number, or a transmission is damped.
     """
 
     slopes: ClassVar[Mapping[str, bool]] = {**dict.fromkeys(OF_MOTORS, True), MARGIN: False}
 
     def __init__(self, robot: Robot, trajectory: Trajectory, patterns: Sequence[str] = ()) -> None:
         self.robot, self.trajectory = robot, fitted(robot, trajectory)
+        refuse_damped_transmissions(robot, self.trajectory, "sensitivities")
         self.parameters: tuple[Parameter, ...] = parameters(robot, patterns)
 
     def __iter__(self) -> Iterator[Derivatives]:

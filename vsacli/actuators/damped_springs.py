@@ -1,0 +1,293 @@
+"""Springs with a damper beside them, as in CompAct: the link feels tau_l = T(phi) + d w.
+
+Here w is the velocity of the damper, the sum of theta_k' - q' over the motors that a spring lies behind, and
+T the torque of the springs. The motors' velocities follow from w and from the rate of the stiffness,
+
+    [[b_1, b_2], [g_1, g_2]] (theta_1', theta_2') = (w + (b_1 + b_2) q', sigma' - sigma_q q')
+
+with b_k = 1 where a spring lies behind motor k, else 0, and g_k the derivative of sigma over theta_k, and
+their accelerations likewise. The matrix is singular where its determinant, the pivot b_1 g_2 - b_2 g_1, is
+zero, and not where det A is. With one motor the first row is all there is.
+
+The spread, the sum of the deflections that w is the rate of, is a state of its own: spread' = (tau_l - T)/d.
+The slope of that over the spread, at a stiffness, is -(det A/pivot)/d.
+"""
+
+from __future__ import annotations
+
+import operator
+from functools import reduce
+from itertools import zip_longest
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.elasticity import ElasticState
+from vsacli.actuators.reach import Reach, reach
+from vsacli.actuators.transmission import Command, Transmission
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.flags import SINGULAR_MARGIN, Flag, marked
+from vsacli.base.signals import DAMPING, STIFFNESS
+from vsacli.base.variables import VARIABLES
+
+NEWTON_STEPS = 4
+"""From a guess that is 1e-4 off, three reach rounding; one more does no harm."""
+
+
+CONTINUATION_STEPS = 200
+"""From the equilibrium to where a robot file says that the motion starts."""
+
+
+class InternalMotion(NamedTuple):
+    """The motion inside a transmission with a damper.
+
+    Attributes:
+        phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is a
+            guess from which the stiffness is found.
+        velocity: w, the rate of the spread, (samples,); what follows from the damping if None.
+        acceleration: its derivative, (samples,), likewise.
+    """
+
+    phi: FloatArray
+    velocity: FloatArray | None
+    acceleration: FloatArray | None
+
+
+class _Springs(NamedTuple):
+    """The springs at deflections.
+
+    Attributes:
+        state: arrays (samples, 1 joint[, motors]).
+        torque: derivatives of T over each theta, (motors, samples).
+        stiffness: those of sigma, likewise.
+        pivot: determinant of the matrix that gives the motors' velocities; 1 if no stiffness is commanded.
+    """
+
+    state: ElasticState
+    torque: FloatArray
+    stiffness: FloatArray
+    pivot: FloatArray
+
+    @property
+    def slope(self) -> FloatArray:
+        """dT/d(spread) at a stiffness, det A/pivot: positive where the motion inside is stable."""
+        slope: FloatArray = self.torque[0]
+        if len(self.torque) > 1:
+            determinant = self.torque[0] * self.stiffness[1] - self.torque[1] * self.stiffness[0]
+            slope = determinant / self.divisor
+        return slope
+
+    @property
+    def divisor(self) -> FloatArray:
+        """The pivot, NaN instead of zero."""
+        return np.where(self.pivot == 0, np.nan, self.pivot)
+
+
+class DampedSprings:
+    """The springs of an actuator beside which a damper lies.
+
+    Deflections phi are (2, samples), values of motors (motors, samples), others (samples,).
+    """
+
+    def __init__(self, actuator: Actuator) -> None:
+        self._actuator = actuator
+        self._motors = actuator.motor_count
+        self._elasticity = type(actuator).elasticity([actuator])
+        self._settable = STIFFNESS.key in actuator.commanded
+        self._behind = [float(there) for there in actuator.has(VARIABLES["phi"])[: self._motors]]
+
+    def spread(self, phi: FloatArray) -> FloatArray:
+        """Sum of the deflections beside the damper."""
+        parts = [factor * row for factor, row in zip(self._behind, phi, strict=False)]
+        return reduce(operator.add, parts)
+
+    def torque(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        """T."""
+        return self._state(phi, q).tau_e[..., 0]
+
+    def slope(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        """dT/d(spread) at a stiffness: positive where the motion inside is stable."""
+        slope: FloatArray = self._springs(phi, q).slope
+        return slope
+
+    def pivot(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        """Zero where the rates do not follow from that of the stiffness."""
+        return self._springs(phi, q).pivot
+
+    def within(self, phi: FloatArray) -> BoolArray:
+        """Where the laws of the springs hold."""
+        lowest, highest = np.array(self._actuator.phi_ranges).T[..., None]
+        inside: BoolArray = (phi[: self._motors] >= lowest) & (phi[: self._motors] <= highest)
+        return np.asarray(np.all(inside, axis=0))
+
+    def settled(self, spread: FloatArray, phi: FloatArray, command: Command) -> FloatArray:
+        """Deflections of a spread with the commanded stiffness, from a guess; NaN where none are near."""
+        missing = (spread - self.spread(phi)) / sum(self._behind)
+        shares = zip_longest(phi, self._behind, fillvalue=0.0)
+        phi = np.stack([row + missing * share for row, share in shares])
+        if not self._settable:
+            return phi
+        stiffness = command.commanded[STIFFNESS.key]
+        along = self._along(spread)
+        for _ in range(NEWTON_STEPS):
+            springs = self._springs(phi, command.q)
+            phi = phi + along * ((stiffness - springs.state.stiffness[..., 0]) / springs.divisor)
+        left = stiffness - self._state(phi, command.q).stiffness[..., 0]
+        return np.where(np.abs(left) < SINGULAR_MARGIN * stiffness, phi, np.nan)
+
+    def equilibrium(self, command: Command, spread: float | None = None) -> FloatArray:
+        """Deflections at which the springs carry the torque alone; those of a spread, if one is given."""
+        if self._settable:
+            phi = self._actuator.solve(command.tau_e, command.commanded[STIFFNESS.key], command.q).deflections
+        else:
+            phi = self._actuator.transmit(command, SINGULAR_MARGIN, None).phi
+        if spread is None:
+            return phi
+        begin = self.spread(phi)
+        for share in np.linspace(0, 1, CONTINUATION_STEPS + 1)[1:]:
+            phi = self.settled(begin + (spread - begin) * share, phi, command)
+        return phi
+
+    def driven(self, phi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:
+        """What moves at deflections: w = (tau_l - T)/d, and w' = (tau_l' - d' w - T')/d."""
+        damping, d_damping = (command.commanded[name] for name in DAMPING.names[:2])
+        springs = self._springs(phi, command.q)
+        velocity = (command.tau_e - springs.state.tau_e[..., 0]) / damping
+        dtheta = self._velocities(springs, velocity, command)
+        rate = springs.state.torque_rate(self._coordinates(command.dq, dtheta))[..., 0]
+        return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
+
+    def transmit(self, command: Command, motion: InternalMotion, near_singular: float) -> Transmission:
+        """Stiffness, motor motion and spring torques of a motion inside; as `Actuator.transmit`.
+
+        The corridor is that of the springs' torque. A step is singular where the pivot is zero, not where
+        det A is; INTERNAL_INSTABILITY says that the slope is not positive.
+        """
+        phi = self.settled(self.spread(motion.phi), motion.phi, command)
+        _, rate, acceleration = motion
+        if rate is None or acceleration is None:
+            rate, acceleration = self.driven(phi, command)
+        springs = self._springs(phi, command.q)
+        lower, upper, reached = self._reach(springs, phi, command, near_singular)
+        velocity = np.where(reached.singular | reached.infeasible, np.nan, rate)
+        dtheta = self._velocities(springs, velocity, command)
+        rates = self._coordinates(command.dq, dtheta)
+        ddtheta = self._accelerations(springs, acceleration, rates, command)
+        none = np.full_like(command.q, np.nan)
+
+        def of_motors(values: FloatArray) -> FloatArray:
+            rows = [values[0], values[1] if self._motors > 1 else none]
+            return np.where(reached.infeasible, np.nan, np.stack(rows))
+
+        unstable = ~reached.infeasible & ~(springs.slope > 0)
+        energy = self._elasticity.energy(self._at(phi, command.q))[..., 0]
+        return Transmission(
+            *self._stiffness(springs, rates, ddtheta, command),
+            phi=of_motors(phi),
+            dphi=of_motors(self._elasticity.deflections(command.dq[:, None], _columns(dtheta))[:, 0].T),
+            ddtheta=of_motors(ddtheta),
+            tau_spring=of_motors(springs.state.tau_spring[:, 0].T),
+            elastic_energy=np.where(reached.infeasible, np.nan, energy),
+            det_A=np.where(reached.infeasible, np.nan, springs.state.determinant()[..., 0]),
+            stiffness_lower=lower,
+            stiffness_upper=upper,
+            flags=reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
+        )
+
+    def _reach(
+        self, springs: _Springs, phi: FloatArray, command: Command, near_singular: float
+    ) -> tuple[FloatArray, FloatArray, Reach]:
+        """The corridor at the torque of the springs, and what is wrong with the step."""
+        lost, none = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
+        never = np.zeros_like(lost)
+        if not self._settable:
+            return none, none, Reach(lost, never, never, never)
+        stiffness = command.commanded[STIFFNESS.key]
+        solution = self._actuator.solve(springs.state.tau_e[..., 0], stiffness, command.q)
+        reached = reach(stiffness, solution, near_singular)
+        margin = self._margin(springs, stiffness)
+        return (
+            solution.lower,
+            solution.upper,
+            Reach(
+                infeasible=reached.infeasible | lost,
+                slack=reached.slack,
+                singular=margin <= SINGULAR_MARGIN,
+                near_singular=(margin > SINGULAR_MARGIN) & (margin < near_singular),
+            ),
+        )
+
+    def _margin(self, springs: _Springs, stiffness: FloatArray) -> FloatArray:
+        """How far the stiffness is from its extremum at the same spread, relative to itself."""
+        bent = springs.state.stiffness_curvature(self._coordinates(0 * stiffness, self._along(stiffness)))
+        divisor = 2 * stiffness * np.abs(bent[..., 0])
+        margin: FloatArray = springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
+        return margin
+
+    def _along(self, like: FloatArray) -> FloatArray:
+        """Velocities of the motors that leave the spread as it is, (motors, samples)."""
+        return np.stack((0 * like - self._behind[1], 0 * like + self._behind[0]))
+
+    def _velocities(self, springs: _Springs, velocity: FloatArray, command: Command) -> FloatArray:
+        still = self._coordinates(command.dq, np.zeros_like(springs.torque))
+        rate = command.commanded[STIFFNESS.names[1]] - springs.state.stiffness_rate(still)[..., 0]
+        return self._solved(springs, velocity + sum(self._behind) * command.dq, rate)
+
+    def _accelerations(
+        self, springs: _Springs, acceleration: FloatArray, rates: FloatArray, command: Command
+    ) -> FloatArray:
+        still = self._coordinates(command.ddq, np.zeros_like(springs.torque))
+        state = springs.state
+        bent = state.stiffness_curvature(rates)[..., 0] + state.stiffness_rate(still)[..., 0]
+        missing = command.commanded[STIFFNESS.names[2]] - bent
+        return self._solved(springs, acceleration + sum(self._behind) * command.ddq, missing)
+
+    def _solved(self, springs: _Springs, of_spread: FloatArray, of_stiffness: FloatArray) -> FloatArray:
+        """What solves both rows; the first alone if there is one motor."""
+        if self._motors == 1:
+            return of_spread[None]
+        (b_1, b_2), (g_1, g_2) = self._behind, springs.stiffness
+        return np.stack(
+            (
+                (g_2 * of_spread - b_2 * of_stiffness) / springs.divisor,
+                (b_1 * of_stiffness - g_1 * of_spread) / springs.divisor,
+            )
+        )
+
+    def _stiffness(
+        self, springs: _Springs, rates: FloatArray, ddtheta: FloatArray, command: Command
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """As it is commanded; else what the springs have there, with its derivatives."""
+        if self._settable:
+            stiffness, rate, acceleration = (command.commanded[name] for name in STIFFNESS.names)
+            return stiffness, rate, acceleration
+        state, turning = springs.state, self._coordinates(command.ddq, ddtheta)
+        bent = state.stiffness_curvature(rates) + state.stiffness_rate(turning)
+        return state.stiffness[..., 0], state.stiffness_rate(rates)[..., 0], bent[..., 0]
+
+    def _springs(self, phi: FloatArray, q: FloatArray) -> _Springs:
+        state = self._state(phi, q)
+        units = np.eye(self._motors)[:, :, None] + 0 * q
+        turned = [self._coordinates(0 * q, unit) for unit in units]
+        torque = np.stack([state.torque_rate(each)[..., 0] for each in turned])
+        stiffness = np.stack([state.stiffness_rate(each)[..., 0] for each in turned])
+        if self._motors == 1:
+            return _Springs(state, torque, stiffness, np.ones_like(q))
+        pivot = self._behind[0] * stiffness[1] - self._behind[1] * stiffness[0]
+        return _Springs(state, torque, stiffness, pivot)
+
+    def _state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
+        return self._elasticity.state(self._at(phi, q))
+
+    def _at(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+        return self._coordinates(q, self._actuator.motor_positions(phi, q)[: self._motors])
+
+    def _coordinates(self, q: FloatArray, theta: FloatArray) -> FloatArray:
+        """Of the springs, (samples, 1 joint, coordinates), from positions of joint and motors, or rates."""
+        return self._elasticity.coordinates(q[:, None], _columns(theta))
+
+
+def _columns(of_motors: FloatArray) -> FloatArray:
+    """(samples, 1 joint, motors) from (motors, samples)."""
+    return of_motors.T[:, None]

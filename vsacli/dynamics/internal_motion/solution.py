@@ -1,0 +1,145 @@
+"""What moves inside the damped transmissions of a robot along a trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from vsacli.actuators.damped_springs import DampedSprings, InternalMotion
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.signals import DAMPING
+from vsacli.base.units import time_text
+from vsacli.dynamics.integrated_deflections.integration import Pieces
+from vsacli.dynamics.internal_motion.march import FIRST_CELLS, LOST, March, Marched
+from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+SEEN = 1000
+"""Times at which damping is looked at, beside all breakpoints: whether there is any."""
+
+
+@dataclass(frozen=True)
+class InternalMotions:
+    """The motion inside each damped transmission; joints whose damping is zero all the time have none.
+
+    Attributes:
+        joints: indices of those that have one.
+        stops: for each of these whose motion ends before the trajectory does, where.
+    """
+
+    joints: tuple[int, ...]
+    stops: Mapping[int, Stop]
+    _springs: Mapping[int, DampedSprings] = field(repr=False)
+    _marched: Mapping[int, Marched] = field(repr=False)
+
+    def at(self, elapsed: FloatArray) -> dict[int, InternalMotion]:
+        """The motion of each joint at times from the first step on; NaN from a stop on."""
+        return {joint: self._at(joint, elapsed) for joint in self.joints}
+
+    def _at(self, joint: int, elapsed: FloatArray) -> InternalMotion:
+        marched, springs = self._marched[joint], self._springs[joint]
+        if marched.phi is None:
+            none = np.full_like(elapsed, np.nan)
+            return InternalMotion(np.stack((none, none)), none, none)
+        gone = (elapsed >= marched.end) & (marched.reason is not None)
+        phi, rate, acceleration = (
+            np.where(gone, np.nan, marched.phi.at(elapsed, order)) for order in range(3)
+        )
+        return InternalMotion(phi, springs.spread(rate), springs.spread(acceleration))
+
+
+def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
+    """Integrate what moves inside the damped transmissions of a robot, from the first step to the last.
+
+    The smooth functions of the trajectory count; derivatives given with samples play no part.
+
+    Raises:
+        InputError: the damping of a joint falls to zero, or below, somewhere but not everywhere.
+    """
+    first, trajectory = trajectory.start, trajectory.from_zero()
+    joints = damped_joints(robot, trajectory)
+    demand = _Demand(robot, trajectory)
+    evenly = np.linspace(0.0, trajectory.duration, FIRST_CELLS + 1)
+    ends = np.union1d(evenly, Pieces.of(trajectory, 0.0).ends)
+    springs = {index: DampedSprings(robot.joints[index].actuator) for index in joints}
+    marched = {}
+    with np.errstate(all="ignore"):  # a trial step may leave the range of a law
+        for index in joints:
+            begin = springs[index].equilibrium(demand.of(index, ends[:1]), robot.joints[index].damper_start)
+            march = March(springs[index], partial(demand.of, index))
+            started = not np.isnan(begin[0]).any()
+            marched[index] = march.through(ends, begin) if started else Marched(None, 0.0, LOST)
+    stops = {
+        index: Stop(first + each.end, each.reason)
+        for index, each in marched.items()
+        if each.reason is not None
+    }
+    return InternalMotions(joints, stops, springs, marched)
+
+
+def damped_joints(robot: Robot, trajectory: Trajectory) -> tuple[int, ...]:
+    """The joints with a damper parallel to their springs that is not at zero all the time.
+
+    Raises:
+        InputError: it falls to zero, or below, somewhere but not everywhere.
+    """
+    chosen = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
+    if not chosen:
+        return ()
+    time = np.union1d(np.linspace(*trajectory.times.span, SEEN), trajectory.breakpoints)
+    damping = trajectory.at(time).commanded[DAMPING.key]
+    for index in chosen:
+        _check_damping(robot.joints[index], time, damping[:, index])
+    return tuple(index for index in chosen if damping[:, index].any())
+
+
+def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str) -> None:
+    """Refuse what looks at steps one by one, where a step depends on all before.
+
+    Args:
+        robot: the robot.
+        trajectory: fitted to the robot.
+        work: what refuses, a plural.
+
+    Raises:
+        InputError: a transmission is damped.
+    """
+    names = ", ".join(robot.joint_names[index] for index in damped_joints(robot, trajectory))
+    if names:
+        raise InputError.one(
+            f"{work} do not know transmissions with a damper ({names}): what moves inside depends on the "
+            "whole motion; set their damping to 0, or move the dampers between the links"
+        )
+
+
+def _check_damping(joint: Joint, time: FloatArray, damping: FloatArray) -> None:
+    """Refuse a damping that vanishes on the way."""
+    vanishes = damping <= 0
+    if vanishes.any() and damping.any():
+        raise InputError.one(
+            f"{joint.name}: its damping is {damping[vanishes][0]:g} at t = "
+            f"{time_text(float(time[vanishes][0]))}; parallel to springs it must be positive all the time, "
+            "or zero all the time, since what moves inside is a state only while it is damped"
+        )
+
+
+class _Demand:
+    """What joints are asked to do; times that were asked for before are remembered."""
+
+    def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
+        self._robot, self._trajectory = robot, trajectory
+        self._known: dict[bytes, Mapping[str, FloatArray]] = {}
+
+    def of(self, joint: int, time: FloatArray) -> Command:
+        key = time.tobytes()
+        if key not in self._known:
+            motion = self._trajectory.at(time)
+            self._known[key] = {**motion.variables(), **elastic_torques(self._robot, motion)}
+        return command_of(joint, self._known[key])
