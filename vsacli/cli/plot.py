@@ -41,9 +41,10 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
     <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give <stem>-losses if the
-    robot has dry friction or dampers, results <stem>-damper, and <stem>-motor-current and <stem>-motor-voltage if its motors have what that
-    takes. Two or more FILEs give one figure <stem>-<stem>-compare: motor torques of results, or position
-    errors of simulations, overlaid joint by joint.
+    robot has dry friction or dampers, and <stem>-motor-current and <stem>-motor-voltage if its motors have
+    what that takes; results of robots with dampers <stem>-damper. Two or more FILEs give one figure
+    <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid joint by
+    joint.
     """
     from vsacli.base.outputs import Outputs
 
