@@ -18,7 +18,7 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.elastic_torques import link_torques
@@ -97,13 +97,22 @@ def _swinging(time: FloatArray, swings: int) -> FloatArray:
 
 
 def _largest_load(actuator: Actuator, stiffness: FloatArray) -> FloatArray:
-    """About the largest |tau_e| that the stiffness allows in either direction, by bisection."""
+    """About the largest |tau_e| up to which the stiffness allows any, in either direction."""
     low, high = np.zeros_like(stiffness), 10 * stiffness
-    for _ in range(30):
+    for _ in range(30):  # bisection
         middle = (low + high) / 2
-        fits = np.ones(stiffness.shape, dtype=bool)
-        for sign in (-1, 1):
-            solution = actuator.solve(sign * middle, stiffness, np.zeros_like(middle))
-            fits &= (solution.lower <= stiffness) & (stiffness <= solution.upper)
+        fits = _fits(actuator, stiffness, middle)
         low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    return low
+    # where the torque has a peak, the stiffness may be reached again beyond loads that do not allow it
+    shares = np.linspace(0, 1, 200)
+    allowed = np.array([_fits(actuator, stiffness, share * low) for share in shares])
+    return shares[np.logical_and.accumulate(allowed).sum(axis=0) - 1] * low
+
+
+def _fits(actuator: Actuator, stiffness: FloatArray, load: FloatArray) -> BoolArray:
+    """Whether a load in either direction allows the stiffness."""
+    fits = np.ones(stiffness.shape, dtype=bool)
+    for sign in (-1, 1):
+        solution = actuator.solve(sign * load, stiffness, np.zeros_like(load))
+        fits &= (solution.lower <= stiffness) & (stiffness <= solution.upper)
+    return fits

@@ -60,7 +60,9 @@ def one_joint(*laws: SpringLaw) -> Robot:
 
 
 @pytest.mark.usefixtures("quickly")
-@pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "mixed_3r", "tendon_1r"])
+@pytest.mark.parametrize(
+    "name", ["vsa_3r", "rp_2", "mixed_3r", "tendon_1r", slow("maccepa_1r"), slow("cam_1r")]
+)
 def test_example_robots_agree(name: str):
     robot = load_robot(ROBOTS / f"{name}.yaml")
     motion = demands(robot, SAMPLES)

@@ -74,7 +74,10 @@ def test_inverse_dynamics_with_springs_of_each_law(law: str, tmp_path: Path) -> 
     assert np.isfinite(block.tau_motor).any(axis=(0, 2)).all()
 
 
-@pytest.mark.parametrize("name", ["vsa_3r", "rp_2", "mixed_3r", slow("lwr_7r_vsa"), "tendon_1r"])
+@pytest.mark.parametrize(
+    "name",
+    ["vsa_3r", "rp_2", "mixed_3r", "tendon_1r", slow("lwr_7r_vsa"), slow("maccepa_1r"), slow("cam_1r")],
+)
 def test_inverse_dynamics_of_arms(name: str, tmp_path: Path) -> None:
     check_inverse_dynamics(shipped_robot(name), tmp_path)
 

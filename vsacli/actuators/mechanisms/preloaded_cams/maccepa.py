@@ -34,8 +34,8 @@ class Maccepa(PreloadedCam):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
-        """A device of a hand's size."""
-        return {"b": 0.04, "c": 0.12, "k": 5000, "r": 0.01, "pretension": [0.002, 0.03]}
+        """Levers of a hand's size, with the stiffness of an arm's joint."""
+        return {"b": 0.04, "c": 0.12, "k": 20000, "r": 0.01, "pretension": [0.002, 0.05]}
 
     @property
     def deflection_range(self) -> tuple[float, float]:
