@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,8 @@ def test_a_new_robot_executes_its_new_trajectory(joints: str, actuator: str, tmp
 
 @pytest.mark.parametrize("mechanism", MECHANISMS)
 def test_a_serial_robot_can_be_had_with_each_mechanism(mechanism: str, tmp_path: Path) -> None:
+    # a cam needs its profile beside it
+    shutil.copy(REPOSITORY / "robots" / "cam_profile.csv", tmp_path)
     robot = robot_of(robot_template("RR", mechanism), tmp_path)
     assert {joint.actuator_type for joint in robot.joints} == {"serial"}
     assert report_of(robot, trajectory_template(robot), tmp_path).verdict == "ok"

@@ -26,6 +26,8 @@ class Maccepa(PreloadedCam):
     b: float = number(units.LENGTH, "length of the lever that motor 1 turns", check=POSITIVE)
     c: float = number(units.LENGTH, "distance from the axis to the point of the link", check=POSITIVE)
 
+    joint_types = ("revolute",)
+
     def __post_init__(self) -> None:
         problems = self._pretension_problems()
         if self.b == self.c:
