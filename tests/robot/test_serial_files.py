@@ -62,3 +62,25 @@ def test_two_motors_and_their_coupling_are_read() -> None:
     actuator = load(AWAS, "coupled_inertia: 0.004")
     assert [motor.inertia for motor in actuator.motors] == [0.3, 0.02]
     assert actuator.coupled_rotors == 0.004
+
+
+@pytest.mark.usefixtures("own_folder")
+@pytest.mark.parametrize(
+    ("rows", "reason"),
+    [
+        ("0,3\n1,2.5\n2,1.5\n", "the table needs 4 rows or more"),
+        ("0,3\n0.5,2.8\n1,2.5\n1.5,1.5\n", "the table goes from 0 to 1.5, `setting` farther"),
+        ("0,3\n0.5,2.8\n1,2.9\n2,1.5\n", "scale: must rise or fall over all of `setting`"),
+    ],
+)
+def test_a_table_of_scales_that_is_none_is_refused(rows: str, reason: str) -> None:
+    Path("scale.csv").write_text(f"setting,scale\n{rows}")
+    with pytest.raises(InputError, match=rf"arm\.yaml:\d+: .*{re.escape(reason)}"):
+        load(f"{RATIO}{{type: table, file: scale.csv}}}}")
+
+
+@pytest.mark.usefixtures("own_folder")
+def test_a_table_of_scales_is_among_the_sources() -> None:
+    Path("scale.csv").write_text("setting,scale\n0,3\n0.5,2.8\n1,2.5\n2,1.5\n")
+    actuator = load(f"{RATIO}{{type: table, file: scale.csv}}}}")
+    assert [Path(source.path).name for source in actuator.sources] == ["scale.csv"]

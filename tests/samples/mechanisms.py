@@ -12,6 +12,7 @@ import sympy
 
 from samples.full_model import Drive, Potential, springs_of
 from samples.law_energies import SAMPLES, Energy
+from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.mechanisms.mechanism import Mechanism
@@ -21,6 +22,7 @@ from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
 from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
 from vsacli.actuators.mechanisms.ratios.awas import Awas
 from vsacli.actuators.mechanisms.ratios.lever import Lever
+from vsacli.actuators.mechanisms.ratios.measured_scale import MeasuredScale
 from vsacli.actuators.mechanisms.ratios.scales import PolynomialScale, Power
 from vsacli.actuators.mechanisms.ratios.sine import Sine
 from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
@@ -51,7 +53,7 @@ class Device:
         anchor: the end of the settings at which the branch begins, 0 the first or -1 the last.
         scanned: phi within which each setting carries a torque or has its largest; `deflections` if None.
         falls: whether only a piece on which the stiffness falls from the anchor on belongs to the branch.
-        endless: whether it carries any torque.
+        endless: whether it carries any torque at any stiffness.
         symmetric: whether U(-phi) = U(phi).
         rest: phi without load.
         scanned_settings: theta_2 to scan where no end bounds it.
@@ -144,6 +146,13 @@ def _lever(k: float, length: float, lead: float) -> Potential:
 
 def _ratio(scale: Callable[[Any], Any], energy: Callable[[Any], Any]) -> Potential:
     return lambda q, theta_1, theta_2: scale(theta_2) * energy(theta_1 - q)
+
+
+def scale_table(settings: FloatArray, scale: Callable[[FloatArray], FloatArray]) -> Table:
+    """A table, as if read from a file."""
+    return Table(
+        ("setting", "scale"), np.column_stack([settings, scale(settings)]), Source("scale.csv", "", None)
+    )
 
 
 def _four_bar(k: float, ratio: float) -> Callable[[Any], Any]:
@@ -294,6 +303,19 @@ DEVICES = {
         stiffness=(500, 900),
         deflections=(-0.52, 0.52),
         settings=(0, 4),
+    ),
+    "variable_ratio, measured scale": Device(  # a spline through the points of a cubic is that cubic
+        mechanism=VariableRatio(
+            setting=(0, 3),
+            scale=MeasuredScale(file=scale_table(np.linspace(0, 3, 7), lambda s: 3 - 0.5 * s - 0.02 * s**3)),
+            torque=Cubic(k=300, k_c=500),
+        ),
+        potential=_ratio(lambda s: 3 - 0.5 * s - 0.02 * s**3, lambda phi: 150 * phi**2 + 125 * phi**4),
+        stiffness=(800, 500),
+        deflections=(-0.5, 0.5),
+        settings=(0, 3),
+        scanned=(-2, 2),
+        anchor=0,
     ),
     "variable_ratio, torque that turns": Device(
         mechanism=VariableRatio(

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
     from vsacli.actuators.mechanisms.ratios.awas import Awas
     from vsacli.actuators.mechanisms.ratios.lever import Lever
+    from vsacli.actuators.mechanisms.ratios.measured_scale import MeasuredScale
     from vsacli.actuators.mechanisms.ratios.scales import PolynomialScale, Power
     from vsacli.actuators.mechanisms.ratios.sine import Sine
     from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
@@ -53,6 +54,7 @@ __all__ = [
     "Cam",
     "Lever",
     "Maccepa",
+    "MeasuredScale",
     "Mechanism",
     "PairSolution",
     "Partials",

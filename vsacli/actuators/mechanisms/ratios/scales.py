@@ -17,6 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.lazy import LazyRegistry
 from vsacli.compute.control_flow import Values
 from vsacli.documents.fields import NON_ZERO, check_fields, number
+from vsacli.documents.source import Source
 
 SETTINGS = 2001
 """Points of the range at which the scale is looked at; neither a power nor four of them turns faster."""
@@ -36,6 +37,11 @@ class ScaleLaw(ABC):
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Files that it was read from."""
+        return ()
 
     @abstractmethod
     def at(self, s: FloatArray) -> Scale:
@@ -116,6 +122,7 @@ SCALES = LazyRegistry(
     {
         "power": "vsacli.actuators.mechanisms.ratios.scales:Power",
         "polynomial": "vsacli.actuators.mechanisms.ratios.scales:PolynomialScale",
+        "table": "vsacli.actuators.mechanisms.ratios.measured_scale:MeasuredScale",
     }
 )
 """Scales by the name they have in a robot file."""

@@ -94,8 +94,8 @@ class VariableRatio(Mechanism):
 
     @property
     def sources(self) -> tuple[Source, ...]:
-        """Those of the torque."""
-        return self.torque.sources
+        """Those of scale and torque."""
+        return (*self.scale.sources, *self.torque.sources)
 
     @property
     def deflection_range(self) -> tuple[float, float]:
