@@ -140,3 +140,36 @@ def test_full_disks(arguments: tuple[object, ...], code: int, message: str, tmp_
     assert (found, out) == (code, "")
     assert err.splitlines()[-1].startswith(message)  # Matplotlib may have complained before
     assert not contents(here)
+
+
+def test_figures_without_a_folder_for_what_matplotlib_keeps(feasible_result: Path, tmp_path: Path) -> None:
+    homeless = {"HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null", "XDG_CONFIG_HOME": "/dev/null"}
+    changes = {**homeless, "MPLCONFIGDIR": None}
+    found, out, err = run("plot", feasible_result, folder=tmp_path, changes=changes, preexec_fn=no_room)
+    assert (found, out) == (4, "")
+    assert err.splitlines()[-1].startswith(
+        "figures: cannot be drawn: Matplotlib has no folder for its files;"
+    )
+    assert not contents(tmp_path)
+
+
+EMPTY = {
+    "invdyn -o": ("invdyn", ROBOT, REST_TO_REST, "-o", ""),
+    "check-feasibility --plot": (*EXAMPLE, "--plot", ""),
+    "plot -o": ("plot", "r.h5", "--output="),
+    "codegen -o": ("codegen", ROBOT, "-o", ""),
+    "examples --copy": ("examples", "--copy", ""),
+    "new robot -o": ("new", "robot", "--joints", "R", "-o", ""),
+    "validate": ("validate", ROBOT, ""),
+    "info": ("info", ""),
+}
+
+
+@pytest.mark.parametrize("arguments", EMPTY.values(), ids=EMPTY)
+def test_a_variable_of_the_shell_that_is_not_set(
+    arguments: tuple[object, ...], vsacli: Any, tmp_path: Path
+) -> None:
+    done = vsacli(*arguments)
+    assert (done.code, done.out) == (2, "")
+    assert done.err.splitlines()[-1].endswith(": is empty; say what is meant")
+    assert not contents(tmp_path)

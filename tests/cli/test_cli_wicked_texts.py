@@ -134,6 +134,8 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("plot", "RESULT", "RESULT", "-o", "OUT/figures", "--format", "svg", "-v"),
     ("export", "RESULT", "-o", "OUT/table.csv", "--variables", "q,stiffness"),
     ("invdyn", "ROBOT", "OUT/table.csv", "-o", "OUT/again.h5"),
+    ("compare", "RESULT", "OUT/table.csv"),
+    ("sensitivity", "ROBOT", "MOVE", "--parameters", "joints.base.link.mass"),
     ("info", "RESULT"),
     ("info", "RESULT", "--json"),
     ("info", "RESULT", "--extract", "OUT/inputs"),
