@@ -17,6 +17,7 @@ import pytest
 from samples.command_line import ROBOT
 from samples.results import random_block, write_result
 
+from vsacli import open_result
 from vsacli.base.errors import InputError
 from vsacli.results.store import damage
 from vsacli.results.store.reader import StoredResult
@@ -158,19 +159,32 @@ def test_opening_reads_no_samples(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_damage_matters_where_it_is_read(
     vsacli: Any, small_result: Path, arguments: tuple[object, ...], code: int
 ) -> None:
-    shutil.copy(small_result, "r.h5")
+    with_damaged_flags(small_result, Path("r.h5"))
     shutil.copy(small_result.with_name("move.yaml"), "move.yaml")
-    with h5py.File("r.h5", "r+") as file:
-        where = file["flags"].id.get_chunk_info(0).byte_offset
-    with Path("r.h5").open("r+b") as raw:
-        raw.seek(where)
-        raw.write(b"no deflate stream")
     done = vsacli(*arguments)
     assert done.code == code
     if code:
         assert "r.h5: variable flags is damaged or truncated (" in done.out + done.err
         assert "; compute it again\n" in done.out + done.err
         assert not Path("figures").exists()
+
+
+def with_damaged_flags(small_result: Path, path: Path) -> None:
+    """Copy a result and change bytes of a variable that is compressed."""
+    shutil.copy(small_result, path)
+    with h5py.File(path, "r+") as file:
+        where = file["flags"].id.get_chunk_info(0).byte_offset
+    with path.open("r+b") as raw:
+        raw.seek(where)
+        raw.write(b"no deflate stream")
+
+
+def test_a_damaged_variable_is_no_missing_attribute(small_result: Path, tmp_path: Path) -> None:
+    with_damaged_flags(small_result, tmp_path / "r.h5")
+    with open_result(tmp_path / "r.h5") as result:
+        assert result.phi.shape == (11, 3, 2)
+        with pytest.raises(InputError, match="variable flags is damaged or truncated"):
+            result.flags  # noqa: B018 - reading is what fails
 
 
 def test_damage_of_an_attribute_is_found(vsacli: Any, small_result: Path) -> None:
