@@ -33,11 +33,11 @@ class Dual(NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or options:
             raise NotImplementedError(f"numpy.{ufunc.__name__}.{method} carries no derivatives along")
+        if ufunc in FREQUENT:
+            return FREQUENT[ufunc](*inputs)
         values = [value_of(each) for each in inputs]
         if ufunc in FLAT:
             return ufunc(*values)
-        if ufunc in SUMS:
-            return _sum_of(ufunc, inputs, ufunc(*values))
         if ufunc not in SLOPES:
             raise NotImplementedError(f"numpy.{ufunc.__name__} carries no derivatives along")
         result = ufunc(*values)
@@ -51,6 +51,23 @@ class Dual(NDArrayOperatorsMixin):
         if function not in ARRANGED:
             raise NotImplementedError(f"numpy.{function.__name__} carries no derivatives along")
         return ARRANGED[function](*arguments, **options)
+
+    # What the recursion is made of, without the way through NumPy's protocol: a fifth of its time.
+
+    def __add__(self, other: Any) -> Dual:
+        return _sum_of(self, other)
+
+    def __sub__(self, other: Any) -> Dual:
+        return _difference_of(self, other)
+
+    def __mul__(self, other: Any) -> Dual:
+        return _product_of(self, other)
+
+    def __rmul__(self, other: Any) -> Dual:
+        return _product_of(self, other)
+
+    def __neg__(self) -> Dual:
+        return Dual(-self.value, -self.tangent)
 
     def __getitem__(self, index: Any) -> Dual:
         places = index if isinstance(index, tuple) else (index,)
@@ -114,21 +131,44 @@ def tangent_of(array: Any, directions: int, shape: tuple[int, ...]) -> FloatArra
 def _spread(tangent: FloatArray, dimensions: int) -> FloatArray:
     """A tangent that can be broadcast with values of more dimensions."""
     missing = dimensions - (tangent.ndim - 1)
+    if not missing:
+        return tangent
     return tangent.reshape(tangent.shape[0], *[1] * missing, *tangent.shape[1:])
 
 
-def _sum_of(ufunc: np.ufunc, inputs: Sequence[Any], value: FloatArray) -> Dual:
-    """A sum or difference; what has no tangent adds nothing to it."""
-    first, second = inputs
-    dimensions = np.ndim(value)
+def _sum_of(first: Any, second: Any) -> Dual:
+    """A sum; what has no tangent adds nothing to it."""
+    if not isinstance(first, Dual):
+        first, second = second, first
     if not isinstance(second, Dual):
-        tangent = _spread(first.tangent, dimensions)
-    elif isinstance(first, Dual):
-        tangent = ufunc(_spread(first.tangent, dimensions), _spread(second.tangent, dimensions))
-    else:
-        tangent = _spread(second.tangent, dimensions)
-        tangent = tangent if ufunc is np.add else -tangent
-    return Dual(value, tangent)
+        value = first.value + second
+        return Dual(value, _spread(first.tangent, value.ndim))
+    value = first.value + second.value
+    return Dual(value, _spread(first.tangent, value.ndim) + _spread(second.tangent, value.ndim))
+
+
+def _difference_of(first: Any, second: Any) -> Dual:
+    """A difference."""
+    if not isinstance(second, Dual):
+        value = first.value - second
+        return Dual(value, _spread(first.tangent, value.ndim))
+    value = value_of(first) - second.value
+    tangent = _spread(second.tangent, np.ndim(value))
+    if not isinstance(first, Dual):
+        return Dual(value, -tangent)
+    return Dual(value, _spread(first.tangent, value.ndim) - tangent)
+
+
+def _product_of(first: Any, second: Any) -> Dual:
+    """A product, by Leibniz's rule."""
+    if not isinstance(first, Dual):
+        first, second = second, first
+    if not isinstance(second, Dual):
+        value = first.value * second
+        return Dual(value, _spread(first.tangent, value.ndim) * second)
+    value = first.value * second.value
+    tangent = _spread(first.tangent, value.ndim) * second.value
+    return Dual(value, tangent + _spread(second.tangent, value.ndim) * first.value)
 
 
 def _chained(slopes: Sequence[Callable[[], Any]], inputs: Sequence[Any], dimensions: int) -> FloatArray:
@@ -154,7 +194,6 @@ Slopes = Callable[..., Sequence[Callable[[], Any]]]
 """From the result and the operands of a function: its derivative by each operand, computed if needed."""
 
 SLOPES: Mapping[np.ufunc, Slopes] = {
-    np.multiply: lambda _r, a, b: (lambda: b, lambda: a),
     np.divide: lambda r, _a, b: (lambda: 1.0 / b, lambda: -r / b),
     np.power: lambda r, a, b: (lambda: b * a ** (b - 1.0), lambda: r * np.log(a)),
     np.negative: lambda _r, _a: (lambda: -1.0,),
@@ -185,8 +224,12 @@ SLOPES: Mapping[np.ufunc, Slopes] = {
 }
 """The functions of NumPy that carry derivatives along."""
 
-SUMS = frozenset({np.add, np.subtract})
-"""Functions that treat tangents as they do values: by far the most frequent ones beside products."""
+FREQUENT: Mapping[np.ufunc, Callable[[Any, Any], Dual]] = {
+    np.add: _sum_of,
+    np.subtract: _difference_of,
+    np.multiply: _product_of,
+}
+"""Functions without the detour by slopes."""
 
 FLAT = frozenset(
     {

@@ -72,7 +72,8 @@ def analysed(
         InputError: a tolerance is none.
     """
     robot, given = run.robot, None if tolerances is None else tolerances_of(tolerances, run.parameters)
-    effects = Effects(np.array([step_of(each) for each in run.parameters]), len(robot.joints))
+    steps = np.array([step_of(each) for each in run.parameters])
+    effects = Effects(steps, run.trajectory.times.block(0, run.trajectory.samples), len(robot.joints))
     sizes = np.zeros(len(run.parameters)) if given is None else deviations(given)
     band = None if given is None else Band(sizes)
     for part in run:

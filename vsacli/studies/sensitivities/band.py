@@ -64,18 +64,16 @@ class Band:
         """Merge the next block."""
         block = part.block
         gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
-        self._parts.append(
-            (
-                np.asarray(block.time),
-                np.asarray(block.tau_motor),
-                gap,
-                *(self._deviation(part.by_name[name]) for name in ("tau_motor", MARGIN)),
-            )
-        )
-
-    def _deviation(self, slopes: FloatArray) -> FloatArray:
-        counted = self._variances > 0
-        return np.asarray(np.sqrt(np.einsum("p...,p->...", slopes[counted] ** 2, self._variances[counted])))
+        of_torque, of_margin = np.zeros_like(block.tau_motor), np.zeros_like(gap)
+        for group in part.groups:
+            variances = self._variances[group.places]
+            known = np.flatnonzero(variances)
+            for joint, slopes in enumerate(group.of_joints if known.size else ()):
+                if slopes is not None:
+                    torque, of_gap = (slopes[name][known] ** 2 for name in ("tau_motor", MARGIN))
+                    of_torque[:, joint] += np.einsum("pms,p->sm", torque, variances[known])
+                    of_margin[:, joint] += np.einsum("ps,p->s", of_gap, variances[known])
+        self._parts.append((part.time, block.tau_motor, gap, np.sqrt(of_torque), np.sqrt(of_margin)))
 
     def curves(self) -> TorqueCurves:
         """Torques and their deviations so far."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -41,31 +42,51 @@ class Effects:
         failed: how many steps of joints are infeasible or singular.
     """
 
-    def __init__(self, steps: FloatArray, joints: int) -> None:
+    def __init__(self, steps: FloatArray, times: FloatArray, joints: int) -> None:
         """Begin.
 
         Args:
             steps: by how much each parameter changes.
+            times: of all steps of the run, s.
             joints: how many there are.
         """
         shape = (len(steps), joints)
         self._steps = steps
+        self._weights = _trapezoidal(times)
+        self._done = 0
         self.peak = np.zeros(joints)
         self.largest, self.time, self.spent = np.zeros((3, *shape))
         self.motor = np.ones(shape, dtype=int)
         self.smallest = Smallest(np.full(joints, np.inf), np.zeros(joints), np.zeros(shape))
         self.failed = 0
         self._flags = np.zeros(1, dtype=np.uint16)
-        self._last: tuple[float, FloatArray] | None = None
 
     def add(self, part: Derivatives) -> None:
         """Merge the next block."""
-        time, flags = np.asarray(part.block.time), np.asarray(part.block.flags)
-        self._flags |= np.bitwise_or.reduce(flags, axis=None)
-        self.failed += int(np.count_nonzero(has(flags, Flag.INFEASIBLE | Flag.SINGULAR)))
-        self._add_torque(time, np.asarray(part.block.tau_motor), part.by_name["tau_motor"])
-        self._add_margin(time, part)
-        self._add_energy(time, np.asarray(part.block.motor_power), part.by_name["motor_power"])
+        block = part.block
+        self._flags |= np.bitwise_or.reduce(block.flags, axis=None)
+        self.failed += int(np.count_nonzero(has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR)))
+        self.peak = np.fmax(self.peak, np.fmax.reduce(np.abs(block.tau_motor), axis=(0, 2)))
+        weights = self._weights[self._done : self._done + len(part.time), None, None]
+        spending = weights * (block.motor_power > 0)
+        gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+        gap = np.where(np.isfinite(gap), gap, np.inf)
+        worst, joints = gap.argmin(axis=0), np.arange(gap.shape[1])
+        smaller = gap[worst, joints] < self.smallest.value
+        self.smallest.slopes[:, smaller] = 0.0
+        for group in part.groups:
+            for joint, slopes in enumerate(group.of_joints):
+                if slopes is None or not group.places:
+                    continue
+                self._add_torque(part.time, slopes["tau_motor"], group.places, joint)
+                self._add_energy(slopes["motor_power"], spending[:, joint], group.places, joint)
+                if smaller[joint]:
+                    self.smallest.slopes[group.places, joint] = slopes[MARGIN][:, worst[joint]]
+        self.smallest = self.smallest._replace(
+            value=np.where(smaller, gap[worst, joints], self.smallest.value),
+            time=np.where(smaller, part.time[worst], self.smallest.time),
+        )
+        self._done += len(part.time)
 
     @property
     def verdict(self) -> str:
@@ -73,39 +94,27 @@ class Effects:
         judged = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "over_limit": LIMITS}
         return next((verdict for verdict, bits in judged.items() if has(self._flags, bits).any()), "ok")
 
-    def _add_torque(self, time: FloatArray, torque: FloatArray, slopes: FloatArray) -> None:
-        self.peak = np.fmax(self.peak, np.fmax.reduce(np.abs(torque), axis=(0, 2)))
-        changes = np.abs(slopes) * self._steps[:, None, None, None]
-        changes = np.nan_to_num(np.moveaxis(changes, 1, -1), nan=0.0)  # (parameters, joints, 2, samples)
-        flat = changes.reshape(*changes.shape[:2], -1)
-        worst = flat.argmax(axis=-1)
-        found = np.take_along_axis(flat, worst[..., None], axis=-1)[..., 0]
-        larger = found > self.largest
-        self.largest = np.where(larger, found, self.largest)
-        self.time = np.where(larger, time[worst % len(time)], self.time)
-        self.motor = np.where(larger, 1 + worst // len(time), self.motor)
+    def _add_torque(self, time: FloatArray, slopes: FloatArray, places: Sequence[int], joint: int) -> None:
+        changes = np.abs(slopes).reshape(len(places), -1)
+        np.copyto(changes, 0.0, where=np.isnan(changes))
+        worst = changes.argmax(axis=1)
+        found = changes[np.arange(len(places)), worst] * self._steps[places]
+        larger = found > self.largest[places, joint]
+        at = np.asarray(places)[larger]
+        self.largest[at, joint] = found[larger]
+        self.time[at, joint] = time[worst[larger] % len(time)]
+        self.motor[at, joint] = 1 + worst[larger] // len(time)
 
-    def _add_margin(self, time: FloatArray, part: Derivatives) -> None:
-        block = part.block
-        gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
-        gap = np.where(np.isfinite(gap) & np.isfinite(part.by_name[MARGIN]).all(axis=0), gap, np.inf)
-        worst = gap.argmin(axis=0)
-        joints = np.arange(gap.shape[1])
-        smaller = gap[worst, joints] < self.smallest.value
-        self.smallest = Smallest(
-            np.where(smaller, gap[worst, joints], self.smallest.value),
-            np.where(smaller, time[worst], self.smallest.time),
-            np.where(smaller, part.by_name[MARGIN][:, worst, joints], self.smallest.slopes),
-        )
+    def _add_energy(
+        self, slopes: FloatArray, spending: FloatArray, places: Sequence[int], joint: int
+    ) -> None:
+        """What motors take back does not count as spent."""
+        known = np.where(np.isfinite(slopes), slopes, 0.0).reshape(len(places), -1)
+        self.spent[places, joint] += known @ spending.T.ravel() * self._steps[places]
 
-    def _add_energy(self, time: FloatArray, power: FloatArray, slopes: FloatArray) -> None:
-        """By the trapezoidal rule; what motors take back does not count as spent."""
-        spending = np.where(np.isfinite(slopes) & (power > 0), slopes, 0.0).sum(axis=-1)
-        if self._last is not None:
-            before, rate = self._last
-            time = np.concatenate(([before], time))
-            spending = np.concatenate((rate[:, None], spending), axis=1)
-        if len(time) > 1:
-            means = (spending[:, 1:] + spending[:, :-1]) / 2
-            self.spent += np.einsum("pkj,k,p->pj", means, np.diff(time), self._steps)
-        self._last = float(time[-1]), spending[:, -1]
+
+def _trapezoidal(times: FloatArray) -> FloatArray:
+    """Weights of the trapezoidal rule over times, (samples,), s."""
+    halves = np.diff(times) / 2
+    weights: FloatArray = np.append(halves, 0.0) + np.append(0.0, halves)
+    return weights
