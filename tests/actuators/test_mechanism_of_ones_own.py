@@ -9,7 +9,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from samples.marks import needs, needs_compiler
+from samples.marks import needs, needs_compiler, slow
 from samples.own_mechanism import AdjustableArm
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
@@ -56,7 +56,7 @@ def test_a_robot_file_has_it_and_describes_it(arm):
     "engine",
     [
         "numpy",
-        pytest.param("c", marks=needs_compiler),
+        pytest.param("c", marks=(needs_compiler, pytest.mark.slow)),
     ],
 )
 def test_its_torques_move_a_model_made_from_the_potential_alone(arm, tmp_path, engine):
@@ -92,7 +92,7 @@ def full_model(time, torque, start):
     return solve_ivp(rates, time[[0, -1]], start, "DOP853", time, rtol=1e-12, atol=1e-13).y
 
 
-@pytest.mark.parametrize("controller", ["feedforward", "feedback-linearization"])
+@pytest.mark.parametrize("controller", ["feedforward", slow("feedback-linearization")])
 def test_a_simulation_follows_the_command(arm, controller):
     report = json.loads(
         ok(arm("simulate", "arm.yaml", "move.yaml", "--controller", controller, "-o", "sim.h5", "--json")).out
@@ -104,6 +104,7 @@ def test_a_simulation_follows_the_command(arm, controller):
     assert joint["energy"]["co_contraction"] is None
 
 
+@pytest.mark.slow
 def test_an_initial_error_of_position_and_stiffness_dies_out(arm):
     options = (
         "--initial-error",
@@ -130,6 +131,7 @@ def test_feasibility_names_the_corridor(arm, tmp_path):
     assert "below the 80" in refused.out
 
 
+@pytest.mark.slow
 def test_figures_are_drawn(arm):
     ok(arm("invdyn", "arm.yaml", "move.yaml", "-o", "move.h5"))
     ok(arm("plot", "move.h5", "-o", "figures"))

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from samples.driven_arm import ARM, LINK, assert_follows
 from samples.full_model import Drive, springs_of
+from samples.marks import slow, slow_but
 from samples.mechanisms import DEVICES
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 
@@ -46,7 +48,7 @@ OTHERS: dict[str, Case] = {
 }
 
 
-@pytest.mark.parametrize("name", DEVICES)
+@pytest.mark.parametrize("name", slow_but(MECHANISMS, DEVICES))
 def test_a_pendulum_follows(name: str) -> None:
     actuator, drive, stiffness = of_device(name)
     assert_follows(LINK, [actuator], [drive], [stiffness])
@@ -54,7 +56,11 @@ def test_a_pendulum_follows(name: str) -> None:
 
 @pytest.mark.parametrize(
     "kinds",
-    [("awas", "antagonistic", "elastic"), ("antagonistic", "awas", "rigid"), ("rigid", "elastic", "awas")],
+    [
+        ("awas", "antagonistic", "elastic"),
+        slow(("antagonistic", "awas", "rigid")),
+        slow(("rigid", "elastic", "awas")),
+    ],
 )
 def test_an_arm_of_many_kinds_follows(kinds: tuple[str, ...]) -> None:
     actuators, drives, stiffness = zip(*(OTHERS.get(kind) or of_device(kind) for kind in kinds), strict=True)
