@@ -16,7 +16,7 @@ from samples.marks import slow_but
 from vsacli import load_robot
 from vsacli.actuators.laws import Cubic
 from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.mechanisms.potentials.potential import Potential, Ranges, Start
+from vsacli.actuators.mechanisms.potentials.potential import BranchStart, Potential, PotentialRange
 from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
 from vsacli.actuators.mechanisms.ratios.awas import Awas
 from vsacli.actuators.pairs import make_pair
@@ -42,32 +42,32 @@ joints:
 AWAS = Potential(
     energy="k*(r*theta_2)^2*sin(theta_1 - q)^2",
     constants=(("k", 50000.0), ("r", 0.01)),
-    start=Start(theta_1=0, theta_2=8),
-    range=Ranges(phi=(-0.9, 0.9), theta_2=(5, 12)),
+    start=BranchStart(theta_1=0, theta_2=8),
+    range=PotentialRange(phi=(-0.9, 0.9), theta_2=(5, 12)),
 )
 MACCEPA = Potential(
     energy="k/2*(sqrt(B^2 + C^2 - 2*B*C*cos(phi)) - (C - B) + r*theta_2)^2",
     constants=(("k", 394.0), ("B", 0.036), ("C", 0.135), ("r", 0.015)),
-    start=Start(theta_1=0.05, theta_2=3),
-    range=Ranges(phi=(-3.1, 3.1), theta_2=(0, 6)),
+    start=BranchStart(theta_1=0.05, theta_2=3),
+    range=PotentialRange(phi=(-3.1, 3.1), theta_2=(0, 6)),
 )
 TWO_SPRINGS = Potential(
     energy="k/2*((theta_1 - q)^2 + (theta_2 - q)^2) + k_c/4*((theta_1 - q)^4 + (theta_2 - q)^4)",
     constants=(("k", 400.0), ("k_c", 2000.0)),
-    start=Start(theta_1=0.2, theta_2=-0.2),
-    range=Ranges(phi=(-2, 2), theta_2=(-9, 9)),
+    start=BranchStart(theta_1=0.2, theta_2=-0.2),
+    range=PotentialRange(phi=(-2, 2), theta_2=(-9, 9)),
 )
 BOWED = Potential(
     energy="k/2*(r*theta_2)^2*(phi - bow*sin(2*q))^2 + k_c*phi^4/(1 + theta_2/5)",
     constants=(("k", 50000.0), ("k_c", 500.0), ("r", 0.01), ("bow", 0.1)),
-    start=Start(theta_1=0, theta_2=10),
-    range=Ranges(phi=(-0.8, 0.8), theta_2=(4, 20)),
+    start=BranchStart(theta_1=0, theta_2=10),
+    range=PotentialRange(phi=(-0.8, 0.8), theta_2=(4, 20)),
 )
 WAVY = Potential(
     energy="a*phi^2*(2 + sin(theta_2))*(1 + c*phi^2) + b*phi*sin(3*theta_2)",
     constants=(("a", 5.0), ("b", 0.6), ("c", 1.5)),
-    start=Start(theta_1=0.1, theta_2=0.3),
-    range=Ranges(phi=(-1, 1), theta_2=(-3, 3)),
+    start=BranchStart(theta_1=0.1, theta_2=0.3),
+    range=PotentialRange(phi=(-1, 1), theta_2=(-3, 3)),
 )
 """Level curves that wind, and several pieces on most of them."""
 
@@ -187,8 +187,8 @@ def random_potential(number: int) -> Potential:
             return Potential(
                 energy=energy,
                 constants=constants,
-                start=Start(theta_1=float(draw(-0.6, 0.6)), theta_2=float(draw(-1.5, 1.5))),
-                range=Ranges(phi=(-1, 1), theta_2=(-2, 2)),
+                start=BranchStart(theta_1=float(draw(-0.6, 0.6)), theta_2=float(draw(-1.5, 1.5))),
+                range=PotentialRange(phi=(-1, 1), theta_2=(-2, 2)),
             )
         except InvalidRecordError:
             continue
@@ -284,11 +284,11 @@ REFUSED = {
     "no second motor": ({"energy": "k*r*phi^2"}, "energy: does not depend on theta_2"),
     "no link": ({"energy": "k*r*theta_1*theta_2"}, "energy: does not depend on q"),
     "a range without width": (
-        {"range": Ranges(phi=(0, 0), theta_2=(5, 12))},
+        {"range": PotentialRange(phi=(0, 0), theta_2=(5, 12))},
         "range.phi: must have two finite ends, the lower one first",
     ),
     "a start outside": (
-        {"start": Start(theta_1=0, theta_2=13)},
+        {"start": BranchStart(theta_1=0, theta_2=13)},
         "start.theta_2: must lie within the range of theta_2, 5 to 12, not at 13",
     ),
     "a negative stiffness": (

@@ -106,6 +106,15 @@ def test_whole_powers_hold_at_zero_where_others_divide_by_it():
         assert not np.isfinite(jet_of("root", [zero, zero, zero]).derivative((1, 0, 0)))
 
 
+def test_powers_beyond_all_sense_take_no_time():
+    jet = SERIES.linear(np.full(1, 0.999), (1, 0, 0))
+    for exponent in (1000, 1001, 1e300):
+        power = jet**exponent
+        np.testing.assert_allclose(power.value, 0.999**exponent, rtol=1e-12)
+        slope = exponent * 0.999 ** (exponent - 1)
+        np.testing.assert_allclose(power.derivative((1, 0, 0)), slope, rtol=1e-12)
+
+
 def test_what_vanishes_everywhere_costs_nothing():
     x, y = (SERIES.linear(np.ones(2), unit) for unit in ((1, 0, 0), (0, 1, 0)))
     difference = (x - x) * FUNCTIONS["sin"](y)

@@ -16,8 +16,8 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.mechanisms.potentials.potential import BranchStart, PotentialRange
 from vsacli.actuators.mechanisms.potentials.potential import Potential as OwnPotential
-from vsacli.actuators.mechanisms.potentials.potential import Ranges, Start
 from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
 from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
 from vsacli.actuators.mechanisms.ratios.awas import Awas
@@ -219,8 +219,8 @@ DEVICES = {
         mechanism=OwnPotential(
             energy="k/2*(r*theta_2)^2 * (phi - bow*sin(2*q))^2",
             constants=(("k", 50000), ("r", 0.01), ("bow", 0.1)),
-            start=Start(theta_1=0, theta_2=10),
-            range=Ranges(phi=(-0.8, 0.8), theta_2=(4, 20)),
+            start=BranchStart(theta_1=0, theta_2=10),
+            range=PotentialRange(phi=(-0.8, 0.8), theta_2=(4, 20)),
         ),
         potential=_bowed(50000, 0.01, 0.1),
         stiffness=(300, 500),
@@ -231,8 +231,8 @@ DEVICES = {
         mechanism=OwnPotential(
             energy="k/2*((theta_1 - q)^2 + (theta_2 - q)^2) + k_c/4*((theta_1 - q)^4 + (theta_2 - q)^4)",
             constants=(("k", 50), ("k_c", 1000)),
-            start=Start(theta_1=0.2, theta_2=-0.2),
-            range=Ranges(phi=(-1, 1), theta_2=(-5, 5)),
+            start=BranchStart(theta_1=0.2, theta_2=-0.2),
+            range=PotentialRange(phi=(-1, 1), theta_2=(-5, 5)),
         ),
         potential=_two_springs(50, 1000),
         stiffness=(220, 300),

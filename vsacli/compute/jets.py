@@ -22,6 +22,9 @@ Order = tuple[int, ...]
 
 Terms = Mapping[Order, Scalar]
 
+MOST_FACTORS = 1000
+"""Exponent up to which whole powers are products, so that they hold at zero, too."""
+
 
 class Truncation:
     """Which derivatives jets hold; with each also those of fewer differentiations.
@@ -126,7 +129,7 @@ class Jet:
     def __pow__(self, exponent: Any) -> Jet:
         if isinstance(exponent, Jet):
             return _compose(_exponential, _compose(_logarithmic, self) * exponent)
-        if not float(exponent).is_integer():
+        if not (float(exponent).is_integer() and abs(exponent) <= MOST_FACTORS):
             return _power(self, exponent)
         power = _whole_power(self, abs(int(exponent)))
         return power if exponent >= 0 else _reciprocal(power)

@@ -12,7 +12,7 @@ from vsacli.base.lazy import LazyRegistry, lazy_exports
 if TYPE_CHECKING:
     from vsacli.actuators.laws.pair import PairSolution
     from vsacli.actuators.mechanisms.mechanism import Mechanism
-    from vsacli.actuators.mechanisms.potentials.potential import Potential
+    from vsacli.actuators.mechanisms.potentials.potential import BranchStart, Potential, PotentialRange
     from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
     from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
     from vsacli.actuators.mechanisms.ratios.awas import Awas
@@ -51,6 +51,7 @@ __all__ = [
     "STIFFNESS",
     "TORQUE",
     "Awas",
+    "BranchStart",
     "Cam",
     "Lever",
     "Maccepa",
@@ -60,6 +61,7 @@ __all__ = [
     "Partials",
     "PolynomialScale",
     "Potential",
+    "PotentialRange",
     "Power",
     "ShiftedCams",
     "Sine",

@@ -45,7 +45,7 @@ which A is taken for singular."""
 
 
 @dataclass(frozen=True)
-class Start:
+class BranchStart:
     """A state of the springs that names the branch."""
 
     theta_1: float = number(units.POSITION, "position of motor 1")
@@ -56,7 +56,7 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Ranges:
+class PotentialRange:
     """Where the potential holds."""
 
     phi: tuple[float, float] = interval(units.POSITION, "deflection theta_1 - q")
@@ -77,8 +77,10 @@ class Potential(Mechanism):
     constants: tuple[tuple[str, float], ...] = value(
         NamedNumbers(), "constants of the energy by name", check=FINITE, default=()
     )
-    start: Start = value(Record(Start), "where q = 0: motor positions that name the branch")
-    range: Ranges = value(Record(Ranges), "where the energy holds; its ends bound the stiffness")
+    start: BranchStart = value(Record(BranchStart), "where q = 0: motor positions that name the branch")
+    range: PotentialRange = value(
+        Record(PotentialRange), "where the energy holds; its ends bound the stiffness"
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)
