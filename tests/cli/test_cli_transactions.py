@@ -77,7 +77,9 @@ TASKS = {
 
 STARTS = ("new", "overwriting")
 
-CASES = [(name, start) for name, task in TASKS.items() for start in STARTS[: 1 + task.overwrites]]
+CASES = [
+    (name, STARTS[number % 2 if task.overwrites else 0]) for number, (name, task) in enumerate(TASKS.items())
+]
 
 State = dict[str, bytes | None]
 """What is in a folder: files with their bytes, folders with None."""
@@ -202,7 +204,7 @@ def sample(calls: Sequence[str], most: int, draw: random.Random) -> list[int]:
     return sorted(draw.sample(chosen, min(most, len(chosen))))
 
 
-QUICK = {("new robot", "overwriting")}
+QUICK = {case for case in CASES if case[0] == "new robot"}
 
 TRIED = 1
 """Calls of each task and start, of some twenty to five hundred; all of them take hours."""
@@ -224,8 +226,8 @@ def test_all_is_new_or_nothing(stage: MakeStage, case: tuple[str, str]) -> None:
 def test_a_moment_at_random(stage: MakeStage) -> None:
     """Whatever a command does just then, and whichever it is."""
     draw = random.Random(0)
-    for name, start in draw.sample(CASES, 10):
-        there = stage(name, start)
+    for case in draw.sample(CASES, 6):
+        there = stage(*case)
         check_moment(there, draw.choice(ENDING), draw.random())
 
 

@@ -158,10 +158,7 @@ TOO_LONG = 4
 """Exit code where two names of 200 letters make one that the file system does not take."""
 
 
-EVERYWHERE = (
-    *("comment", "markdown", "spreadsheet", "shell", "option", "parent", "path", "markup", "letters", "long"),
-    *(f"unprintable {kind}" for kind in ("escape", "break", "bidirectional", "long")),
-)
+EVERYWHERE = ("shell", "markup", "letters", "long", "unprintable escape")
 """Texts that every command gets; the others differ from these by what a file that is read may hold."""
 
 
