@@ -25,6 +25,8 @@ joints:
 AWAS = "mechanism: {type: awas, k: 60000, arm: [0.02, 0.1], lead: 0.01}"
 LEVER = "mechanism: {type: lever, k: 500, length: 0.1, pivot: [0.02, 0.1], lead: 1}"
 RATIO = "mechanism: {type: variable_ratio, setting: [0, 2], torque: {type: sine, k: 300}, scale: "
+OF_CUBIC = RATIO.replace("sine, k: 300", "cubic, k: 300, k_c: 9, max_deflection: 1")
+LIMITED = OF_CUBIC + "{type: power, exponent: 1, offset: 1}}"
 
 
 def load(*lines: str) -> object:
@@ -46,6 +48,7 @@ def load(*lines: str) -> object:
         ((f"{RATIO}{{type: power, exponent: -1, lead: -1, offset: 1}}}}",), "not positive at theta_2 = 1"),
         ((f"{RATIO}{{type: polynomial, c0: 1, c1: 2, c2: -1}}}}",), "it has no slope near theta_2 = 1"),
         ((f"{RATIO}{{type: polynomial, c0: 1}}}}",), "scale: must rise or fall over all of `setting`"),
+        ((LIMITED,), "torque.max_deflection: is no limit of a serial actuator"),
         ((AWAS.replace("awas", "awass"),), "mechanism.type: unknown word 'awass'; did you mean 'awas'?"),
         ((AWAS, "coupled_inertia: -0.2"), "is -0.2 on the joint side of the gears; its size must be below"),
         ((AWAS, "preload: negative"), "unknown key 'preload'"),

@@ -75,6 +75,9 @@ class VariableRatio(Mechanism):
             problems.append(FieldProblem(("setting",), "must have two ends, the smaller one first"))
         else:
             problems += [FieldProblem(("scale",), each) for each in self.scale.problems(self.setting)]
+        if isinstance(self.torque, SpringLaw) and np.isfinite(self.torque.max_deflection):
+            reason = "is no limit of a serial actuator; leave it out (a table, for one, ends by itself)"
+            problems.append(FieldProblem(("torque", "max_deflection"), reason))
         check_fields(self, *problems)
 
     @classmethod
