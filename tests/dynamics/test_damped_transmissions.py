@@ -26,8 +26,11 @@ from vsacli.actuators.transmission import Command
 from vsacli.analysis.run import Run
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
+from vsacli.base.signals import DAMPING, POSITION
 from vsacli.dynamics.internal_motion import internal_motions
 from vsacli.dynamics.internal_motion.march import March
+from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
@@ -249,3 +252,17 @@ def test_motions_inside_go_as_far_as_the_trajectory() -> None:
     assert inside.joints == (0,)
     assert not inside.stops
     assert np.isfinite(inside.at(np.linspace(0, DURATION, 9))[0].acceleration).all()
+
+
+def test_simulation_knows_how_fast_it_settles() -> None:
+    """Degree 7 begins with a jump of the snap: what moves inside settles within milliseconds."""
+    span = (0.0, 1.0)
+    position = RestToRest(signal=POSITION, span=span, degree=7, start=(-1.2,), end=(0.3,))
+    damping = RestToRest(signal=DAMPING, span=span, degree=3, start=(1.0,), end=(2.0,))
+    profiles = {"damping": damping}
+    trajectory = Trajectory(UniformTimes(1.0, 1000), position, profiles, name="abrupt")
+    robot = pendulum("elastic")
+    past, expected = simulate(robot, trajectory).history, inverse_dynamics(robot, trajectory)
+    peak = np.nanmax(np.abs(expected.tau_motor))
+    np.testing.assert_allclose(past.tau_motor, expected.tau_motor, rtol=0, atol=1e-9 * peak)
+    assert np.abs(past.q_error).max() < 1e-8

@@ -62,7 +62,8 @@ class Feedforward:
                 return torque
             return np.concatenate((torque - self._friction.torque(velocity), velocity), axis=-1)
 
-        self._table = tabulate(columns, trajectory.breakpoints)
+        ends = np.union1d(trajectory.breakpoints, trajectory.start + internal.breakpoints)
+        self._table = tabulate(columns, ends if internal.joints else trajectory.breakpoints)
         self.ending: Ending | None = None
         if (found := first_undefined(self._table)) is not None:
             time, column = found

@@ -39,6 +39,12 @@ class InternalMotions:
     _springs: Mapping[int, DampedSprings] = field(repr=False)
     _marched: Mapping[int, Marched] = field(repr=False)
 
+    @property
+    def breakpoints(self) -> FloatArray:
+        """Ends of the pieces, from the first step on, s: short where what moves inside dies away."""
+        ends = [each.phi.ends for each in self._marched.values() if each.phi is not None]
+        return np.unique(np.concatenate([np.zeros(0), *ends]))
+
     def at(self, elapsed: FloatArray) -> dict[int, InternalMotion]:
         """The motion of each joint at times from the first step on; NaN from a stop on."""
         return {joint: self._at(joint, elapsed) for joint in self.joints}
