@@ -70,6 +70,7 @@ def test_limits_are_flagged_where_they_are_exceeded(engine):
     assert f" {worst:.4g} A at t = " in str(report).replace(" -", " ")
 
 
+@pytest.mark.slow
 def test_limits_are_flagged_in_simulations():
     robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
     past = simulate(with_windings(robot, max_current=20), trajectory).history
