@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import stat
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from vsacli.base import staging
 from vsacli.base.errors import InputError, StorageError
+from vsacli.base.interrupts import ENDING, Interrupted, unwinding_when_ended
 from vsacli.base.outputs import Outputs, Staged
 from vsacli.base.storage import reporting_storage_errors, temporary_folder
 
@@ -205,3 +209,41 @@ def test_temporary_folders_of_killed_processes_are_removed(
     link.symlink_to("elsewhere")
     with temporary_folder() as place:
         assert set(tmp_path.iterdir()) == {place, tmp_path / "elsewhere"}
+
+
+@pytest.mark.usefixtures("own_signals")
+def test_a_signal_while_files_get_their_names_comes_too_late(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would say that nothing was written; one before them is in time."""
+    genuine = os.link
+
+    def ending(*arguments: Any) -> None:
+        signal.raise_signal(signal.SIGTERM)
+        genuine(*arguments)
+
+    monkeypatch.setattr(os, "link", ending)
+    with unwinding_when_ended():
+        with pytest.raises(Interrupted):
+            write_until_ended(tmp_path / "a")
+        assert not list(tmp_path.iterdir())
+        with Outputs() as outputs:
+            outputs.file(tmp_path / "a").write_text("whole")
+        signal.raise_signal(signal.SIGTERM)
+    signal.raise_signal(signal.SIGTERM)
+    assert contents(tmp_path) == {"a": "whole"}
+
+
+def write_until_ended(path: Path) -> None:
+    with Outputs() as outputs:
+        outputs.file(path).write_text("not read by anybody")
+        signal.raise_signal(signal.SIGTERM)
+
+
+@pytest.fixture
+def own_signals() -> Iterator[None]:
+    """The test may set what signals do."""
+    before = {number: signal.getsignal(number) for number in ENDING}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
