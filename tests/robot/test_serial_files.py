@@ -87,3 +87,14 @@ def test_a_table_of_scales_is_among_the_sources() -> None:
     Path("scale.csv").write_text("setting,scale\n0,3\n0.5,2.8\n1,2.5\n2,1.5\n")
     actuator = load(f"{RATIO}{{type: table, file: scale.csv}}}}")
     assert [Path(source.path).name for source in actuator.sources] == ["scale.csv"]
+
+
+@pytest.mark.usefixtures("own_folder")
+def test_a_motor_that_sets_the_springs_is_held_against_no_link() -> None:
+    """Its size follows from its screw; that of the motor which carries the load does not."""
+    small = "{inertia: 2e-6, max_velocity: 900, max_torque: 0.05}"
+    text = HEAD.replace("{inertia: 0.02}", small) + f"      {AWAS}\n"
+    Path("arm.yaml").write_text(text.lstrip())
+    assert load_robot("arm.yaml").warnings == ()
+    Path("arm.yaml").write_text(text.lstrip().replace("{inertia: 0.3}", small))
+    assert len(load_robot("arm.yaml").warnings) == 3

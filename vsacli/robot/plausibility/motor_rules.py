@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from vsacli.actuators.motor import Motor
+from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import declared
-from vsacli.documents.plausibility import Measured, NumberPath, Rule, Slip
+from vsacli.documents.plausibility import Entry, Measured, NumberPath, Rule, Slip
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.body_rules import FASTEST, SIZES
 from vsacli.robot.plausibility.facts import Facts, joint_path, motors, ratio
@@ -45,6 +46,14 @@ def driven_motors(facts: Facts) -> Iterator[Driven]:
             yield Driven(number, joint, at, motor)
 
 
+def carrying_motors(facts: Facts) -> Iterator[Driven]:
+    """Those that move with the joint; one that only sets the springs may be as small and fast as it likes."""
+    for driven in driven_motors(facts):
+        last = driven.at[-1]
+        if driven.joint.actuator.has(VARIABLES["phi"])[last.number if isinstance(last, Entry) else 0]:
+            yield driven
+
+
 def _gear_ratios(facts: Facts, *, revolute: bool) -> Iterator[Measured]:
     for driven in driven_motors(facts):
         if driven.motor.gear_ratio is not None and driven.joint.is_revolute == revolute:
@@ -52,14 +61,14 @@ def _gear_ratios(facts: Facts, *, revolute: bool) -> Iterator[Measured]:
 
 
 def _rotors(facts: Facts) -> Iterator[Measured]:
-    for driven in driven_motors(facts):
+    for driven in carrying_motors(facts):
         size = ratio(driven.motor.at_joint.inertia, float(facts.sizes.inertias[driven.number]))
         yield driven.measured("inertia", size)
 
 
 def _heavy_rotors(facts: Facts) -> Iterator[Measured]:
     """Rotors of robots that are not tiny; those of fingers outweigh them by far behind their gears."""
-    for driven in driven_motors(facts) if facts.sizes.extent > TINY else ():
+    for driven in carrying_motors(facts) if facts.sizes.extent > TINY else ():
         lever = facts.sizes.extent if driven.joint.is_revolute else 1.0
         size = ratio(driven.motor.at_joint.inertia, facts.sizes.mass * lever**2)
         yield driven.measured("inertia", size)
@@ -73,7 +82,7 @@ def _motor_damping(facts: Facts) -> Iterator[Measured]:
 
 def _velocities(facts: Facts) -> Iterator[tuple[Measured, Driven]]:
     """Limits of velocity in rad/s, each with its motor and as its own size."""
-    for driven in driven_motors(facts):
+    for driven in carrying_motors(facts):
         measured = driven.measured("max_velocity", driven.motor.max_velocity)
         if measured.unit == "rad/s" and math.isfinite(measured.value):
             yield measured, driven
@@ -94,7 +103,7 @@ def _output_velocities(facts: Facts) -> Iterator[Measured]:
 
 def _torques(facts: Facts, *, least: bool) -> Iterator[Measured]:
     """Largest torque at the joint, over what its weight can ask of it, or over the weight at full reach."""
-    for driven in driven_motors(facts):
+    for driven in carrying_motors(facts):
         torque = driven.motor.at_joint.max_torque
         load = float(facts.sizes.loads[driven.number]) if least else facts.sizes.scale(driven.joint)
         if math.isfinite(torque) and (any(facts.gravity) or not least):
@@ -108,7 +117,7 @@ def _joint_damping(facts: Facts) -> Iterator[Measured]:
 
 def _braking(facts: Facts) -> Iterator[Measured]:
     """What damping takes at the largest velocity of the joint, over the largest torque; 0 without a limit."""
-    for driven in driven_motors(facts):
+    for driven in carrying_motors(facts):
         joint, motor = driven.joint, driven.motor.at_joint
         velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))
         if velocity < FASTEST:
