@@ -220,6 +220,15 @@ def test_help_of_both(vsacli: Any, command: str) -> None:
     assert f"vsacli new {command} " in done.out
 
 
+def test_a_new_robot_with_cams_comes_with_their_profile(vsacli: Any, tmp_path: Path) -> None:
+    command = ("new", "robot", "--joints", "R", "--actuator", "cam", "-o")
+    assert vsacli(*command, str(tmp_path / "arm.yaml")).code == 0
+    assert load_robot(tmp_path / "arm.yaml").joints[0].actuator_type == "serial"
+    again = vsacli(*command, str(tmp_path / "other.yaml"))
+    assert (again.code, "cam_profile.csv" in again.err) == (4, True)  # one of yours is not replaced
+    assert not (tmp_path / "other.yaml").exists()
+
+
 def test_a_new_trajectory_never_replaces_its_robot(vsacli: Any) -> None:
     Path("arm.yaml").write_text(robot_template("RP"))
     for output in ("arm.yaml", "./arm.yaml"):

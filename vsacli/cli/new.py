@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 import click
 
@@ -50,12 +51,15 @@ def new() -> None:
 def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk: Talk) -> None:
     """Write a robot file with these joints, to be edited.
 
-    It can be computed with as it is. Each key has a comment; what is optional stands commented out. Reports
-    say that its springs and motors are made up until the key `placeholder` is removed.
+    It can be computed with as it is; a profile that it names is written beside it. Each key has a comment;
+    what is optional stands commented out. Reports say that its springs and motors are made up until the key
+    `placeholder` is removed.
     """
+    from vsacli.files.examples import example_tables
     from vsacli.files.templates import robot_template
 
-    _write(robot_template(joints, actuator), output, overwrite, talk)
+    text = robot_template(joints, actuator)
+    _write(text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text])
 
 
 @new.command(
@@ -81,7 +85,15 @@ def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk
     _write(trajectory_template(robot), output, overwrite, talk, inputs)
 
 
-def _write(text: str, output: str | None, overwrite: bool, talk: Talk, inputs: Iterable[str] = ()) -> None:
+def _write(
+    text: str,
+    output: str | None,
+    overwrite: bool,
+    talk: Talk,
+    inputs: Iterable[str] = (),
+    tables: Iterable[Path] = (),
+) -> None:
+    """Write the text, and beside the file copies of these tables; standard output gets the text alone."""
     if output is None or output == STANDARD:
         click.echo(text, nl=False)
         return
@@ -89,4 +101,6 @@ def _write(text: str, output: str | None, overwrite: bool, talk: Talk, inputs: I
 
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         outputs.file(output).write_text(text)
+        for table in tables:
+            outputs.file(Path(output).parent / table.name).write_bytes(table.read_bytes())
     talk.wrote(outputs)

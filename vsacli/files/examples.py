@@ -107,6 +107,11 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
     return list(copies.values())
 
 
+def example_tables() -> list[Path]:
+    """The tables that robots name, as springs measured and profiles of cams."""
+    return sorted((_root() / "robots").rglob("*.csv"))
+
+
 def opening_comment(path: Path) -> str:
     """What the comment says with which a YAML file begins, in one line."""
     lines = path.read_text(encoding="utf-8").splitlines()
