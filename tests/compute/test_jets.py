@@ -68,7 +68,7 @@ def derivatives(case, rows):
     return [jet.derivative(order) + 0 * rows[0] for order in SERIES.orders]
 
 
-@pytest.mark.parametrize("case", slow_but({"tangent", "negative powers", "logarithm"}, CASES))
+@pytest.mark.parametrize("case", slow_but({"cosine", "negative powers"}, CASES))
 def test_every_derivative_is_the_one_that_sympy_finds(case):
     names = dict(zip("xyz", X, strict=True))
     function = sympy.nsimplify(sympy.sympify(CASES[case].replace("^", "**"), locals=names), rational=True)

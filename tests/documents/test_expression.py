@@ -5,7 +5,7 @@ import re
 
 import pytest
 import sympy
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vsacli.documents.expression import MAX_NESTING, ExpressionError, Grammar, parse
@@ -56,6 +56,7 @@ PARTS = st.deferred(
 )
 
 
+@settings(max_examples=50)
 @given(PARTS.filter(lambda text: len(text) < 60))
 def test_any_expression_has_the_value_that_python_finds(text):
     """Python's own parser knows the same precedence, and is never asked by the code under test."""

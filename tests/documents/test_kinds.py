@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 
 from vsacli.base.units import LENGTH, POSITION
 from vsacli.documents.fields import (
+    FINITE,
     NON_NEGATIVE,
     Boolean,
     Choice,
@@ -18,6 +20,7 @@ from vsacli.documents.fields import (
     Interval,
     Items,
     Kind,
+    NamedNumbers,
     Number,
     OneOf,
     Pair,
@@ -220,3 +223,12 @@ def json_of(record: Any) -> dict[str, Any]:
 )
 def test_plain(kind: Kind, content: Any, expected: Any) -> None:
     assert kind.json_value(content, json_of) == expected
+
+
+def test_named_numbers_are_pairs_that_go_by_their_names():
+    kind, content = NamedNumbers(), (("k", 3.0), ("turn", math.inf))
+    assert kind.json_value(content, lambda _: None) == {"k": 3.0, "turn": math.inf}
+    arrays = list(kind.arrays(content, lambda _: iter(())))
+    assert [(field.path, float(field.values)) for field in arrays] == [(("k",), 3.0), (("turn",), math.inf)]
+    problems = list(kind.problems(("constants",), FINITE, content))
+    assert [str(problem) for problem in problems] == ["constants.turn: must be finite, not inf"]
