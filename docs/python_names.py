@@ -12,7 +12,7 @@ import vsacli
 
 GROUPS = {
     "Robots": "load_robot import_urdf Robot Joint DenavitHartenberg Link Inertia Pose Limits Antagonistic "
-    "Elastic Rigid Serial Motor Friction laws mechanisms Placeholders",
+    "Elastic Rigid Serial Motor Friction Damper laws mechanisms Placeholders",
     "Trajectories": "load_trajectory Trajectory Motion Wrench",
     "Inverse dynamics and its results": "inverse_dynamics Result Report Flag open_result suggest "
     "compare Comparison sensitivity Sensitivity",

@@ -7,6 +7,7 @@ from vsacli.base.lazy import lazy_exports
 if TYPE_CHECKING:
     from vsacli.actuators import laws, mechanisms
     from vsacli.actuators.antagonistic import Antagonistic
+    from vsacli.actuators.damper import Damper
     from vsacli.actuators.elastic import Elastic
     from vsacli.actuators.friction import Friction
     from vsacli.actuators.motor import Motor
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Antagonistic",
+    "Damper",
     "Elastic",
     "Friction",
     "Motor",
