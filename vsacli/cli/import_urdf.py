@@ -61,7 +61,8 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     "--stiffness",
     metavar="NM/RAD",
     type=float,
-    help="Placeholder: of elastic joints; by default as stiff as what the joint carries asks for.",
+    help="Placeholder: of elastic joints, and in the middle of what serial ones reach; by default as stiff "
+    "as what the joint carries asks for.",
 )
 @click.option(
     "--spring",

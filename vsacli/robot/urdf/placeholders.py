@@ -51,7 +51,7 @@ class Placeholders(NamedTuple):
     Attributes:
         actuator: a key of `vsacli.actuators.kinds.ACTUATORS`.
         motor_inertia: of each motor, joint side of the gear.
-        stiffness: of an elastic transmission.
+        stiffness: of an elastic transmission, and in the middle of what a serial one reaches.
         spring: k and k_c of the cubic springs of an antagonistic one.
     """
 
