@@ -1,5 +1,8 @@
 """Smoothing splines for records with noise of any colour: right, or said not to be."""
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from samples.noisy_records import (
@@ -8,6 +11,7 @@ from samples.noisy_records import (
     MOTIONS,
     first_order,
     pauses,
+    random_motion,
     record,
     sines,
     sweep,
@@ -16,8 +20,9 @@ from samples.noisy_records import (
 )
 from scipy.interpolate import BSpline
 
-from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, fit_samples
+from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, fit_samples, search
 from vsacli.trajectory.fits.bins import Bins, uniform_basis
+from vsacli.trajectory.fits.moments import Moments
 from vsacli.trajectory.fits.noise import filtered_noise
 from vsacli.trajectory.fits.penalised import Model
 from vsacli.trajectory.fits.spectral_lines import spectral_lines
@@ -153,7 +158,7 @@ def test_estimate_is_that_of_dense_algebra(degree):
     """The penalised least squares of whitened bins, the restricted likelihood, and the deviations."""
     time = np.sort(np.random.default_rng(1).uniform(0, 2, 300))
     row = np.sin(3 * time) + 0.01 * np.random.default_rng(2).standard_normal(300)
-    bins = Bins.of(time, row, 20, degree)
+    bins = Bins.of(Moments.of(time, row, 40, degree))
     penalties = np.geomspace(1e-3, 1e2, bins.coefficients - degree)
     model = Model(bins, 0.4, penalties, 1)
     lag = 0.4**bins.gaps
@@ -307,3 +312,77 @@ def test_no_record_is_wrong_in_silence(colour):
         shown.append(np.mean(np.abs(off) < 2 * deviation))
     # of 240 records that state a deviation it was 93 % and more
     assert min(shown) > 0.9
+
+
+def test_bins_of_half_the_resolution_are_those_of_the_samples():
+    time = np.sort(np.random.default_rng(3).uniform(0, 2, 500))
+    row = np.cos(time)
+    fine, coarse = Moments.of(time, row, 64, 7), Moments.of(time, row, 32, 7)
+    for name in ("powers", "time", "row"):
+        # sums of some fifteen positive numbers
+        np.testing.assert_allclose(getattr(fine.halved, name), getattr(coarse, name), rtol=100 * EPS)
+    bins = Bins.of(coarse)
+    place = (time - time[0]) / bins.span
+    which = np.minimum((2 * place).astype(int), 31)
+    splines = np.stack(uniform_basis(place - which // 2, 7), axis=1)
+    sums = np.array([splines[which == k].mean(axis=0) for k in range(32) if (which == k).any()])
+    # polynomials of degree 7 whose coefficients are up to some 10
+    np.testing.assert_allclose(bins.design, sums, rtol=0, atol=1000 * EPS)
+
+
+def test_long_records_start_from_stretches(monkeypatch):
+    """With stretches as short as a second the search ends where that of the whole does."""
+    for motion in (pauses, sweep):
+        of = record(motion, "white, 1e-5 rad", 5)
+        whole = fitted(of)
+        monkeypatch.setattr(search, "MOST_SPANS_OF_GRID", 64)
+        parts = fitted(of)
+        monkeypatch.undo()
+        assert len(parts.parts[0].knots) == len(whole.parts[0].knots)
+        assert error(parts, of) < 1.3 * error(whole, of)  # a tenth of what is stated
+        stated = [fit.parts[0].smoothing.relative for fit in (whole, parts)]
+        assert stated[1] == pytest.approx(stated[0], rel=0.5)
+
+
+@pytest.mark.parametrize("motion", [sines, random_motion])
+def test_the_bias_is_that_of_the_motion(motion):
+    """Sines have none at the cut-off; a spectrum that falls slowly has more than the prior expects."""
+    of = record(motion, "white, 1e-4 rad", 1)
+    fit = fitted(of, SMOOTH)
+    inside = of.time[1000:-1000]
+    off = fit.at(inside, 5)[4, 0] - of.truth[1][1000:-1000]
+    deviation = np.sqrt(fit.covariance(inside)[0, 4, 4])
+    assert np.mean(np.abs(off) < 2 * deviation) > 0.85
+    # errors are 0.6 and 1.4 of the posterior's own deviation
+    assert 0.5 < np.sqrt(np.mean(off**2) / np.mean(deviation**2)) < 1.2
+
+
+@pytest.mark.slow
+def test_filtered_noise_is_said_where_no_resolution_is_accepted():
+    of = record(velocity_steps, "zero-phase low-pass, 20 Hz", 0)
+    fit = fitted(of)
+    # the spline goes through the samples, 29 % off
+    assert fit.parts[0].exact
+    assert alarmed(fit)
+
+
+def test_a_bandwidth_says_which_lines_are_noise():
+    of = record(sines, "17-bit encoder", 4)
+    shaken = of.values + 3e-4 * np.sin(2 * np.pi * 15 * of.time)
+    for bandwidth, lines in ((8.0, ()), (None, (15,))):
+        fit = fit_samples(of.time, shaken[None], 7, 4, SMOOTH, bandwidth=bandwidth)
+        assert fit.parts[0].smoothing.lines.others == pytest.approx(lines, abs=0.1)
+
+
+def test_fitting_tells_how_far_it_is():
+    of = record(sines, "white, 1e-4 rad", 0)
+    values = np.array([of.values, of.truth[0], np.full(len(of.time), np.nan)])
+    for method in (SMOOTH, None):
+        counted: list[int] = []
+
+        def progress(steps, counted=counted):
+            counted.append(steps)
+            return nullcontext(SimpleNamespace(update=counted.append))
+
+        fit_samples(of.time, values, 7, 4, method, progress=progress)
+        assert counted == [2 * len(of.time), len(of.time), len(of.time)]

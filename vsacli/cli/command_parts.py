@@ -108,7 +108,7 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> Inputs:
     from vsacli.trajectory.file import load_trajectory
 
     robot = load_robot(robot_path)
-    trajectory = load_trajectory(trajectory_path, robot)
+    trajectory = load_trajectory(trajectory_path, robot, progress=talk.fitting)
     talk.detail(
         f"{robot.name}: {len(robot.joints)} joints; {trajectory.name}: {trajectory.samples} steps over "
         f"{trajectory.duration:g} s"

@@ -6,7 +6,7 @@ import enum
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, redirect_stdout, suppress
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Self, TextIO, cast
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self, TextIO, cast
 import click
 
 from vsacli.base.errors import StorageError
+from vsacli.base.progress import unseen
 from vsacli.base.texts import for_terminal
 
 if TYPE_CHECKING:
@@ -104,21 +105,17 @@ class Talk:
         if self.verbose and not self.quiet:
             tell(message)
 
-    def progress(self, steps: int, *, shown_from: int = PROGRESS_FROM) -> AbstractContextManager[Any]:
-        """A progress bar over steps, shown only for long work on a terminal."""
+    def progress(
+        self, steps: int, *, shown_from: int = PROGRESS_FROM, label: str = "computing"
+    ) -> AbstractContextManager[Any]:
+        """A progress bar over steps, shown only for long work on a terminal; click's takes time to import."""
         if self.quiet or steps < shown_from or not sys.stderr.isatty():
-            return nullcontext(_NoProgress())
-        return click.progressbar(length=steps, label="computing", file=sys.stderr)
+            return unseen(steps)
+        return click.progressbar(length=steps, label=label, file=sys.stderr)
 
-
-class _NoProgress:
-    """In place of a progress bar; click's takes time to import."""
-
-    pos = 0
-
-    def update(self, steps: int) -> None:
-        """Show nothing."""
-        self.pos += steps
+    def fitting(self, samples: int) -> AbstractContextManager[Any]:
+        """The same over the samples of all components that splines are fitted to."""
+        return self.progress(samples, label="fitting")
 
 
 def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:

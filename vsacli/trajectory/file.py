@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
+from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
 from vsacli.documents.plausibility import numbers
@@ -139,8 +140,14 @@ OF_ANY_ROBOT = content(frozenset(), rigid=True)
 """The content for a robot that is not known: what some robot would accept."""
 
 
-def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
+def load_trajectory(path: str | os.PathLike[str], robot: Robot, *, progress: Progress = unseen) -> Trajectory:
     """Read a trajectory for a robot from a YAML file, or from a CSV file with position and stiffness.
+
+    Args:
+        path: of the file.
+        robot: that is to move.
+        progress: opens a bar over the samples of all components of a recorded signal while splines are
+            fitted to them, which takes seconds for millions; `lambda samples: tqdm(total=samples)` is one.
 
     Raises:
         InputError: with every problem of the file, each with its line.
@@ -152,10 +159,10 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     if is_table(path):
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
-        return with_uncommanded_devices(recorded_trajectory(path, joints), robot)
+        return with_uncommanded_devices(recorded_trajectory(path, joints, progress), robot)
     cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
     document, source = read_document(path, cls, FORMAT, joints.types, joints.exempt)
-    recordings = _read_recordings(document, Path(path).parent, joints)
+    recordings = _read_recordings(document, Path(path).parent, joints, progress)
     times = _times(document, recordings, source.path)
     if recordings:
         _check_lasting(document, times, source.path, joints.names)
@@ -184,7 +191,9 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot) -> Trajectory:
     return with_uncommanded_devices(trajectory, robot)
 
 
-def _read_recordings(document: TrajectoryFile, folder: Path, joints: CommandedJoints) -> list[Recording]:
+def _read_recordings(
+    document: TrajectoryFile, folder: Path, joints: CommandedJoints, progress: Progress
+) -> list[Recording]:
     """Each CSV file once, for the signals that are wanted from it; all with the times of the first."""
     wanted: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
     for signal, declared in document.recorded.items():
@@ -195,7 +204,7 @@ def _read_recordings(document: TrajectoryFile, folder: Path, joints: CommandedJo
 
     resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)
     recordings = [
-        read_recording(file, joints, fits, resampled=resampled, unwrap=unwrap)
+        read_recording(file, joints, fits, resampled=resampled, unwrap=unwrap, progress=progress)
         for file, fits in wanted.items()
     ]
     for other in recordings[1:]:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.trajectory.fits.information import block_count, sort_rows
+from vsacli.trajectory.fits.moments import Moments, merged
 
 BINS_PER_SPAN = 2
-
-BLOCK_SAMPLES = 65536
-"""Whose B-splines are held at a time: what fits into a cache is twice as fast."""
 
 LONGEST_LINK = 4.001
 """Bins between two means whose errors are still taken for correlated: a row of the difference of both must
@@ -67,41 +65,31 @@ class Bins:
     noise: float | None = None
 
     @classmethod
-    def of(
-        cls, time: FloatArray, row: FloatArray, spans: int, degree: int, noise: float | None = None
-    ) -> Bins:
+    def of(cls, moments: Moments, noise: float | None = None) -> Bins:
         """Averages of samples.
 
         Args:
-            time: (samples,), s.
-            row: (samples,).
-            spans: of the spline, of equal length.
-            degree: of the spline.
+            moments: of the bins, up to the power of the degree.
             noise: standard deviation of a sample's noise, if it is known.
         """
-        start, span = float(time[0]), float(time[-1] - time[0]) / spans
-        count, sums = np.zeros(BINS_PER_SPAN * spans), np.zeros((degree + 3, BINS_PER_SPAN * spans))
-        for first in range(0, len(time), BLOCK_SAMPLES):
-            block = slice(first, first + BLOCK_SAMPLES)
-            place = np.clip((time[block] - start) / span, 0, spans * (1 - 1e-15))
-            which = np.minimum((BINS_PER_SPAN * place).astype(int), len(count) - 1)
-            basis = uniform_basis(place - which // BINS_PER_SPAN, degree)
-            count += np.bincount(which, minlength=len(count))
-            for total, values in zip(sums, (time[block], row[block], *basis), strict=True):
-                total += np.bincount(which, values, minlength=len(count))
+        count, degree = moments.powers[0], len(moments.powers) - 1
         used = np.flatnonzero(count)
-        times, means, *design = sums[:, used] / count[used]
-        gaps = np.diff(times) * BINS_PER_SPAN / span
+        means, times = moments.row[used] / count[used], moments.time[used] / count[used]
+        # the first and the second half of a span: the other half is empty
+        halves, nothing = moments.powers[:, used], np.zeros_like(moments.powers[:, used])
+        second = used % BINS_PER_SPAN == 1
+        powers = np.where(second, merged(nothing, halves), merged(halves, nothing)) / count[used]
+        gaps = np.diff(times) / moments.width
         return cls(
-            start=start,
-            span=span,
-            spans=spans,
+            start=moments.start,
+            span=BINS_PER_SPAN * moments.width,
+            spans=len(count) // BINS_PER_SPAN,
             degree=degree,
             means=means,
-            design=np.stack(design, axis=1),
+            design=powers.T @ _basis_polynomials(degree),
             first=used // BINS_PER_SPAN,
             gaps=np.where(gaps > LONGEST_LINK, np.inf, gaps),
-            samples=len(time) / len(used),
+            samples=float(np.sum(count)) / len(used),
             noise=noise,
         )
 
@@ -141,22 +129,29 @@ class Bins:
             correlation: of the errors of two neighbouring means; those further apart are correlated the less,
                 as those of a process of first order.
         """
+        here, before, block, place = self._linked_rows
         lag = np.append(0.0, np.sign(correlation) * np.abs(correlation) ** self.gaps)
         scale = 1 / np.sqrt(1 - lag**2)
-        linked = lag != 0
-        first = self.first.copy()
-        first[1:] = np.where(linked[1:], self.first[:-1], self.first[1:])
-        width = self.degree + 1
-        rows = np.zeros((len(first), width + math.ceil(LONGEST_LINK / BINS_PER_SPAN)))
-        columns = (self.first - first)[:, None] + np.arange(width)
-        np.put_along_axis(rows, columns, self.design, axis=1)
-        rows[1:, :width] -= lag[1:, None] * self.design[:-1]
-        errors = self.means - lag * np.append(0.0, self.means[:-1])
-        ordered = sort_rows(first, rows * scale[:, None], self.coefficients)
-        target = np.zeros(ordered.blocks.shape[:2])
-        target[ordered.block, ordered.place] = errors * scale
+        lags, scales = np.zeros((2, *here.shape[:2]))
+        lags[block, place], scales[block, place] = lag, scale
+        rows = scales[..., None] * (here - lags[..., None] * before)
+        target = np.zeros(here.shape[:2])
+        target[block, place] = scale * (self.means - lag * np.append(0.0, self.means[:-1]))
         variance = self._noise_variance(correlation)
-        return Whitened(ordered.blocks, target, 2 * float(np.sum(np.log(scale))), variance)
+        return Whitened(rows, target, 2 * float(np.sum(np.log(scale))), variance)
+
+    @cached_property
+    def _linked_rows(self) -> tuple[FloatArray, FloatArray, IndexArray, IndexArray]:
+        """The design sorted into blocks, for each bin that of the bin before it, and where each bin is."""
+        linked, width = np.isfinite(self.gaps), self.degree + 1
+        first = self.first.copy()
+        first[1:] = np.where(linked, self.first[:-1], self.first[1:])
+        both = np.zeros((2, len(first), width + math.ceil(LONGEST_LINK / BINS_PER_SPAN)))
+        columns = (self.first - first)[:, None] + np.arange(width)
+        np.put_along_axis(both[0], columns, self.design, axis=1)
+        both[1, 1:, :width] = np.where(linked[:, None], self.design[:-1], 0)
+        here, before = (sort_rows(first, rows, self.coefficients) for rows in both)
+        return here.blocks, before.blocks, here.block, here.place
 
     def _noise_variance(self, correlation: float) -> float | None:
         """Of a mean, if that of a sample is known; its noise is taken for a process of first order.
@@ -210,3 +205,11 @@ def uniform_basis(place: FloatArray, degree: int) -> list[FloatArray]:
             higher[i] += (1 - rising) * value
         values = higher
     return values
+
+
+@cache
+def _basis_polynomials(degree: int) -> FloatArray:
+    """Coefficients of the B-splines of a span by powers of the place in it, (powers, degree + 1)."""
+    nodes = np.linspace(0, 1, degree + 1)
+    values = np.stack(uniform_basis(nodes, degree), axis=1)
+    return np.asarray(np.linalg.solve(np.vander(nodes, increasing=True), values), dtype=np.float64)

@@ -147,15 +147,20 @@ class Posterior:
         return np.concatenate([near, far], axis=-1)
 
     def variances(self, blocks: FloatArray) -> FloatArray:
-        """Of what rows give, (blocks, rows), for rows as in `Rows.blocks`."""
+        """Of what rows give, (blocks, rows), for rows as in `Rows.blocks`, or alike for all blocks."""
         return np.asarray(np.sum(self.roots_of(blocks) ** 2, axis=2))
 
 
 def _triangle(rows: FloatArray) -> FloatArray:
     """The triangular factor of rows, (..., rows, columns), as mode "r" gives it in twice the time."""
-    reflected, _ = np.linalg.qr(rows, mode="raw")
+    from scipy.linalg.lapack import dgeqrf
+
+    if rows.ndim > 2 and len(rows) > 1:
+        reflected = np.swapaxes(np.linalg.qr(rows, mode="raw")[0], -1, -2)
+    else:  # without what NumPy does for every call
+        reflected = dgeqrf(rows.reshape(rows.shape[-2:]))[0].reshape(rows.shape)
     height, width = min(rows.shape[-2:]), rows.shape[-1]
-    return np.asarray(np.swapaxes(reflected, -1, -2)[..., :height, :] * _upper(height, width))
+    return np.asarray(reflected[..., :height, :] * _upper(height, width))
 
 
 @cache

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.progress import Bar
 from vsacli.trajectory.fits.fit import Fit, Part
 from vsacli.trajectory.fits.least_squares import fit_spline
 from vsacli.trajectory.fits.resolution import KnownNoise
@@ -63,7 +64,7 @@ def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | No
     return Part(members, spline, exact=False, smoothing=smoothing, smooth=True)
 
 
-def judged(record: Record, fit: Fit, *, chosen: bool) -> Iterator[Part]:
+def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part]:
     """For components whose fit may follow noise: the same with what is known of it, or what stands instead.
 
     Suspect are least squares, whose number of knots has a bias, and splines through noisy samples. A
@@ -72,25 +73,36 @@ def judged(record: Record, fit: Fit, *, chosen: bool) -> Iterator[Part]:
     Args:
         record: what was fitted.
         fit: by least squares, or through the samples.
+        bar: on which the samples of each component are counted when it is judged.
         chosen: whether the user chose it, so that it stays.
     """
     for part in fit.parts:
-        for column, member in enumerate(part.members.tolist()):
-            wanted = not chosen and record.known[member].bandwidth is not None
-            suspect = record.spoilt[member] > SUSPECT or record.filtered[member]
-            if part.exact and not suspect and not wanted:
-                continue
-            judge = _judge(record, member, fit.degree)
-            if judge.smoothing is None:
-                continue
-            difference = _difference(part, column, judge, record)
-            if wanted or (not chosen and _better(judge, difference, record)):
-                yield judge
-            elif judge.smoothing.resolved or _disagrees(record, member) or not part.exact:
-                single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], fit.degree)
-                relative = float(np.hypot(judge.smoothing.relative, difference))
-                known = replace(judge.smoothing, relative=relative, follows_lines=True)
-                yield Part(judge.members, single, part.exact, known)
+        for column in range(len(part.members)):
+            instead = _instead(record, part, column, chosen=chosen)
+            bar.update(len(record.time))
+            if instead is not None:
+                yield instead
+
+
+def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part | None:
+    """What stands for a component of a part; None if it needs no judge, or there is none."""
+    member, degree = int(part.members[column]), part.spline.k
+    wanted = not chosen and record.known[member].bandwidth is not None
+    suspect = record.spoilt[member] > SUSPECT or record.filtered[member]
+    if part.exact and not suspect and not wanted:
+        return None
+    judge = _judge(record, member, degree)
+    if judge.smoothing is None:
+        return None
+    difference = _difference(part, column, judge, record)
+    if wanted or (not chosen and _better(judge, difference, record)):
+        return judge
+    if judge.smoothing.resolved or _disagrees(record, member) or not part.exact:
+        single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], degree)
+        relative = float(np.hypot(judge.smoothing.relative, difference))
+        known = replace(judge.smoothing, relative=relative, follows_lines=True)
+        return Part(judge.members, single, part.exact, known)
+    return None
 
 
 def _disagrees(record: Record, member: int) -> bool:

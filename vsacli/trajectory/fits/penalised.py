@@ -143,12 +143,12 @@ class Model:
             order: of the derivative.
             posterior: of the coefficients; None: that of the model.
         """
-        bins = self.bins
         places = np.array([0.25, 0.75])
-        rows = _derivative_rows(places, bins.degree, order) / bins.span**order
-        first = np.repeat(np.arange(bins.spans), len(places))
-        ordered = sort_rows(first, np.tile(rows, (bins.spans, 1)), bins.coefficients)
-        return (posterior or self.posterior).variances(ordered.blocks)[ordered.block, ordered.place]
+        rows = _derivative_rows(places, self.bins.degree, order) / self.bins.span**order
+        # spans of a block have the same B-splines, each one further
+        block = sort_rows(np.repeat(np.arange(BLOCK), 2), np.tile(rows, (BLOCK, 1)), BLOCK).blocks
+        variances = (posterior or self.posterior).variances(block)
+        return variances.ravel()[: 2 * self.bins.spans]
 
     @property
     def kinks(self) -> BoolArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins
+from vsacli.trajectory.fits.moments import Moments
 from vsacli.trajectory.fits.penalised import KINK_VARIANCE, Model
 from vsacli.trajectory.fits.search import most_likely
 
@@ -112,7 +113,7 @@ def find_resolution(
     if known.bandwidth is not None:
         return _given(time, row, degree, order, known)
     tried = []
-    for coarse, fine in pairwise(_models(time, row, degree, _spans(len(time)), known)):
+    for coarse, fine in pairwise(_models(_moments(time, row, degree), known)):
         tried.append(_compared(time, row, coarse, fine, order))
         if tried[-1].accepted:
             return tried[-1]
@@ -128,26 +129,31 @@ def _given(
     spans = SPANS_PER_PERIOD * known.bandwidth * float(time[-1] - time[0])
     finest = int(np.clip(np.ceil(spans), 1, max(1, len(time) // BINS_PER_SPAN - degree)))
     halvings = range(int(np.log2(max(1, finest / FIRST_SPANS))), -1, -1)
-    models = list(_models(time, row, degree, [-(-finest // 2**halving) for halving in halvings], known))
+    bins = [BINS_PER_SPAN * -(-finest // 2**halving) for halving in halvings]
+    models = list(_models((Moments.of(time, row, count, degree) for count in bins), known))
     if not models:
         return None
     return _compared(time, row, models[-1], models[-1], order)._replace(given=True)
 
 
-def _spans(samples: int) -> list[int]:
-    """Of the resolutions that are tried."""
-    first = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
+def _moments(time: FloatArray, row: FloatArray, degree: int) -> list[Moments]:
+    """Of the resolutions that are tried, coarse to fine."""
+    samples = len(time)
+    spans = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
     most = max(samples // FEWEST_SAMPLES, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
-    return [first * 2**k for k in range(30) if first * 2**k <= min(most, MOST_SPANS)]
+    doublings = int(np.log2(min(most, MOST_SPANS) // spans))
+    found = [Moments.of(time, row, BINS_PER_SPAN * spans * 2**doublings, degree)]
+    for _ in range(doublings):
+        found.append(found[-1].halved)
+    return found[::-1]
 
 
-def _models(
-    time: FloatArray, row: FloatArray, degree: int, spans: list[int], known: KnownNoise
-) -> Iterator[Model]:
+def _models(moments: Iterable[Moments], known: KnownNoise) -> Iterator[Model]:
+    """The most likely model of each resolution, coarse to fine."""
     model: Model | None = None
-    for count in spans:
-        bins = Bins.of(time, row, count, degree, known.deviation)
-        if len(bins.means) > degree + 1:
+    for each in moments:
+        bins = Bins.of(each, known.deviation)
+        if len(bins.means) > bins.degree + 1:
             model = most_likely(bins, model)
             yield model
 

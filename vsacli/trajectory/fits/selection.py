@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.progress import Progress, unseen
 from vsacli.trajectory.fits.fit import Fit, Part, join
 from vsacli.trajectory.fits.judgement import Record, judged, replaced, smooth_part
 from vsacli.trajectory.fits.least_squares import best_spans, fit_spline
@@ -69,6 +70,7 @@ def fit_samples(
     *,
     noise: FloatArray | None = None,
     bandwidth: float | None = None,
+    progress: Progress = unseen,
 ) -> Fit:
     """Fit splines to samples.
 
@@ -82,6 +84,7 @@ def fit_samples(
             highest derivative; for others, and where noise was filtered, stands a smoothing spline.
         noise: standard deviation of the samples of each component, (components,), NaN where none is known.
         bandwidth: above which there is no motion, Hz, if it is known; by default smoothing splines have it.
+        progress: opens a bar over the samples of all components.
     """
     present = np.flatnonzero(~np.all(np.isnan(values), axis=1))
     given = np.full(len(values), np.nan) if noise is None else noise
@@ -98,7 +101,10 @@ def fit_samples(
     )
     parts: list[Part] = []
     if method == SMOOTH:
-        parts += (smooth_part(record, member, degree) for member in present.tolist())
+        with progress(len(time) * len(present)) as bar:
+            for member in present.tolist():
+                parts.append(smooth_part(record, member, degree))
+                bar.update(len(time))
         return join(degree, parts, time, values, estimate, given)
     if present.size and method == LEAST_SQUARES:
         parts += _least_squares(time, values, present, degree)
@@ -110,7 +116,8 @@ def fit_samples(
         record.spoilt[present] = _spoilt(parts[0].spline, time, values[present], expected, order)
         record.filtered[present] = filtered_noise(time, values[present], degree + 1)
     fit = join(degree, parts, time, values, estimate, given)
-    instead = list(judged(record, fit, chosen=method is not None))
+    with progress(len(time) * len(present)) as bar:
+        instead = list(judged(record, fit, bar, chosen=method is not None))
     return join(degree, replaced(parts, instead), time, values, estimate, given) if instead else fit
 
 

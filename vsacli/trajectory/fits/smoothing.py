@@ -96,7 +96,11 @@ def smoothing_spline(
     size = scale * float(np.sqrt(np.mean(spline(model.probes, nu=order)[model.inside] ** 2)))
     relative = float(deviations[order]) / max(size, np.finfo(float).tiny) if found.accepted else found.total
     residual = row - (scale * spline(time)[:, 0] + offset)
-    lines = Lines() if is_rounding(row, residual) else spectral_lines(time, residual, order, size)
+    lines = (
+        Lines()
+        if is_rounding(row, residual)
+        else spectral_lines(time, residual, order, size, known.bandwidth)
+    )
     units = scale * known_errors.units
     smoothing = Smoothing(deviations, relative, found.accepted, lines, model.cautious, units)
     return BSpline(spline.t, scale * spline.c + offset, degree), smoothing

@@ -23,6 +23,9 @@ a motion that was repeated ten times."""
 NEIGHBOURS = 40
 """Frequencies on each side that the median is taken of."""
 
+BLOCK_FREQUENCIES = 16384
+"""Whose medians are taken at a time, to bound the memory."""
+
 LEAKAGE = 3
 """Frequencies beside a line that a Hann window leaks into."""
 
@@ -62,7 +65,9 @@ class Lines(NamedTuple):
         return Lines(hum, tuple(frequency / factor for frequency in self.others), self.share)
 
 
-def spectral_lines(time: FloatArray, residual: FloatArray, order: int, size: float) -> Lines:
+def spectral_lines(
+    time: FloatArray, residual: FloatArray, order: int, size: float, bandwidth: float | None = None
+) -> Lines:
     """Frequencies that stand out of the residual of a fit, from its periodogram with a Hann window.
 
     Args:
@@ -71,6 +76,7 @@ def spectral_lines(time: FloatArray, residual: FloatArray, order: int, size: flo
         order: of the highest derivative that is needed.
         size: of that derivative of the fit, root mean square; lines that would add less than 10 % to it do
             not count, as what a coarse spline leaves of a motion has lines too.
+        bandwidth: above which there is no motion, Hz, if it is known: lines above it are noise.
     """
     steps = np.diff(time)
     step = float(np.mean(steps))
@@ -78,7 +84,9 @@ def spectral_lines(time: FloatArray, residual: FloatArray, order: int, size: flo
         return Lines()
     power = np.abs(np.fft.rfft(residual * np.hanning(len(residual)))) ** 2
     count = len(power)
-    medians = np.median(np.lib.stride_tricks.sliding_window_view(power, NEIGHBOURS), axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view(power, NEIGHBOURS)
+    starts = range(0, len(windows), BLOCK_FREQUENCIES)
+    medians = np.concatenate([np.median(windows[at : at + BLOCK_FREQUENCIES], axis=1) for at in starts])
     centre = np.arange(NEIGHBOURS + LEAKAGE, count - NEIGHBOURS - LEAKAGE)
     below = medians[centre - NEIGHBOURS - LEAKAGE]
     # of a spectrum that falls steeply, the side below has the larger median
@@ -94,9 +102,10 @@ def spectral_lines(time: FloatArray, residual: FloatArray, order: int, size: flo
     if len(found) > MOST_LINES:
         return Lines()
     mains = _mains(frequencies)
-    near = np.unique(found[~mains, None] + np.arange(-LEAKAGE, LEAKAGE + 1))
+    unclear = ~mains & (frequencies < (np.inf if bandwidth is None else bandwidth))
+    near = np.unique(found[unclear, None] + np.arange(-LEAKAGE, LEAKAGE + 1))
     share = float(np.sum(power[near]) / max(np.sum(power), np.finfo(float).tiny))
-    return Lines(tuple(frequencies[mains].tolist()), tuple(frequencies[~mains].tolist()), share)
+    return Lines(tuple(frequencies[mains].tolist()), tuple(frequencies[unclear].tolist()), share)
 
 
 def is_rounding(row: FloatArray, residual: FloatArray) -> bool:

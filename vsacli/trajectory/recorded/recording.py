@@ -12,6 +12,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.texts import as_name
 from vsacli.base.wrench import WRENCH_AXES
@@ -76,6 +77,7 @@ def read_recording(
     *,
     resampled: bool = False,
     unwrap: bool = False,
+    progress: Progress = unseen,
 ) -> Recording:
     """Read signals from a CSV file.
 
@@ -86,6 +88,7 @@ def read_recording(
             devices if they are there, each fitted as its noise asks for.
         resampled: whether the steps will be other times than the recorded ones.
         unwrap: whether to take jumps by 2 pi out of the positions of revolute joints.
+        progress: opens a bar over the samples that splines are fitted to.
 
     Raises:
         InputError: with file and line of everything that does not fit.
@@ -110,13 +113,19 @@ def read_recording(
     notes = tuple(f"{file}: {clause}" for clause in (*turns, *_unused(layout, signals)))
     source, lines = table.source, table.lines
     del table  # as large as the records, which may be fitted now
-    profiles = tuple(_profile(record, wanted[record.signal], resampled=resampled) for record in records)
+    profiles = tuple(_profile(each, wanted[each.signal], progress, resampled=resampled) for each in records)
     return Recording(RecordedTimes(time, rounding_notes(time)), profiles, warnings, notes, source, lines)
 
 
-def _profile(record: Samples, chosen: FitChoice, *, resampled: bool) -> SampledProfile:
-    noise, bandwidth = chosen.deviations, chosen.bandwidth
-    return SampledProfile.of(record, chosen.method, noise=noise, bandwidth=bandwidth, resampled=resampled)
+def _profile(record: Samples, chosen: FitChoice, progress: Progress, *, resampled: bool) -> SampledProfile:
+    return SampledProfile.of(
+        record,
+        chosen.method,
+        noise=chosen.deviations,
+        bandwidth=chosen.bandwidth,
+        resampled=resampled,
+        progress=progress,
+    )
 
 
 def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:
@@ -188,13 +197,15 @@ def _located(problem: SampleProblem, table: Table, layout: ColumnLayout) -> Prob
     return Problem(table.source.path, line, f"{column} {problem.message}")
 
 
-def recorded_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> Trajectory:
+def recorded_trajectory(
+    path: str | os.PathLike[str], joints: CommandedJoints, progress: Progress = unseen
+) -> Trajectory:
     """A trajectory whose position and commanded signals come from one CSV file, named after the file.
 
     Raises:
         InputError: as `read_recording`.
     """
-    recording = read_recording(path, joints)
+    recording = read_recording(path, joints, progress=progress)
     profiles = {profile.signal.key: profile for profile in recording.profiles}
     return Trajectory(
         recording.times,

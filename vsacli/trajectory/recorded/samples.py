@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import Fit, fit_samples, mismatches
 from vsacli.trajectory.fits.bounds import Unresolved, unresolved, vibrations
@@ -121,6 +122,7 @@ class SampledProfile:
         noise: FloatArray | None = None,
         bandwidth: float | None = None,
         resampled: bool = False,
+        progress: Progress = unseen,
     ) -> SampledProfile:
         """Fit samples that have no problems.
 
@@ -130,6 +132,7 @@ class SampledProfile:
             noise: standard deviation of the samples of each component, if it is known, likewise.
             bandwidth: above which there is no motion, Hz, likewise.
             resampled: whether the steps are not the recorded times.
+            progress: opens a bar over the samples of all components.
         """
         signal = record.signal
         with np.errstate(
@@ -143,6 +146,7 @@ class SampledProfile:
                 method,
                 noise=noise,
                 bandwidth=bandwidth,
+                progress=progress,
             )
             warnings = tuple(record.warnings(fit, resampled=resampled))
         return cls(record=record, fit=fit, resampled=resampled, warnings=warnings)

@@ -1,0 +1,38 @@
+"""How long work tells how far it is, if anybody asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from typing import Protocol, TypeAlias
+
+
+class Bar(Protocol):
+    """What steps are counted on, as those of click and tqdm."""
+
+    def update(self, steps: int, /) -> object:
+        """Count steps that are done."""
+
+
+Progress: TypeAlias = Callable[[int], AbstractContextManager[Bar]]
+"""Called with the number of steps before work begins: a bar for as long as it lasts."""
+
+
+class NoBar:
+    """A bar that nobody sees.
+
+    Attributes:
+        pos: steps counted so far.
+    """
+
+    pos = 0
+
+    def update(self, steps: int, /) -> None:
+        """Count steps that are done."""
+        self.pos += steps
+
+
+def unseen(steps: int) -> AbstractContextManager[NoBar]:
+    """A bar for work of so many steps that nobody watches."""
+    del steps
+    return nullcontext(NoBar())
