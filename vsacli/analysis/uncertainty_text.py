@@ -23,7 +23,7 @@ def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
 
 
 def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[str]:
-    yield from map(_undetermined, uncertainty.undetermined)
+    yield from map(undetermined_text, uncertainty.undetermined)
     for kind, steps in uncertainty.steps.items():
         if steps:
             all_of_them = count(joint.steps[kind])
@@ -48,7 +48,8 @@ def _spread(name: str, spread: Spread) -> str:
     return f"{name} +- unknown{within}"
 
 
-def _undetermined(spread: Spread) -> str:
+def undetermined_text(spread: Spread) -> str:
+    """That a record does not determine a variable, and by how much it may be wrong."""
     what = f"{spread.name} is not determined by the record"
     if math.isnan(spread.bound):
         return f"{what}, since a signal that it depends on is not"

@@ -29,6 +29,10 @@ class WrenchQuantity(Quantity):
         """Both units, whatever the joint."""
         return str(self)
 
+    def of_axis(self, axis: int) -> str:
+        """Unit of a component: three forces, then three moments."""
+        return self.prismatic if axis < 3 else self.revolute
+
     def __str__(self) -> str:
         return f"{self.prismatic} (forces), {self.revolute} (moments)"
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from vsacli.analysis.run import Run
+from vsacli.analysis.uncertainty_text import undetermined_text
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
@@ -174,6 +178,7 @@ def simulate(
         methods=tuple(replace(method, start=first + method.start) for method in integrated.effort.methods),
         warnings=(
             *(*robot.warnings, *trajectory.warnings),
+            *_undetermined(robot, trajectory),
             *([_AMPLIFIED] if exact and verdict == "strayed" else []),
             *(stiffness_warnings(robot, past) if integrated.ending is None else []),
             *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
@@ -197,6 +202,18 @@ def check_measured(measured: Measured, gains: Gains | None) -> None:
         raise InputError.one(
             "feedforward measures nothing: measured positions need the controller feedback-linearization"
         )
+
+
+def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
+    """For which joints a recorded motion leaves open what is commanded: a run along it would be doubtful."""
+    if trajectory.estimates:
+        run = Run(robot, trajectory)
+        deque(run, maxlen=0)
+        for joint in run.report().joints:
+            if joint.uncertainty is not None:
+                yield from (
+                    f"{joint.name}: {undetermined_text(each)}" for each in joint.uncertainty.undetermined
+                )
 
 
 def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gains | None) -> ClosedLoop:

@@ -1,7 +1,7 @@
 """Splines through, or close to, recorded samples: which kind, how many knots, and how far to trust them."""
 
 from vsacli.trajectory.fits.fit import Fit
-from vsacli.trajectory.fits.fit_text import mismatches
+from vsacli.trajectory.fits.given import mismatches
 from vsacli.trajectory.fits.selection import (
     INTERPOLATE,
     LEAST_SQUARES,

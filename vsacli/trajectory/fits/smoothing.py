@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.trajectory.fits.calibration import calibrated
+from vsacli.trajectory.fits.calibration import calibrated, posterior_error
 from vsacli.trajectory.fits.information import Posterior
 from vsacli.trajectory.fits.resolution import KnownNoise, find_resolution
 from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding, spectral_lines
@@ -24,7 +24,8 @@ class Smoothing:
     Attributes:
         deviations: standard deviation of the value and each derivative, root mean square away from the ends,
             (orders,).
-        relative: that of the highest derivative that is needed, over this derivative's own root mean square.
+        relative: error that must be expected of the highest derivative that is needed, over this derivative's
+            own root mean square; rather more than the deviation.
         resolved: whether two successive resolutions agree on that derivative.
         lines: frequencies that stand out of the residual.
         posterior: of the coefficients.
@@ -94,7 +95,10 @@ def smoothing_spline(
     known_errors = calibrated(model, order + 1, found.unexplained)
     deviations = scale * np.sqrt(np.mean(known_errors.deviations[:, model.inside] ** 2, axis=1))
     size = scale * float(np.sqrt(np.mean(spline(model.probes, nu=order)[model.inside] ** 2)))
-    relative = float(deviations[order]) / max(size, np.finfo(float).tiny) if found.accepted else found.total
+    relative = found.total
+    if found.accepted:
+        errors = np.array([deviations[order], scale * posterior_error(model, order)])
+        relative = float(np.max(np.hypot(errors / max(size, np.finfo(float).tiny), [0.0, found.change])))
     residual = row - (scale * spline(time)[:, 0] + offset)
     lines = (
         Lines()

@@ -11,7 +11,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
-from vsacli.base.units import time_text
+from vsacli.base.units import Quantity, WrenchQuantity, time_text
 from vsacli.trajectory.recorded.faults import Faults, frozen, held, outliers, saturated, wraps
 from vsacli.trajectory.recorded.grain import ORDER, Grain
 from vsacli.trajectory.recorded.problems import SampleProblem
@@ -20,19 +20,23 @@ from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE, LARGEST_TRAVEL
 
 
-def health(stamps: FloatArray, records: Sequence[Samples]) -> Iterator[SampleProblem]:
+def health(
+    stamps: FloatArray, records: Sequence[Samples], types: Sequence[str] = ()
+) -> Iterator[SampleProblem]:
     """What of a recording is hardly what was meant although it can be used.
 
     Args:
         stamps: (samples,) in s, as recorded.
         records: the signals that are used, without problems.
+        types: of the joints, "revolute" or "prismatic", for units; empty if they are not known.
     """
     if len(stamps) <= ORDER:
         return
     yield from stamp_faults(stamps)
     for record in records:
         for component in np.flatnonzero(record.given).tolist():
-            for first, sentence in _of_column(stamps, record, component):
+            unit = _unit(record.signal.quantities[0], component, types)
+            for first, sentence in _of_column(stamps, record, component, unit):
                 yield SampleProblem(record.signal.names[0], sentence, component, first)
 
 
@@ -53,7 +57,7 @@ def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterato
                 yield SampleProblem(name, f"goes to {largest:.4g} m; are these mm? {_write('mm')}", index)
 
 
-def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[tuple[int, str]]:
+def _of_column(stamps: FloatArray, record: Samples, component: int, unit: str) -> Iterator[tuple[int, str]]:
     """Of each kind of fault the first sample, and a sentence."""
     time, values = record.time, record.values[component]
     if np.ptp(values) == 0:
@@ -66,7 +70,7 @@ def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[
         )
         return
     if off := outliers(time, values, grain):
-        extent = _extent(off, stamps, [f"{size:.3g}" for size in off.sizes.tolist()])
+        extent = _extent(off, stamps, [f"{size:.3g}{unit}" for size in off.sizes.tolist()])
         yield (
             off.at,
             f"is off {_occasions(off, stamps)}, by {extent} from a smooth curve, amid samples that are on it:"
@@ -79,9 +83,10 @@ def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[
             " these samples were lost; delete the rows, or record again",
         )
     if cut := saturated(time, values, grain):
+        at = f"{values[cut.first[0]]:.4g}{unit}"
         yield (
             cut.at,
-            f"is cut off at {values[cut.first[0]]:.4g} {_occasions(cut, stamps)}, for {_lasting(cut, stamps)}"
+            f"is cut off at {at} {_occasions(cut, stamps)}, for {_lasting(cut, stamps)}"
             " while the motion goes on: the sensor or the log file has no larger range; record again",
         )
     if record.signal is POSITION and (wrapped := wraps(values)):
@@ -90,6 +95,13 @@ def _of_column(stamps: FloatArray, record: Samples, component: int) -> Iterator[
             f"jumps by 2 pi {_occasions(wrapped, stamps)}: an angle that was wrapped? Set unwrap: true under"
             " position in a trajectory file",
         )
+
+
+def _unit(quantity: Quantity, component: int, types: Sequence[str]) -> str:
+    """With a space before it; nothing where it is not known."""
+    if isinstance(quantity, WrenchQuantity):
+        return f" {quantity.of_axis(component)}"
+    return f" {quantity.unit(types[component])}" if types else ""
 
 
 def _write(unit: str) -> str:

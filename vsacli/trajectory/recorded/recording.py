@@ -108,7 +108,10 @@ def read_recording(
     problems = [*time_problems(time), *(problem for record in records for problem in value_problems(record))]
     if problems:
         raise InputError(_located(problem, table, layout) for problem in problems)
-    found = [*health(time, records), *unit_doubts(records, _without_unit(table, layout, joints))]
+    found = [
+        *health(time, records, list(joints.types.values())),
+        *unit_doubts(records, _without_unit(table, layout, joints)),
+    ]
     warnings = tuple(str(_located(doubt, table, layout)) for doubt in found)
     notes = tuple(f"{file}: {clause}" for clause in (*turns, *_unused(layout, signals)))
     source, lines = table.source, table.lines

@@ -1,0 +1,146 @@
+"""Derivatives that were given, compared with those of a fit of the values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.base.units import time_text
+from vsacli.trajectory.fits.fit import Fit
+from vsacli.trajectory.fits.selection import INTERPOLATION_GAIN, LEAST_SQUARES_GAIN, SMALLEST_SHARE
+
+SHARE = 0.05
+"""Of the root mean square of a derivative by which a given one may differ: measured ones do."""
+
+DEVIATIONS = 10.0
+"""Standard deviations by which the derivative of the fit itself may be wrong."""
+
+OUTLYING = 0.5
+"""Of the largest derivative of the fit, inside, by which a given sample is off if it is an outlier. It stands
+amid samples that are off by less than an eighth; what a spline makes of a jump is off on both sides."""
+
+MOST_OUTLIERS = 10
+"""More than that are no outliers: a derivative taken of an encoder's steps is like that all the time."""
+
+FACTORS = {
+    180 / math.pi: "degrees instead of radians?",
+    math.pi / 180: "are the values in degrees?",
+    -1.0: "opposite sign?",
+    1000.0: "milli-units?",
+    0.001: "are the values in milli-units?",
+}
+"""By how much a given derivative may be too large throughout, and what that hints at."""
+
+
+def mismatches(
+    names: Sequence[str],
+    labels: Sequence[str],
+    time: FloatArray,
+    derivatives: Sequence[FloatArray | None],
+    fit: Fit,
+    *,
+    start: float = 0.0,
+) -> Iterator[str]:
+    """A sentence for each column of given derivatives that does not follow from the fit of the values.
+
+    The doubtful stretches at both ends play no part, or the first and last quarter if these are shorter. A
+    column differs if the root mean square of the difference exceeds 5 % of that of the fit's derivative, plus
+    ten times the error that noise gives the latter.
+
+    Args:
+        names: of the signal and its derivatives.
+        labels: of the components.
+        time: (samples,), s.
+        derivatives: of the signal, each (components, samples) if it is given.
+        fit: of the signal.
+        start: stamp of the time zero, s, with which times are told.
+    """
+    first, last = np.minimum(fit.doubtful, (time[-1] - time[0]) / 4)
+    inside = (time >= time[0] + first) & (time <= time[-1] - last)
+    if not inside.any() or all(given is None for given in derivatives):
+        return
+    rows = fit.at(time[inside], len(names))
+    for order, given in enumerate(derivatives, start=1):
+        if given is not None:
+            found = given[:, inside]
+            differ, stamps = _differ(found, rows, order, fit), start + time[inside]
+            for component, label in enumerate(labels):
+                columns = found[component], rows[order, component]
+                off = _outliers(*columns)
+                if off.size:
+                    times = f"at t = {time_text(stamps[off[0]])}"
+                    times = times if len(off) == 1 else f"{len(off)} times, first {times}"
+                    what = f"is off {times}, amid samples that follow from {names[0]}"
+                    yield f"{names[order]} of {label} {what}: {_amounts(stamps, *columns)}; delete such rows"
+                elif differ[component]:
+                    what = f"{names[order]} of {label} does not follow from {names[0]}"
+                    yield f"{what}: {_extent(stamps, *columns)}"
+
+
+def _differ(given: FloatArray, rows: FloatArray, order: int, fit: Fit) -> BoolArray:
+    """Which components differ by more than what can be told, (components,)."""
+    size = _rms(rows[order])
+    least = SMALLEST_SHARE * np.nanmax(size, initial=0.0)
+    allowed = SHARE * np.maximum(size, least) + DEVIATIONS * _errors(fit, order)
+    differ: BoolArray = _rms(given - rows[order]) > allowed
+    return differ
+
+
+def _errors(fit: Fit, order: int) -> FloatArray:
+    """Standard deviation of a derivative of the fit, inside, due to noise of the samples, (components,)."""
+    errors = np.zeros(fit.components)
+    for part in fit.parts:
+        if part.smooth and part.smoothing is not None:
+            errors[part.members] = part.smoothing.deviations[order]
+            continue
+        span = float(np.mean(np.diff(part.knots)))
+        gain = (
+            INTERPOLATION_GAIN[fit.degree][order]
+            if part.exact
+            else LEAST_SQUARES_GAIN[fit.degree][order] * math.sqrt(fit.step / span)
+        )
+        errors[part.members] = gain * fit.noise[part.members] / span**order
+    return errors
+
+
+def _extent(time: FloatArray, given: FloatArray, expected: FloatArray) -> str:
+    factor = _factor(given, expected)
+    if factor is not None:
+        hint = next((hint for ratio, hint in FACTORS.items() if abs(factor / ratio - 1) < SHARE), None)
+        return f"it is {factor:.3g} times as large throughout" + (f" ({hint})" if hint else "")
+    return _amounts(time, given, expected)
+
+
+def _amounts(time: FloatArray, given: FloatArray, expected: FloatArray) -> str:
+    difference = np.abs(given - expected)
+    worst = int(difference.argmax())
+    amounts = f"{given[worst]:.4g} instead of {expected[worst]:.4g}"
+    return f"it differs by up to {difference[worst]:.3g} ({amounts} at t = {time_text(time[worst])})"
+
+
+def _outliers(given: FloatArray, expected: FloatArray) -> IndexArray:
+    """Indices of the few samples that are off by far while those on both sides are not."""
+    error = np.abs(given - expected)
+    far = np.flatnonzero(error > OUTLYING * np.abs(expected).max())
+    if not 0 < len(far) <= MOST_OUTLIERS:
+        return far[:0]
+    beside = np.pad(error, 1)
+    alone: IndexArray = far[np.maximum(beside[far], beside[far + 2]) < error[far] / 8]
+    return alone
+
+
+def _factor(given: FloatArray, expected: FloatArray) -> float | None:
+    """What the expected values are multiplied by throughout, if they are."""
+    power = float(expected @ expected)
+    if power == 0:
+        return None
+    factor = float(given @ expected) / power
+    scaled = _rms(given - factor * expected) < SHARE * _rms(given)
+    return factor if scaled else None
+
+
+def _rms(rows: FloatArray) -> FloatArray:
+    return np.asarray(np.sqrt(np.mean(rows**2, axis=-1)))
