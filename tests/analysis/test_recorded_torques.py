@@ -11,6 +11,7 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
 from vsacli.base.signals import STIFFNESS
+from vsacli.control.simulation.simulate import simulate
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
 from vsacli.robot.model import Robot
@@ -100,3 +101,11 @@ def test_torques_of_steps_of_velocity_are_right_or_doubtful(colour):
         assert verdict == "doubtful" or error < 0.1, name
         if name == "elastic":
             assert verdict == "doubtful"
+
+
+@pytest.mark.slow
+def test_a_simulation_along_a_doubtful_record_says_so():
+    of = record(MOTIONS["velocity steps, 50 ms"], QUICK, 20, RATE)
+    trajectory = Trajectory.from_samples(of.time, of.values[:, None])
+    warnings = simulate(ARMS["elastic"], trajectory).report.warnings
+    assert any(each.startswith("elbow: tau_motor is not determined by the record: ") for each in warnings)

@@ -1,5 +1,4 @@
-"""Given derivatives that follow from vsacli.trajectory.recorded.arrays import samples_of_arrays
-from their position, and those that do not."""
+"""Given derivatives that follow from their position, and those that do not."""
 
 import re
 
@@ -108,3 +107,16 @@ def test_a_stiffness_and_a_component_without_one():
         sentence
         == "dstiffness of column 1 does not follow from stiffness: it is 0.8 times as large throughout"
     )
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_single_samples_that_are_off_are_named(order):
+    given = [columns(k) for k in range(1, 5)]
+    given[order - 1][[1500, 2200], 1] += 2 * RATES[1] ** order
+    (found,) = complaints(*given)
+    name = ("dq", "ddq", "d3q", "d4q")[order - 1]
+    start = (
+        f"{name} of elbow is off 2 times, first at t = 1.500 s, amid samples that follow from q: it differs"
+    )
+    assert found.startswith(start)
+    assert found.endswith("delete such rows")

@@ -386,3 +386,11 @@ def test_fitting_tells_how_far_it_is():
 
         fit_samples(of.time, values, 7, 4, method, progress=progress)
         assert counted == [2 * len(of.time), len(of.time), len(of.time)]
+
+
+def test_few_samples_are_said_to_be_taken_for_exact():
+    for count, said in ((31, True), (32, False)):
+        time = np.arange(count) / 10
+        trajectory = Trajectory.from_samples(time, np.sin(time)[:, None])
+        notes = [note for note in trajectory.notes if "is taken for exact: 31 samples are too few" in note]
+        assert bool(notes) is said

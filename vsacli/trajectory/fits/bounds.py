@@ -11,10 +11,10 @@ from vsacli.trajectory.fits.covariance import local_basis, of_derivatives, of_le
 from vsacli.trajectory.fits.fit import Fit, Part
 from vsacli.trajectory.fits.information import Posterior
 
-CAUTION = 2.0
+CAUTION = 3.2
 """Factor between what resolutions differ by and what is taken for a standard deviation. With motions of
-minimum jerk or steps of velocity within 50 and 200 ms, twelve colours of noise, 250 Hz and 1 kHz, torques
-that were wrong by more than 5 % were so by up to 4.3 times as much: twice this deviation."""
+minimum jerk or steps of velocity within 50 and 200 ms, and twelve colours of noise, torques that were wrong by
+more than 5 % were so by up to 6.2 times as much: twice this deviation is a little more."""
 
 PROBES = 500
 """Times that root mean squares are taken of."""

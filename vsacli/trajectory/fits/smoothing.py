@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 
+DETERMINED = 0.08
+"""Expected relative error of the highest derivative up to which it counts as right to 10 %: of those that
+were wrong by more, on 300 records, errors were up to 1.3 times what was expected."""
+
+
 @dataclass(frozen=True, eq=False)
 class Smoothing:
     """What is known of a smoothing spline.
@@ -45,7 +50,7 @@ class Smoothing:
     @property
     def determined(self) -> bool:
         """Whether the record determines the highest derivative to 10 %."""
-        return self.resolved and self.relative <= 0.1
+        return self.resolved and self.relative <= DETERMINED
 
     def units_at(self, place: FloatArray) -> FloatArray:
         """Units of the posterior's deviations, (orders, places).
