@@ -43,7 +43,7 @@ def test_outliers_stand_in_the_report_with_line_column_and_time(vsacli, recorded
         arguments = (file, "--robot", ROBOT) if command == "info" else (ROBOT, file)
         out = vsacli(command, *arguments).out
         assert (
-            f"{file}:602: shoulder.q is off 2 times, first at t = 1.200 s, by up to 0.02 (at t = 1.400 s)"
+            f"{file}:602: shoulder.q is off 2 times, first at t = 1.200 s, by up to 0.02 rad (at t = 1.400 s)"
             in out
         )
 

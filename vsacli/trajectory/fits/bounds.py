@@ -13,8 +13,8 @@ from vsacli.trajectory.fits.information import Posterior
 
 CAUTION = 3.2
 """Factor between what resolutions differ by and what is taken for a standard deviation. With motions of
-minimum jerk or steps of velocity within 50 and 200 ms, and twelve colours of noise, torques that were wrong by
-more than 5 % were so by up to 6.2 times as much: twice this deviation is a little more."""
+minimum jerk or steps of velocity within 50 and 200 ms, and twelve colours of noise, torques that were wrong
+by more than 5 % were so by up to 6.2 times as much: twice this deviation is a little more."""
 
 PROBES = 500
 """Times that root mean squares are taken of."""
