@@ -236,7 +236,9 @@ def test_beyond_the_largest_torque_it_is_unstable() -> None:
 
 
 def test_damping_may_not_vanish_on_the_way() -> None:
-    message = "joint_1: its damping is 0 at t = 0.500 s; parallel to springs it must be positive all the time"
+    message = (
+        "the damping of joint_1 is 0 at t = 0.500 s; parallel to springs it must be positive all the time"
+    )
     with pytest.raises(InputError, match=message):
         inverse_dynamics(pendulum("awas"), swing("awas", (2, 0)))
 

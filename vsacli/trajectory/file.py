@@ -21,7 +21,7 @@ from vsacli.documents.source import is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
-from vsacli.trajectory.devices import with_uncommanded_devices
+from vsacli.trajectory.devices import with_devices
 from vsacli.trajectory.plausibility import implausible
 from vsacli.trajectory.plausibility.facts import Facts
 from vsacli.trajectory.profile import Profile, WrenchProfile
@@ -159,7 +159,7 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot, *, progress: Pro
     if is_table(path):
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
-        return with_uncommanded_devices(recorded_trajectory(path, joints, progress), robot)
+        return _with_devices(recorded_trajectory(path, joints, progress), robot)
     cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
     document, source = read_document(path, cls, FORMAT, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
@@ -188,7 +188,14 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot, *, progress: Pro
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, times)],
         sources=[source, *(recording.source for recording in recordings)],
     )
-    return with_uncommanded_devices(trajectory, robot)
+    return _with_devices(trajectory, robot)
+
+
+def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
+    try:
+        return with_devices(trajectory, robot)
+    except InputError as error:
+        raise InputError.one(str(error), trajectory.sources[0].path) from None
 
 
 def _read_recordings(

@@ -13,16 +13,11 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING
-from vsacli.base.units import time_text
 from vsacli.dynamics.integrated_deflections.integration import Pieces
 from vsacli.dynamics.internal_motion.march import FIRST_CELLS, LOST, March, Marched
 from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
-from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
-
-SEEN = 1000
-"""Times at which damping is looked at, beside all breakpoints: whether there is any."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +60,6 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
     """Integrate what moves inside the damped transmissions of a robot, from the first step to the last.
 
     The smooth functions of the trajectory count; derivatives given with samples play no part.
-
-    Raises:
-        InputError: the damping of a joint falls to zero, or below, somewhere but not everywhere.
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
     joints = damped_joints(robot, trajectory)
@@ -91,19 +83,12 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
 
 
 def damped_joints(robot: Robot, trajectory: Trajectory) -> tuple[int, ...]:
-    """The joints with a damper parallel to their springs that is not at zero all the time.
-
-    Raises:
-        InputError: it falls to zero, or below, somewhere but not everywhere.
-    """
+    """The joints with a damper parallel to their springs that is not at zero all the time."""
     chosen = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
     if not chosen:
         return ()
-    time = np.union1d(np.linspace(*trajectory.times.span, SEEN), trajectory.breakpoints)
-    damping = trajectory.at(time).commanded[DAMPING.key]
-    for index in chosen:
-        _check_damping(robot.joints[index], time, damping[:, index])
-    return tuple(index for index in chosen if damping[:, index].any())
+    damping = trajectory.block(0, 1).commanded[DAMPING.key][0]
+    return tuple(index for index in chosen if damping[index])
 
 
 def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str) -> None:
@@ -122,17 +107,6 @@ def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str)
         raise InputError.one(
             f"{work} do not know transmissions with a damper ({names}): what moves inside depends on the "
             "whole motion; set their damping to 0, or move the dampers between the links"
-        )
-
-
-def _check_damping(joint: Joint, time: FloatArray, damping: FloatArray) -> None:
-    """Refuse a damping that vanishes on the way."""
-    vanishes = damping <= 0
-    if vanishes.any() and damping.any():
-        raise InputError.one(
-            f"{joint.name}: its damping is {damping[vanishes][0]:g} at t = "
-            f"{time_text(float(time[vanishes][0]))}; parallel to springs it must be positive all the time, "
-            "or zero all the time, since what moves inside is a state only while it is damped"
         )
 
 
