@@ -73,11 +73,10 @@ def test_usage_error(vsacli, tmp_path, arguments, message):
         ("absent/r.h5", "there is no folder"),
         (".", "is a folder; give the name of a file"),
         ("move.yaml/r.h5", "there is no folder|Not a directory"),
-        ("", "is a folder; give the name of a file"),
         ("/dev/null", "is not a regular file and cannot be replaced"),
         (f"{'r' * 300}.h5", "the file name is too long"),
     ],
-    ids=["no folder", "a folder", "below a file", "nameless", "a device", "long name"],
+    ids=["no folder", "a folder", "below a file", "a device", "long name"],
 )
 def test_result_that_cannot_be_written(vsacli, tmp_path, motion, output, message):
     done = vsacli("invdyn", ROBOT, motion, "-o", output)

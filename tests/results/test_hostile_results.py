@@ -144,24 +144,19 @@ def test_opening_reads_no_samples(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code"),
+    ("line", "code"),
     [
-        (("export", "r.h5", "--variables", "tau_motor"), 0),
-        (("info", "r.h5"), 0),
-        (("export", "r.h5", "--variables", "flags"), 2),
-        (("plot", "r.h5", "-o", "figures"), 2),
-        (("invdyn", ROBOT, "move.yaml", "-o", "s.h5", "--plot", "figures"), 0),
-        (("validate", "r.h5"), 2),
-        (("validate", "r.h5", "--recompute"), 2),
+        ("export r.h5 --variables tau_motor", 0),
+        ("info r.h5", 0),
+        ("export r.h5 --variables flags", 2),
+        ("plot r.h5 -o figures", 2),
+        ("validate r.h5", 2),
+        ("validate r.h5 --recompute", 2),
     ],
-    ids=lambda value: " ".join(map(str, value)) if isinstance(value, tuple) else None,
 )
-def test_damage_matters_where_it_is_read(
-    vsacli: Any, small_result: Path, arguments: tuple[object, ...], code: int
-) -> None:
+def test_damage_matters_where_it_is_read(vsacli: Any, small_result: Path, line: str, code: int) -> None:
     with_damaged_flags(small_result, Path("r.h5"))
-    shutil.copy(small_result.with_name("move.yaml"), "move.yaml")
-    done = vsacli(*arguments)
+    done = vsacli(*line.split())
     assert done.code == code
     if code:
         assert "r.h5: variable flags is damaged or truncated (" in done.out + done.err
