@@ -13,7 +13,7 @@ import pytest
 from oracles import potential_scan
 from samples.marks import slow_but
 
-from vsacli import load_robot
+from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.laws import Cubic
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.mechanisms.potentials.potential import BranchStart, Potential, PotentialRange
@@ -22,6 +22,7 @@ from vsacli.actuators.mechanisms.ratios.awas import Awas
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.reach import reach_flags
 from vsacli.base.errors import InputError, InvalidRecordError
+from vsacli.base.flags import Flag
 
 ROBOT = """
 format: vsacli-robot/1
@@ -344,3 +345,16 @@ def test_constants_may_be_expressions_and_angles(tmp_path: Path) -> None:
         "joints.0.actuator.mechanism.constants", {"k": 40000, "r": 0.01}
     )
     assert changed.joints[0].actuator.mechanism.constants == (("k", 40000.0), ("r", 0.01))
+
+
+def test_a_run_without_a_single_feasible_step_says_so(tmp_path: Path) -> None:
+    robot, trajectory = tmp_path / "robot.yaml", tmp_path / "trajectory.yaml"
+    robot.write_text(ROBOT.format("k/2*(r*theta_2)^2*sin(phi)^2"))
+    trajectory.write_text(
+        "format: vsacli-trajectory/1\nname: too-stiff\nduration: 1\nrate: 10\n"
+        "position: {type: constant, value: 0}\nstiffness: {type: constant, value: 1e5}\n"
+    )
+    own = load_robot(robot)
+    result = inverse_dynamics(own, load_trajectory(trajectory, own))
+    assert (result.flags == Flag.INFEASIBLE).all()
+    assert np.isnan(result.tau_motor).all()

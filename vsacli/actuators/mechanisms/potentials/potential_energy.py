@@ -75,7 +75,7 @@ class PotentialEnergy:
         flat = [row.ravel() for row in rows]
         values = np.empty((len(truncation.orders), flat[0].size))
         function(flat, values, function.workspace(flat[0].size))
-        return Derivatives(dict(zip(truncation.orders, values.reshape(-1, *shape), strict=True)))
+        return Derivatives(dict(zip(truncation.orders, values.reshape(len(values), *shape), strict=True)))
 
     def _traced(self, truncation: Truncation) -> RowFunction:
         from vsacli.compute.tracing import Kind, trace
