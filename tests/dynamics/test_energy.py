@@ -159,6 +159,12 @@ def test_positive_part_of_a_sine_is_of_third_order():
     assert coarse / fine > 8**2.5
 
 
+def test_no_positive_part_is_less_than_the_work():
+    """Nor is anything negative taken back, however much happens between two steps."""
+    power, work = np.array([-1.0, 1.0, -1.0, 1.0]), np.array([5.0, -5.0, 0.0])
+    assert positive_part(np.ones(3), power, work).tolist() == [5.0, 0.25, 0.25]
+
+
 def test_a_link_without_gravity_gives_all_its_energy_back():
     """Rigid and undamped: the peak of the kinetic energy is spent, then recovered."""
     robot = with_gravity(all_rigid("R", seed=2), np.zeros(3))

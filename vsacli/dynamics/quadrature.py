@@ -53,14 +53,15 @@ def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) ->
     Args:
         intervals: lengths h, (samples - 1,), s.
         power: (..., samples); where it changes its sign in an interval it is taken for linear, error O(h^3).
-        work: its integral over each interval, (..., samples - 1).
+        work: its integral over each interval, (..., samples - 1); no positive part is less.
     """
     positive: FloatArray = np.maximum(work, 0.0)
     before, after = power[..., :-1], power[..., 1:]
     turns = before * after < 0
     if turns.any():
         low, high = np.minimum(before, after)[turns], np.maximum(before, after)[turns]
-        positive[turns] = np.broadcast_to(intervals, turns.shape)[turns] / 2 * high**2 / (high - low)
+        linear = np.broadcast_to(intervals, turns.shape)[turns] / 2 * high**2 / (high - low)
+        positive[turns] = np.maximum(linear, positive[turns])
     return positive
 
 
