@@ -18,7 +18,7 @@ GROUPS = {
     "compare Comparison sensitivity Sensitivity",
     "Links": "link_torques forward_kinematics jacobian mass_matrix",
     "Control and simulation": "State state_derivative Gains feedback_linearization FeedbackLinearization "
-    "Integral simulate perturbed InitialError GoalTolerance Tolerances",
+    "Integral simulate perturbed InitialError Sensors GoalTolerance Tolerances",
     "Errors": "InputError StorageError",
 }
 """What is exported, in the order in which one comes across it."""

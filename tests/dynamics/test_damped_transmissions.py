@@ -91,6 +91,13 @@ def test_the_full_model_follows(name: str, damping: Ends) -> None:
 
 
 @pytest.mark.slow
+def test_springs_that_know_the_position_of_the_joint_follow() -> None:
+    device = DEVICES["potential"]
+    drive = replace(device.drive, transmission_dampers=[over_time(2, 8)])
+    assert_follows(LINK, [device.actuator], [drive], [device.stiffness], [PARALLEL], [(2, 8)])
+
+
+@pytest.mark.slow
 def test_an_arm_of_damped_joints_follows() -> None:
     actuators, _, stiffness = zip(*CASES.values(), strict=True)
     damping = [(2, 5), (3, 3), (8, 2)]

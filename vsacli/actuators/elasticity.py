@@ -79,12 +79,9 @@ class ElasticState(ABC):
     def stiffness_rate(self, rates: FloatArray) -> FloatArray:
         """Rate of the stiffness (18), (..., joints)."""
 
+    @abstractmethod
     def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
-        """What the second derivative of the stiffness has from the rates alone, x' H x', (..., joints).
-
-        Only dampers beside the springs need it.
-        """
-        raise NotImplementedError(f"{type(self).__name__} has no springs that a damper may lie beside")
+        """What the second derivative of the stiffness has from the rates alone, x' H x', (..., joints)."""
 
     @abstractmethod
     def motor_accelerations(

@@ -17,11 +17,18 @@ ACTUAL = (
     *("dissipated_power", "current", "voltage", "copper_loss"),
 )
 ERRORS = ("q", "dq", "stiffness", "dstiffness")
+MEASURED = ("q", "theta", "tau_motor")
+"""What sensors read."""
 
 
 def actual(name: str) -> str:
     """Name under which the actual value of a variable is stored."""
     return f"{name}_actual"
+
+
+def measured(name: str) -> str:
+    """Name under which the reading of a variable is stored."""
+    return f"{name}_measured"
 
 
 def error(name: str) -> str:
@@ -42,6 +49,11 @@ def _declared() -> Iterator[Variable]:
     for name in ERRORS:
         words = VARIABLES[name].long_name.replace("commanded ", "")
         yield VARIABLES[name]._replace(name=error(name), long_name=f"{words}, actual minus commanded")
+    for name in MEASURED:
+        was, words = VARIABLES[name], VARIABLES[name].long_name.replace("commanded ", "")
+        yield was._replace(
+            name=measured(name), long_name=f"{words}, as measured", equation=f"{actual(name)}, read"
+        )
     yield VARIABLES["flags"]._replace(equation="state")
 
 

@@ -31,7 +31,7 @@ from vsacli.cli.plot import draw_staged
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.control.gains import Gains
-    from vsacli.control.simulation import Simulation
+    from vsacli.control.simulation import Sensors, Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
     from vsacli.results.plots import FigureFiles
     from vsacli.results.store.simulation import SimulationWriter
@@ -42,7 +42,11 @@ PROGRESS_STEPS = 1000
 FEEDBACK = "feedback-linearization"
 
 
-def _numbers(_context: click.Context, _parameter: click.Parameter, written: str) -> tuple[float, ...]:
+def _numbers(
+    _context: click.Context, _parameter: click.Parameter, written: str | None
+) -> tuple[float, ...] | None:
+    if written is None:
+        return None
     try:
         return tuple(float(word) for word in written.split(","))
     except ValueError:
@@ -86,7 +90,20 @@ def _numbers(_context: click.Context, _parameter: click.Parameter, written: str)
     default=0.0,
     help="Largest relative error of each parameter of the controller's model, e.g. 0.05.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of these errors.")
+@click.option(
+    "--sensor-noise",
+    metavar="RAD[,NM]",
+    callback=_numbers,
+    help="Standard deviation of measured positions, and of measured motor torques, e.g. 2e-5,0.5; adds "
+    "q_measured, theta_measured and tau_motor_measured to the result.",
+)
+@click.option(
+    "--encoder-bits",
+    metavar="N",
+    type=int,
+    help="Measured positions have 2^N steps in a turn of the joint, or of the motor's shaft; adds the same.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of errors of the model and noise.")
 @click.option(
     "--measure",
     "measured",
@@ -155,7 +172,8 @@ def simulate(
         file = outputs.file(path)
         figures = None if plot_folder is None else _figures(inputs.robot, plot_folder, path.stem, outputs)
         provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]])}
-        writer = SimulationWriter(file, *inputs, provenance=provenance)
+        sensed = simulation.keywords["sensors"] is not None
+        writer = SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance)
         report = _run(simulation, inputs.trajectory, writer, talk)
         if figures is not None:
             draw_staged(file, figures, talk)
@@ -181,6 +199,8 @@ def _prepared(
     initial_error: tuple[float, ...],
     initial_stiffness_error: tuple[float, ...],
     perturb: float,
+    sensor_noise: tuple[float, ...] | None,
+    encoder_bits: int | None,
     seed: int,
     measured: Any,
     tolerance: str,
@@ -211,10 +231,24 @@ def _prepared(
         model=perturbed(inputs.robot, perturb, seed),
         initial_error=InitialError(initial_error, initial_stiffness_error),
         measured=measured,
+        sensors=_sensors(sensor_noise, encoder_bits, seed),
         goal_tolerance=GoalTolerance.from_text(tolerance),
         tolerances=Tolerances(rtol, atol),
         budget=budget,
     )
+
+
+def _sensors(noise: tuple[float, ...] | None, bits: int | None, seed: int) -> Sensors | None:
+    from vsacli.control.simulation import Sensors
+
+    if noise is None and bits is None:
+        return None
+    position, torque, *more = (*(noise or ()), 0.0, 0.0)
+    if len(more) > 2:
+        raise InputError.one(
+            "--sensor-noise: expected RAD or RAD,NM: one for positions, one for motor torques"
+        )
+    return Sensors(position, torque, bits, seed)
 
 
 def _gains(robot: Robot, poles: str | None, stiffness_poles: str | None, integral: bool) -> Gains:

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from vsacli.control.simulation.goal_tolerance import GoalTolerance
     from vsacli.control.simulation.integrator import Tolerances
     from vsacli.control.simulation.perturbation import perturbed
+    from vsacli.control.simulation.sensors import Sensors
     from vsacli.control.simulation.simulate import InitialError, simulate
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "GoalTolerance",
     "InitialError",
     "Integral",
+    "Sensors",
     "Tolerances",
     "feedback_linearization",
     "perturbed",

@@ -3,12 +3,14 @@
 from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.integrator import Tolerances
 from vsacli.control.simulation.perturbation import perturbed
+from vsacli.control.simulation.sensors import Sensors
 from vsacli.control.simulation.simulate import InitialError, Measured, Simulation, check_measured, simulate
 
 __all__ = [
     "GoalTolerance",
     "InitialError",
     "Measured",
+    "Sensors",
     "Simulation",
     "Tolerances",
     "check_measured",

@@ -10,6 +10,7 @@ from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.vector import add
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
+from vsacli.control.simulation.sensors import Readings
 from vsacli.control.simulation.state_trajectory import StateTrajectory
 from vsacli.dynamics.limits import limit_flags
 from vsacli.dynamics.losses import dissipated_power
@@ -25,7 +26,13 @@ class History(Block):
     declared = SIMULATION_VARIABLES
 
 
-def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory, first: float) -> History:
+def history(
+    robot: Robot,
+    loop: ClosedLoop,
+    integrated: StateTrajectory,
+    first: float,
+    readings: Readings | None = None,
+) -> History:
     """Evaluate every variable along a state trajectory; `first` is the stamp of its time zero, s."""
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in TRACKED}
@@ -37,12 +44,17 @@ def history(robot: Robot, loop: ClosedLoop, integrated: StateTrajectory, first: 
     for name in ("stiffness", "dstiffness"):  # elsewhere there is none to command
         commanded[name] = np.where(chosen, commanded[name], found[name])
     demand = loop.plant.drivetrain.of_joints(integrated.demand)
+    read: dict[str, FloatArray] = {}
+    if readings is not None:
+        states = loop.packing.unpack(integrated.states)
+        read = readings.variables(states, loop.applied(integrated.demand))
     return History(
         time=first + integrated.time,
         **commanded,
         tau_motor=demand,
         **{actual(name): values for name, values in found.items()},
         **{error(name): found[name] - commanded[name] for name in ERRORS},
+        **read,
         flags=_flags(robot, {**found, "tau_motor": demand}, integrated.ending),
     )
 

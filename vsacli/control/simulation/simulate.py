@@ -27,6 +27,7 @@ from vsacli.control.simulation.integrator import Integrator, Tolerances
 from vsacli.control.simulation.joint_tracking import joint_trackings, stiffness_warnings
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.rounding import check_rounding
+from vsacli.control.simulation.sensors import Readings, Sensors
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
 from vsacli.control.simulation.sliding import sliding
 from vsacli.control.simulation.state_trajectory import StateTrajectory, continuous, sampled
@@ -119,6 +120,7 @@ def simulate(
     model: Robot | None = None,
     initial_error: InitialError = InitialError(),
     measured: Measured = "state",
+    sensors: Sensors | None = None,
     goal_tolerance: GoalTolerance = GoalTolerance(),
     tolerances: Tolerances = Tolerances(),
     budget: int | None = None,
@@ -134,6 +136,8 @@ def simulate(
         initial_error: by how much the start differs from the command.
         measured: what the controller knows: the full "state" at every instant, or the "positions" of joints
             and motors at the steps of the trajectory, between which it holds its torques.
+        sensors: how well positions and torques are measured; None records no measurements, and the positions
+            that a controller measures are exact.
         goal_tolerance: how far off the joints may be at the end of the run.
         tolerances: of the integration.
         budget: after how many evaluations of the equations of motion a run ends, incomplete; by default
@@ -144,7 +148,7 @@ def simulate(
         InputError: a trajectory that is not for the robot, a start that cannot be had, measured positions
             without gains, gains that do not fit, feedback linearization of a robot that mixes rigid joints
             with others, a mass matrix that is not positive definite, springs so stiff or poles so fast that
-            double precision does not resolve them, a budget below 1.
+            double precision does not resolve them, a budget below 1, encoders of a joint that slides any far.
         TypeError: robot or trajectory is none.
     """
     trajectory = fitted(robot, trajectory)
@@ -152,12 +156,15 @@ def simulate(
     first, elapsed = trajectory.start, trajectory.from_zero()
     loop = _closed_loop(robot, elapsed, model or robot, gains)
     start = start_state(robot, elapsed, initial_error)
+    readings: Readings | None = None
+    if sensors is not None:
+        readings = Readings(sensors, robot, loop.plant.drivetrain, elapsed.samples)
 
     def passed(time: float) -> None:
         progress(first + time)
 
-    integrated = _integrate(robot, loop, elapsed, start, measured, tolerances, budget, passed)
-    past = history(robot, loop, integrated, first)
+    integrated = _integrate(robot, loop, elapsed, start, measured, readings, tolerances, budget, passed)
+    past = history(robot, loop, integrated, first, readings)
     joints = joint_trackings(robot, past, goal_tolerance)
     full: SimulationReport | None = None
     if measured == "positions":
@@ -235,6 +242,7 @@ def _integrate(
     trajectory: Trajectory,
     start: State,
     measured: Measured,
+    readings: Readings | None,
     tolerances: Tolerances,
     limit: int | None,
     progress: Progress,
@@ -252,6 +260,8 @@ def _integrate(
     reached = times if last is None else times[times <= last.time]
     budget = Budget(limit, reached)
     integrator = Integrator(list(boundaries(loop, vector)), tolerances, budget, progress, slides)
-    integrate = continuous if measured == "state" else sampled
-    integrated = integrate(loop, integrator, reached, vector)
+    if measured == "state":
+        integrated = continuous(loop, integrator, reached, vector)
+    else:
+        integrated = sampled(loop, integrator, reached, vector, readings)
     return integrated if integrated.ending is not None else integrated._replace(ending=last)

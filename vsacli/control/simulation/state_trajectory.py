@@ -11,6 +11,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.integrator import Effort, Integrator
+from vsacli.control.simulation.sensors import Readings
 from vsacli.control.simulation.state_vector import Phase
 
 CUTOFF = 0.1
@@ -21,23 +22,23 @@ class RateFilter:
     """Backward differences of joint and motor positions, smoothed by a low-pass of first order.
 
     Args:
-        start: the state at the first sample, whose velocities are known: the robot rests.
+        start: what is read of the first sample, whose velocities are known: the robot rests.
     """
 
     def __init__(self, start: Phase) -> None:
         self.phase = start
 
-    def add(self, truth: Phase, elapsed: float) -> None:
+    def add(self, read: Phase, elapsed: float) -> None:
         """Take a sample of the positions, some seconds after the previous one."""
         keep = math.exp(-2 * math.pi * CUTOFF)
         dq, dtheta = (
             keep * rate + (1 - keep) * (new - old) / elapsed
             for rate, new, old in (
-                (self.phase.dq, truth.q, self.phase.q),
-                (self.phase.dtheta, truth.theta, self.phase.theta),
+                (self.phase.dq, read.q, self.phase.q),
+                (self.phase.dtheta, read.theta, self.phase.theta),
             )
         )
-        self.phase = truth._replace(dq=dq, dtheta=dtheta)
+        self.phase = read._replace(dq=dq, dtheta=dtheta)
 
 
 class StateTrajectory(NamedTuple):
@@ -64,18 +65,30 @@ def continuous(
 
 
 def sampled(
-    loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
+    loop: ClosedLoop,
+    integrator: Integrator,
+    times: FloatArray,
+    start: FloatArray,
+    readings: Readings | None = None,
 ) -> StateTrajectory:
-    """The controller acts at the times, on measured positions, and its torques are held in between."""
-    measurement = RateFilter(loop.packing.unpack(start))
+    """The controller acts at the times, on measured positions, and its torques are held in between.
+
+    What is measured are the readings of sensors, or the true positions.
+    """
+
+    def read(state: FloatArray, sample: int) -> Phase:
+        truth = loop.packing.unpack(state)
+        return truth if readings is None else readings.phase(truth, sample)
+
+    measurement = RateFilter(read(start, 0))
     reached, states, ending = [times[:1]], [start[None]], None
     demands = [loop.controller.torque(float(times[0]), measurement.phase)]
-    for interval in np.stack((times[:-1], times[1:]), axis=1):
+    for sample, interval in enumerate(np.stack((times[:-1], times[1:]), axis=1), 1):
         loop.held = demands[-1]
         time, after, ending = integrator.over(loop.derivative, interval, states[-1][-1])
         reached.append(time[1:])
         states.append(after[1:])
-        measurement.add(loop.packing.unpack(after[-1]), time[-1] - time[0])
+        measurement.add(read(after[-1], sample), time[-1] - time[0])
         demands.append(loop.controller.torque(float(time[-1]), measurement.phase))
         if ending is not None:
             break

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
-from vsacli.base.simulation_variables import SIMULATION_VARIABLES
+from vsacli.base.outputs import Staged
+from vsacli.base.simulation_variables import MEASURED, SIMULATION_VARIABLES, measured
 from vsacli.results.store.reader import StoredResult, open_one_of
 from vsacli.results.store.writer import ResultWriter
+from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 FORMAT = "vsacli-simulation/1"
@@ -23,14 +27,30 @@ class StoredSimulation(StoredResult):
 
 
 class SimulationWriter(ResultWriter):
-    """Writes a simulation file; the trajectory's samples are the most it can have."""
+    """Writes a simulation file; the trajectory's samples are the most it can have.
+
+    Args:
+        file, robot, trajectory, provenance: as of `ResultWriter`.
+        sensed: whether the run has readings of sensors.
+    """
 
     _format = FORMAT
     _declared = SIMULATION_VARIABLES
 
-    @staticmethod
-    def _absent(_trajectory: Trajectory) -> dict[str, str]:
-        return {}
+    def __init__(
+        self,
+        file: Staged,
+        robot: Robot,
+        trajectory: Trajectory,
+        *,
+        sensed: bool = False,
+        provenance: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        self._sensed = sensed
+        super().__init__(file, robot, trajectory, provenance=provenance)
+
+    def _absent(self, trajectory: Trajectory) -> dict[str, str]:  # noqa: ARG002
+        return {} if self._sensed else dict.fromkeys(map(measured, MEASURED), "the run had no sensors")
 
 
 def open_stored(path: str | Path) -> StoredResult:

@@ -189,8 +189,7 @@ class ResultWriter:
                 raise InputError.one(f"there is no {variable.name}: {absent[variable.name]}")
         return selected
 
-    @staticmethod
-    def _absent(trajectory: Trajectory) -> dict[str, str]:
+    def _absent(self, trajectory: Trajectory) -> dict[str, str]:
         """The variables that a run along a trajectory does not have, each with the reason."""
         uncertain = trajectory.uncertain
         certain = [name for name in UNCERTAIN if name not in uncertain]

@@ -70,6 +70,10 @@ class PotentialState(MechanismState):
         """Of U_qq."""
         return self._rate((0, 0), rates)
 
+    def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
+        """Quadratic in the rates of x, of U_qq."""
+        return self._curvature((0, 0), rates)
+
     def spring_rates(self, rates: FloatArray) -> FloatArray:
         """Of the derivatives over theta_1 and theta_2."""
         return np.stack((self._rate((1,), rates), self._rate((2,), rates)), axis=-1)
@@ -86,7 +90,7 @@ class PotentialState(MechanismState):
         """A^-1 (y'' - y_q q'' - what is quadratic in the rates)."""
         u = self._all
         torque_row = ddtau_e + u(0, 0) * ddq + self._curvature((0,), rates)
-        stiffness_row = ddstiffness - u(0, 0, 0) * ddq - self._curvature((0, 0), rates)
+        stiffness_row = ddstiffness - u(0, 0, 0) * ddq - self.stiffness_curvature(rates)
         return np.stack(self.rows.solve(torque_row, stiffness_row), axis=-1)
 
     def _rate(self, of: tuple[int, ...], rates: FloatArray) -> FloatArray:

@@ -1,0 +1,126 @@
+"""Sensors of positions and motor torques: their noise, and the steps of encoders."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import Drivetrain
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.simulation_variables import measured
+from vsacli.control.simulation.state_vector import Phase
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+
+MOST_BITS = 48
+"""Beyond, the steps of an encoder come near to what double precision tells apart."""
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """How well positions and torques are measured.
+
+    Attributes:
+        position: standard deviation of the positions of joints and motors, joint side of the gear, rad (m).
+        torque: standard deviation of the motor torques, joint side of the gear, N m (N).
+        encoder_bits: encoders have two to that power of steps in a turn, at the joint and on the shaft of
+            each motor whose gear ratio is known; where nothing turns, in the range of the joint's position.
+            None if they do not round.
+        seed: of the noise.
+
+    Raises:
+        InputError: a deviation that is negative or not finite, bits or a seed out of range.
+    """
+
+    position: float = 0.0
+    torque: float = 0.0
+    encoder_bits: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(each) and each >= 0 for each in (self.position, self.torque)):
+            raise InputError.one("the noise of sensors must be zero or positive numbers")
+        if self.encoder_bits is not None and not 1 <= self.encoder_bits <= MOST_BITS:
+            raise InputError.one(f"encoders have 1 to {MOST_BITS} bits, not {self.encoder_bits}")
+        if self.seed < 0:
+            raise InputError.one(f"the seed must be zero or positive, not {self.seed}")
+
+
+class Readings:
+    """What the sensors of a robot say at each sample of a run.
+
+    The noise is drawn once: a controller that samples positions knows the numbers that are recorded.
+
+    Args:
+        sensors: what is known of them.
+        robot: where they are.
+        drivetrain: its motors and springs.
+        samples: that a run has at most.
+
+    Raises:
+        InputError: encoders of a prismatic joint without position limits.
+    """
+
+    def __init__(self, sensors: Sensors, robot: Robot, drivetrain: Drivetrain, samples: int) -> None:
+        joints, motors = len(robot.joints), len(drivetrain.joint)
+        random = np.random.default_rng(sensors.seed)
+        self._drivetrain = drivetrain
+        self._q = sensors.position * random.standard_normal((samples, joints))
+        self._theta = sensors.position * random.standard_normal((samples, motors))
+        self._torque = sensors.torque * random.standard_normal((samples, motors))
+        self._q_step, self._theta_step = np.zeros(joints), np.zeros(motors)
+        if sensors.encoder_bits is not None:
+            share = 0.5**sensors.encoder_bits
+            self._q_step += [_turn(joint) * share for joint in robot.joints]
+            self._theta_step += [
+                _turn(joint, motor.gear_ratio) * share
+                for joint in robot.joints
+                for motor in joint.actuator.motors
+            ]
+
+    def positions(self, truth: Phase, rows: int | slice) -> tuple[FloatArray, FloatArray]:
+        """Of joints (..., joints) and of all motors (..., motors), at these samples of a run."""
+        theta = self._drivetrain.of_all(truth.q, truth.theta)
+        return (
+            _rounded(truth.q + self._q[rows], self._q_step),
+            _rounded(theta + self._theta[rows], self._theta_step),
+        )
+
+    def phase(self, truth: Phase, sample: int) -> Phase:
+        """What a controller takes for the state at a sample; velocities are the true ones."""
+        q, theta = self.positions(truth, sample)
+        return truth._replace(q=q, theta=theta[self._drivetrain.sprung])
+
+    def variables(self, truth: Phase, torque: FloatArray) -> dict[str, FloatArray]:
+        """All that is read along a run, from its states and the motor torques (samples, motors)."""
+        rows = slice(len(torque))
+        q, theta = self.positions(truth, rows)
+        of_joints = self._drivetrain.of_joints
+        read = {"q": q, "theta": of_joints(theta), "tau_motor": of_joints(torque + self._torque[rows])}
+        return {measured(name): values for name, values in read.items()}
+
+
+def _turn(joint: Joint, gear_ratio: float | None = None) -> float:
+    """What an encoder divides into steps, joint side of the gear, rad (m).
+
+    That is a turn of a joint, or of the shaft of a motor whose gear ratio is known.
+    """
+    if gear_ratio is not None:
+        return 2 * math.pi / abs(gear_ratio)
+    if joint.type == "revolute":
+        return 2 * math.pi
+    lower, upper = joint.limits.position
+    if not math.isfinite(upper - lower):
+        raise InputError.one(
+            f"encoder bits: joint {joint.name} slides, nobody knows how far; give it limits.position"
+        )
+    return upper - lower
+
+
+def _rounded(values: FloatArray, step: FloatArray) -> FloatArray:
+    """To multiples of a step, unless that is zero."""
+    whole = np.where(step > 0, step, 1.0)
+    return np.where(step > 0, whole * np.round(values / whole), values)
