@@ -262,6 +262,8 @@ def test_friction_between_links_must_be_smooth_and_of_one_size():
         with_friction(robot, None, Friction(coulomb=(1.0, 1.0)))
     with pytest.raises(InvalidRecordError, match=r"give their mean 2.5, and half their difference .*: -0.5"):
         with_friction(robot, None, SMOOTH)
+    with pytest.raises(InvalidRecordError, match=r"width: must be at least 1e-30 in size, not 1e-160"):
+        with_friction(robot, None, Friction(coulomb=(1.0, 1.0), width=1e-160))  # its square is no number
     only_offset = with_friction(robot, None, Friction(coulomb=(0.0, 0.0), offset=1.0))
     found = link_torques(only_offset, np.zeros(3)).tau_e - link_torques(robot, np.zeros(3)).tau_e
     np.testing.assert_allclose(found, 1.0, rtol=1e-13)  # rounding

@@ -19,6 +19,7 @@ from vsacli.base.signals import COMMANDED, Signal
 from vsacli.base.variables import LOSSES, MOTOR_CONSTANTS, OF_ANY_ROBOT, Variable
 from vsacli.documents.fields import (
     NON_NEGATIVE,
+    SMALLEST,
     OneOf,
     Record,
     check_fields,
@@ -239,6 +240,9 @@ class Joint:
                 "derivatives are needed, and the sign function has none; take a speed below which the joint "
                 "hardly moves, or give the friction to the motor, where width 0 will do"
             )
+            yield FieldProblem(("friction", "width"), reason)
+        if 0 < self.friction.width < SMALLEST:
+            reason = f"must be at least {SMALLEST:g} in size, not {self.friction.width:g}"
             yield FieldProblem(("friction", "width"), reason)
         if backward != forward:
             reason = (
