@@ -129,6 +129,8 @@ BAD = {
     "no number of the robot fits 'joints.*.max'": ["--parameters", "joints.*.max"],
     "t.yaml: no such file": ["--tolerances", "t.yaml"],
     "a tolerance must be positive": ["--tolerances", "-3%"],
+    "a tolerance must be at most 1e+30": ["--tolerances", "1e300%"],
+    "none of 2 drawn robots is one, choose smaller": ["--tolerances", "900%", "--monte-carlo", "2"],
     "'x%' is no tolerance": ["--tolerances", "x%"],
     "give --tolerances": ["--monte-carlo", "10"],
     "bad.yaml:1: joints.*.link.mass: expected a distribution": ["--tolerances", "bad.yaml"],

@@ -58,6 +58,9 @@ def monte_carlo(
         runs: how many robots are drawn.
         seed: of the draws.
         progress: is told how many further robots are done.
+
+    Raises:
+        InputError: the tolerances are so large that all that were drawn are no robots.
     """
     trajectory, random = fitted(robot, trajectory), np.random.default_rng(seed)
     sums = _Sums(trajectory.samples, len(robot.joints))
@@ -70,8 +73,12 @@ def monte_carlo(
         }
         try:
             sums.add(*_run(robot.replace(drawn), trajectory))
-        except InputError:
+        except InputError as error:
             refused += 1
+            if refused == runs:
+                raise InputError.one(
+                    f"none of {runs} drawn robots is one, choose smaller tolerances: {error}"
+                ) from None
         progress(1)
     return MonteCarlo(
         drawn=runs,

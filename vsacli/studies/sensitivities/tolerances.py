@@ -16,6 +16,7 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
+from vsacli.documents.fields import LARGEST
 from vsacli.documents.number import evaluate
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.yaml_tree import parse_yaml
@@ -122,4 +123,6 @@ def _number(text: str, whole: str, unit: str = "") -> float:
         raise InputError.one(f"{whole!r} is no tolerance: {error}") from None
     if not number > 0:
         raise InputError.one(f"a tolerance must be positive, not {whole!r}")
+    if number > LARGEST:
+        raise InputError.one(f"a tolerance must be at most {LARGEST:g}, not {whole!r}")
     return number
