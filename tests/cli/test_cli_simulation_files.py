@@ -213,13 +213,19 @@ def test_without_a_ratio_nothing_is_guessed(vsacli: Callable[..., Any], simulate
     assert "add it (1 without a gear) and run simulate again" in done.err
 
 
-@pytest.mark.parametrize("name", ["theta", "tau_e", "phi", "det_A"])
+@pytest.mark.parametrize(
+    ("name", "there"),
+    [
+        ("theta", "'theta_actual' or 'theta_measured'"),
+        *((n, f"'{n}_actual'") for n in ("tau_e", "phi", "det_A")),
+    ],
+)
 def test_a_name_of_a_result_leads_to_that_of_the_simulation(
-    vsacli: Callable[..., Any], simulated: Path, name: str
+    vsacli: Callable[..., Any], simulated: Path, name: str, there: str
 ) -> None:
     done = vsacli("export", simulated / "s.h5", "--variables", name)
     assert (done.code, done.out) == (2, "")
-    assert done.err == f"no variable is called {name!r}; did you mean '{name}_actual'?\n"
+    assert done.err == f"no variable is called {name!r}; did you mean {there}?\n"
 
 
 @pytest.mark.slow

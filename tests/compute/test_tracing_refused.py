@@ -45,7 +45,7 @@ REASON = "what is known only when the program runs cannot decide what is recorde
 
 
 def test_no_c_code_is_made(robot: Robot) -> None:
-    with pytest.raises(InputError, match=f"no C code can be made of vsa-3r: {REASON}"):
+    with pytest.raises(InputError, match=f"no C code can be made of vsa-3r: inverse_dynamics: {REASON}"):
         generate(robot)
 
 

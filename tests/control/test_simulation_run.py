@@ -20,7 +20,7 @@ from vsacli.base.flags import Flag
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.units import time_text
 from vsacli.control.gains import Gains
-from vsacli.control.simulation import InitialError, Tolerances, perturbed, simulate
+from vsacli.control.simulation import InitialError, Sensors, Tolerances, perturbed, simulate
 from vsacli.control.simulation.boundaries import Singularity
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.controllers import Feedforward
@@ -231,7 +231,7 @@ def test_perturbation_touches_every_dynamic_parameter_and_nothing_else():
 
 
 def test_every_declared_variable_is_in_the_history():
-    past = simulate(vsa_3r(), short_motion(3)).history
+    past = simulate(vsa_3r(), short_motion(3), sensors=Sensors()).history
     has = vsa_3r().has
     assert list(past.arrays()) == [name for name, each in SIMULATION_VARIABLES.items() if has(each)]
 

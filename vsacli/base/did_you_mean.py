@@ -5,19 +5,25 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+MOST_NEAR = 3
+"""Of words that begin as the one that was typed, so many are a help."""
+
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:
     """The valid word that is most like this one or alone begins with it, or None if none is close."""
-    options = list(valid)
-    longer = [option for option in options if option.startswith(word)]
-    close = difflib.get_close_matches(word, options, n=1, cutoff=0.6) or (longer if word else [])
+    close = _near(word, list(valid))
     return close[0] if len(close) == 1 else None
 
 
 def did_you_mean(word: str, valid: Iterable[str]) -> str:
     """A clause to append to an error: `; did you mean 'x'?`, or the list of what is valid."""
     options = list(valid)
-    near = nearest(word, options)
-    if near is not None:
-        return f"; did you mean {near!r}?"
+    if 0 < len(near := _near(word, options)) <= MOST_NEAR:
+        return f"; did you mean {' or '.join(map(repr, near))}?"
     return f"; valid: {', '.join(options)}" if len(options) <= 40 else ""
+
+
+def _near(word: str, options: list[str]) -> list[str]:
+    """The word most like this one, or those that begin with it."""
+    close = difflib.get_close_matches(word, options, n=1, cutoff=0.6)
+    return close or [option for option in options if word and option.startswith(word)]

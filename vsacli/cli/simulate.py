@@ -30,6 +30,7 @@ from vsacli.cli.plot import draw_staged
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
+    from vsacli.base.variables import Variable
     from vsacli.control.gains import Gains
     from vsacli.control.simulation import Sensors, Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
@@ -185,8 +186,10 @@ def simulate(
 def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFiles:
     from vsacli.results.plots import FigureFiles, simulation_drawings
 
-    drawn = simulation_drawings(lambda variable: any(any(joint.has(variable)) for joint in robot.joints))
-    return FigureFiles(drawn, folder, stem, "png", outputs)
+    def drawn(variable: Variable) -> bool:
+        return robot.has(variable) and any(any(joint.has(variable)) for joint in robot.joints)
+
+    return FigureFiles(simulation_drawings(drawn), folder, stem, "png", outputs)
 
 
 def _prepared(
