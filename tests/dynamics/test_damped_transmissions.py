@@ -30,6 +30,7 @@ from vsacli.base.signals import DAMPING, POSITION
 from vsacli.dynamics.internal_motion import internal_motions
 from vsacli.dynamics.internal_motion.march import March
 from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -250,6 +251,31 @@ def test_damping_may_not_vanish_on_the_way() -> None:
         inverse_dynamics(pendulum("awas"), swing("awas", (2, 0)))
 
 
+def waving(name: str, offset: float, sine: float) -> Trajectory:
+    """The swing with a damping that goes up and down."""
+    wave = Sinusoids(
+        signal=DAMPING, span=(0.0, DURATION), cycles=1.3, offset=(offset,), sine=((sine,),), cosine=((0.0,),)
+    )
+    swinging = swing(name)
+    commanded = {**swinging.commanded, DAMPING.key: wave}
+    return Trajectory(swinging.times, swinging.position, commanded, name="waving")
+
+
+def test_damping_may_not_touch_zero_between_the_times_that_are_looked_at() -> None:
+    with pytest.raises(InputError, match=r"the damping of joint_1 is .* at t = 0\.288"):  # 3/4 of 0.5/1.3 s
+        inverse_dynamics(pendulum("awas"), waving("awas", 1, 1))
+
+
+@pytest.mark.parametrize(("offset", "sine"), [(1, 0.9), (100, 0), (1e6, 0), (0.01, 0)])
+def test_little_much_and_changing_damping_pass_the_self_check(offset: float, sine: float) -> None:
+    """What dies away at the start is resolved, and rates are had by the way that rounding spares."""
+    pendular = pendulum("awas", Damper(location="transmission", range=(0, 1e9)))
+    result = inverse_dynamics(pendular, waving("awas", offset, sine))
+    check = result.report.self_check
+    assert check.spring_residual < 1e-12
+    assert check.ladder < check.ladder_bound == 1e-8  # springs held by 1e6 N m s/rad move by 1e-6 rad
+
+
 def test_feedback_linearization_says_why_not() -> None:
     message = r"motors act on the third where a damper lies parallel to the springs \(joint_1\)"
     with pytest.raises(InputError, match=message):
@@ -260,7 +286,7 @@ def test_motions_inside_go_as_far_as_the_trajectory() -> None:
     inside = internal_motions(pendulum("awas"), swing("awas"))
     assert inside.joints == (0,)
     assert not inside.stops
-    assert np.isfinite(inside.at(np.linspace(0, DURATION, 9))[0].acceleration).all()
+    assert np.isfinite(inside.at(np.linspace(0, DURATION, 9))[0].phi).all()
 
 
 def test_simulation_knows_how_fast_it_settles() -> None:

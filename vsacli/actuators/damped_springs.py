@@ -43,9 +43,10 @@ class InternalMotion(NamedTuple):
     """The motion inside a transmission with a damper.
 
     Attributes:
-        phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is a
-            guess from which the stiffness is found.
-        velocity: w, the rate of the spread, (samples,); what follows from the damping if None.
+        phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is
+            a guess from which the stiffness is found.
+        velocity: w, the rate of the spread, (samples,); where it is NaN, or if it is None, it follows from
+            the damping.
         acceleration: its derivative, (samples,), likewise.
     """
 
@@ -165,9 +166,10 @@ class DampedSprings:
         det A is; INTERNAL_INSTABILITY says that the slope is not positive.
         """
         phi = self.settled(self.spread(motion.phi), motion.phi, command)
-        _, rate, acceleration = motion
-        if rate is None or acceleration is None:
-            rate, acceleration = self.driven(phi, command)
+        rate, acceleration = (
+            following if known is None else np.where(np.isnan(known), following, known)
+            for known, following in zip(motion[1:], self.driven(phi, command), strict=True)
+        )
         springs = self._springs(phi, command.q)
         lower, upper, reached = self._reach(springs, phi, command, near_singular)
         velocity = np.where(reached.singular | reached.infeasible, np.nan, rate)

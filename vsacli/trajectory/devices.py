@@ -15,7 +15,13 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 SEEN = 1000
-"""Times at which damping is looked at, beside all breakpoints: whether there is any."""
+"""Times at which damping is looked at, beside all breakpoints and its dips: whether there is any."""
+
+NEWTON_STEPS = 4
+"""From a thousandth of the motion to a dip's bottom."""
+
+VANISHING = 1e-12
+"""Share of the largest damping that counts as none: what rounding leaves of a dip to zero."""
 
 
 def with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
@@ -30,9 +36,9 @@ def with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
     inside = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
     if inside:
         time = np.union1d(np.linspace(*trajectory.times.span, SEEN), trajectory.breakpoints)
-        damping = trajectory.at(time).commanded[DAMPING.key]
         for index in inside:
-            _check_damping(robot.joints[index], time, damping[:, index])
+            with_dips = np.union1d(time, _dips(trajectory, time, index))
+            _check_damping(robot.joints[index], with_dips, _damping(trajectory, with_dips, index)[0])
     return trajectory
 
 
@@ -48,12 +54,28 @@ def _with_least_damping(trajectory: Trajectory, robot: Robot) -> Trajectory:
     return trajectory.commanding(DAMPING, least, note)
 
 
+def _damping(trajectory: Trajectory, time: FloatArray, joint: int) -> list[FloatArray]:
+    """Damping of a joint with its derivatives at times."""
+    commanded = trajectory.at(time).commanded
+    return [commanded[name][:, joint] for name in DAMPING.names]
+
+
+def _dips(trajectory: Trajectory, time: FloatArray, joint: int) -> FloatArray:
+    """Where the damping is least between the times, by Newton's method on its rate."""
+    before = np.flatnonzero(np.diff(np.sign(_damping(trajectory, time, joint)[1])) > 0)
+    dips = time[before]
+    for _ in range(NEWTON_STEPS):
+        _, rate, bend = _damping(trajectory, dips, joint)
+        dips = np.clip(dips - rate / np.where(bend > 0, bend, np.inf), time[before], time[before + 1])
+    return dips
+
+
 def _check_damping(joint: Joint, time: FloatArray, damping: FloatArray) -> None:
     """Refuse a damping that vanishes on the way."""
-    vanishes = damping <= 0
-    if vanishes.any() and damping.any():
+    least = damping.argmin()
+    if damping[least] <= VANISHING * damping.max() and damping.any():
         raise InputError.one(
-            f"the damping of {joint.name} is {damping[vanishes][0]:g} at t = "
-            f"{time_text(float(time[vanishes][0]))}; parallel to springs it must be positive all the time, "
-            "or zero all the time, since what moves inside is a state only while it is damped"
+            f"the damping of {joint.name} is {damping[least]:.6g} at t = {time_text(float(time[least]))}; "
+            "parallel to springs it must be positive all the time, or zero all the time, since what moves "
+            "inside is a state only while it is damped"
         )

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, IndexArray
 
 STAGES = 12
 """With so many, a motion of half a second from rest to rest is exact to rounding in some forty cells."""
@@ -76,11 +76,15 @@ class Piecewise:
         first = chebyshev.chebder(coefficients, axis=2) / half
         self._orders = coefficients, first, chebyshev.chebder(first, axis=2) / half
 
+    def cell(self, time: FloatArray) -> IndexArray:
+        """Numbers of the cells in which times are; beyond the ends the nearest one."""
+        return np.clip(np.searchsorted(self.ends, time, side="right") - 1, 0, len(self.ends) - 2)
+
     def at(self, time: FloatArray, order: int = 0) -> FloatArray:
         """A derivative, (rows, samples); beyond the ends that of the nearest cell."""
         from numpy.polynomial import chebyshev
 
-        cell = np.clip(np.searchsorted(self.ends, time, side="right") - 1, 0, len(self.ends) - 2)
+        cell = self.cell(time)
         left, right = self.ends[cell], self.ends[cell + 1]
         place = np.clip(2 * (time - left) / (right - left) - 1, -1.0, 1.0)
         coefficients = self._orders[order]

@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.actuators.damped_springs import DampedSprings
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.signals import DAMPING
 from vsacli.dynamics.internal_motion.collocation import Collocation, Piecewise
 
@@ -20,12 +20,26 @@ FIRST_CELLS = 8
 RESOLVED = 1e-14
 """Share of the largest deflection that the last coefficients of a polynomial may have: rounding."""
 
+LEAST_SHARE, LEAST_SPREAD = 1e-6, 1e-9
+"""What a spread is measured against if it is smaller: a share of the largest deflection; rad (m)."""
+
 TOLERATED, GAIN = 1e-9, 4.0
 """Below, halving twice must lower that share by this factor to be worth another one: else it is noise of the
 trajectory itself, whose knots may lie denser than the cells."""
 
 HALVINGS = 20
 """To where a motion cannot go on, within a millionth of a first cell."""
+
+LAYER = 4.0
+"""Where the demand sets in anew, something dies away that need not show in a cell of more than so many time
+constants: its polynomial passes it over."""
+
+FAST = 100.0
+"""In cells of more time constants, a polynomial knows the rates better than the equation d w = tau_l - T.
+
+By that rounding makes them wrong by eps T/d, by the polynomial by some eps spread STAGES^2 2/duration, which
+is less beyond 288 time constants; for the next derivative beyond 170.
+"""
 
 NEWTON_STEPS = 20
 """Mostly five are taken."""
@@ -45,13 +59,27 @@ class Marched(NamedTuple):
 
     Attributes:
         phi: up to where they go; None if they go nowhere.
+        fast: (cells,), where rates are those of the polynomial, see `FAST`.
         end: up to which time, s.
         reason: why not further; None at the end of the trajectory.
     """
 
     phi: Piecewise | None
+    fast: BoolArray
     end: float
     reason: str | None
+
+
+class _Solution(NamedTuple):
+    """What was found in a cell.
+
+    Attributes:
+        phi: deflections at start and nodes, (2, 1 + stages).
+        constants: the time constants it lasts.
+    """
+
+    phi: FloatArray
+    constants: float
 
 
 class _Cell(NamedTuple):
@@ -59,12 +87,14 @@ class _Cell(NamedTuple):
 
     Attributes:
         left, right: its ends, s.
+        new: whether the demand sets in anew where it begins.
         shares: of the last coefficients in the cells that it is a half and a quarter of, the latter first.
         halved: how often it was halved.
     """
 
     left: float
     right: float
+    new: bool = True
     shares: tuple[float, float] = (np.inf, np.inf)
     halved: int = 0
 
@@ -72,8 +102,8 @@ class _Cell(NamedTuple):
         """Left and right."""
         middle = (self.left + self.right) / 2
         return (
-            _Cell(self.left, middle, (self.shares[1], share), self.halved + 1),
-            _Cell(middle, self.right, (self.shares[1], share), self.halved + 1),
+            _Cell(self.left, middle, self.new, (self.shares[1], share), self.halved + 1),
+            _Cell(middle, self.right, False, (self.shares[1], share), self.halved + 1),
         )
 
 
@@ -91,30 +121,33 @@ class March:
     def through(self, ends: FloatArray, phi: FloatArray) -> Marched:
         """The whole way, from deflections (2, 1); between the ends, s, the demand is smooth."""
         solved: list[FloatArray] = []
-        reached, peak = [float(ends[0])], 0.0
+        reached, fast = [float(ends[0])], list[bool]()
+        peaks = _Peaks(self._springs)
         todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
         while todo:
             cell = todo.pop()
             found = self._solved(cell, phi)
-            coefficients = None if isinstance(found, str) else self._rule.coefficients(found)
-            share = np.inf
-            if coefficients is not None:
-                sizes = np.abs(coefficients)
-                peak = max(peak, float(np.nanmax(sizes)))
-                share = float(np.nanmax(sizes[:, -2:])) / peak if peak else 0.0
-            unresolved = share > RESOLVED and (share > TOLERATED or share < cell.shares[0] / GAIN)
+            if isinstance(found, str):
+                share, unresolved = np.inf, True
+            else:
+                coefficients = self._rule.coefficients(found.phi)
+                share = peaks.share(coefficients)
+                settling = cell.new and found.constants > LAYER
+                falling = share < cell.shares[0] / GAIN
+                unresolved = share > RESOLVED and (share > TOLERATED or falling or settling)
             if unresolved and cell.halved < HALVINGS:
                 todo += cell.halves(share)[::-1]
-            elif coefficients is None:
-                return Marched(_joined(reached, solved), cell.left, str(found))
+            elif isinstance(found, str):
+                return Marched(_joined(reached, solved), np.array(fast), cell.left, found)
             else:
-                phi = np.asarray(found)[:, -1:]
+                phi = found.phi[:, -1:]
                 solved.append(coefficients)
                 reached.append(cell.right)
-        return Marched(_joined(reached, solved), reached[-1], None)
+                fast.append(found.constants > FAST)
+        return Marched(_joined(reached, solved), np.array(fast), reached[-1], None)
 
-    def _solved(self, cell: _Cell, start: FloatArray) -> FloatArray | str:
-        """Deflections at start and nodes of a cell, (2, 1 + stages), by Newton's method; or why not."""
+    def _solved(self, cell: _Cell, start: FloatArray) -> _Solution | str:
+        """Deflections in a cell from those at its start, by Newton's method; or why there are none."""
         springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
         before, side = springs.spread(start), np.sign(springs.pivot(start, command.q[:1]))
@@ -127,7 +160,8 @@ class March:
             if (np.sign(springs.pivot(phi, command.q)) != side).any():
                 return SINGULAR
             if converged:
-                return np.hstack((start, phi))
+                fastest = float(np.max(np.abs(springs.slope(phi, command.q)) / damping))
+                return _Solution(np.hstack((start, phi)), (cell.right - cell.left) * fastest)
             rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
             missing = command.tau_e - springs.torque(phi, command.q) - damping * rate
             matrix = damping[:, None] * slopes[:, 1:] + np.diag(springs.slope(phi, command.q))
@@ -135,6 +169,22 @@ class March:
             spread = spread + step
             converged = bool(np.abs(step).max() <= CONVERGED * np.abs(spread).max())
         return LOST
+
+
+class _Peaks:
+    """The largest deflections and the largest spread so far, which the last coefficients are measured by."""
+
+    def __init__(self, springs: DampedSprings) -> None:
+        self._springs = springs
+        self._phi = self._spread = 0.0
+
+    def share(self, coefficients: FloatArray) -> float:
+        """Of the last coefficients of a polynomial (2, degree + 1), in its own peak or an earlier one."""
+        phi, spread = np.abs(coefficients), np.abs(self._springs.spread(coefficients))
+        self._phi = max(self._phi, float(np.nanmax(phi)))
+        self._spread = max(self._spread, float(spread.max()), LEAST_SHARE * self._phi, LEAST_SPREAD)
+        of_phi = float(np.nanmax(phi[:, -2:])) / max(self._phi, LEAST_SPREAD)
+        return max(of_phi, float(spread[-2:].max()) / self._spread)
 
 
 def _joined(reached: list[float], solved: list[FloatArray]) -> Piecewise | None:

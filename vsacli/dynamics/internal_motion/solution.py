@@ -53,7 +53,9 @@ class InternalMotions:
         phi, rate, acceleration = (
             np.where(gone, np.nan, marched.phi.at(elapsed, order)) for order in range(3)
         )
-        return InternalMotion(phi, springs.spread(rate), springs.spread(acceleration))
+        fast = marched.fast[marched.phi.cell(elapsed)]
+        rates = (np.where(fast, springs.spread(each), np.nan) for each in (rate, acceleration))
+        return InternalMotion(phi, *rates)
 
 
 def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
@@ -73,7 +75,9 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
             begin = springs[index].equilibrium(demand.of(index, ends[:1]), robot.joints[index].damper_start)
             march = March(springs[index], partial(demand.of, index))
             started = not np.isnan(begin[0]).any()
-            marched[index] = march.through(ends, begin) if started else Marched(None, 0.0, LOST)
+            marched[index] = (
+                march.through(ends, begin) if started else Marched(None, np.zeros(0, dtype=bool), 0.0, LOST)
+            )
     stops = {
         index: Stop(first + each.end, each.reason)
         for index, each in marched.items()
