@@ -8,7 +8,7 @@ import math
 import h5py
 import numpy as np
 import pytest
-from samples.command_line import REST_TO_REST, ROBOT, rest_to_rest
+from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, rest_to_rest
 
 from vsacli import load_robot, load_trajectory, sensitivity
 from vsacli.actuators.reach import margin
@@ -78,6 +78,15 @@ def test_drawn_robots_agree_with_the_first_order(arm, motion):
         assert band.margin > 0.05
         assert found.monte_carlo.torque[joint] == pytest.approx(band.torque, rel=0.1)
         assert found.monte_carlo.lost[joint] == 0
+
+
+def test_a_deviation_takes_two_robots_with_torques():
+    robot = load_robot(REPOSITORY / "robots/planar_2r.yaml")
+    trajectory = load_trajectory(REPOSITORY / "trajectories/planar_2r.yaml", robot)
+    found = sensitivity(robot, trajectory, tolerances="20%", runs=2, seed=4)
+    assert found.monte_carlo.lost["shoulder"] == 0.5
+    assert np.isnan(found.monte_carlo.torque["shoulder"])
+    assert "shoulder +- unknown (fewer than two have torques), 50 % lost" in str(found)
 
 
 def test_the_chance_that_a_margin_is_lost(arm, motion, tmp_path):

@@ -27,7 +27,8 @@ class MonteCarlo(Published):
         drawn: how many.
         refused: how many of those are no robots: a mass below zero, say.
         lost: share of the others that have an infeasible or singular step, by joint.
-        torque: largest standard deviation of a motor torque among those that have none, by joint, N m (N).
+        torque: largest standard deviation of a motor torque among those that have none, by joint, N m (N);
+            NaN where fewer than two have none.
     """
 
     drawn: int
@@ -124,6 +125,7 @@ class _Sums:
 
     @property
     def deviation(self) -> FloatArray:
-        """Largest over steps and motors, (joints,)."""
+        """Largest over steps and motors, (joints,); NaN where fewer than two robots have torques."""
         variance = self._squares / np.maximum(self._count - 1, 1)[:, None]
-        return np.asarray(np.sqrt(variance.max(axis=(0, 2), initial=0.0)))
+        largest = np.sqrt(variance.max(axis=(0, 2), initial=0.0))
+        return np.asarray(np.where(self._count > 1, largest, np.nan))

@@ -163,10 +163,15 @@ class Sensitivity(Published):
         drawn = self.monte_carlo
         refused = f", {drawn.refused} of them no robots" if drawn.refused else ""
         each = ", ".join(
-            f"{joint} +- {drawn.torque[joint]:.3g} {self.units[joint]}, {_probability(lost)} lost"
+            f"{joint} {self._deviation(joint, drawn.torque[joint])}, {_probability(lost)} lost"
             for joint, lost in drawn.lost.items()
         )
         yield f"of {drawn.drawn} robots drawn{refused}: {each}"
+
+    def _deviation(self, joint: str, torque: float) -> str:
+        if math.isnan(torque):
+            return "+- unknown (fewer than two have torques)"
+        return f"+- {torque:.3g} {self.units[joint]}"
 
 
 def _margins(effect: ParameterEffect) -> str:
