@@ -125,8 +125,9 @@ def test_a_controller_that_measures_positions_knows_what_is_recorded():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"position": -1e-5}, "zero or positive"),
-        ({"torque": np.nan}, "zero or positive"),
+        ({"position": -1e-5}, "between 0 and"),
+        ({"torque": np.nan}, "between 0 and"),
+        ({"torque": 1e300}, "between 0 and"),
         ({"encoder_bits": 0}, "1 to 48 bits, not 0"),
         ({"encoder_bits": 64}, "1 to 48 bits, not 64"),
         ({"seed": -1}, "seed must be"),

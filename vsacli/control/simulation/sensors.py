@@ -12,6 +12,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import measured
 from vsacli.control.simulation.state_vector import Phase
+from vsacli.documents.fields import LARGEST
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
@@ -41,8 +42,8 @@ class Sensors:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if not all(math.isfinite(each) and each >= 0 for each in (self.position, self.torque)):
-            raise InputError.one("the noise of sensors must be zero or positive numbers")
+        if not all(0 <= each <= LARGEST for each in (self.position, self.torque)):
+            raise InputError.one(f"the noise of sensors must lie between 0 and {LARGEST:g}")
         if self.encoder_bits is not None and not 1 <= self.encoder_bits <= MOST_BITS:
             raise InputError.one(f"encoders have 1 to {MOST_BITS} bits, not {self.encoder_bits}")
         if self.seed < 0:
