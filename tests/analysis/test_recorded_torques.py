@@ -87,10 +87,14 @@ def outcomes(motion, colour, seed):
     "colour", [name if name == QUICK else pytest.param(name, marks=pytest.mark.slow) for name in COLOURS]
 )
 def test_torques_from_rest_to_rest_are_right_and_as_uncertain_as_stated(colour):
-    for name, verdict, error, within in outcomes("rest to rest, pauses", colour, 20):
-        assert verdict == "ok", name
-        assert error < 0.02, name  # 1.1 % was the largest of twelve colours, four seeds and two rates
-        assert within is None or within > 0.9, name
+    covered = []
+    for seed in (20, 21, 22):
+        for name, verdict, error, within in outcomes("rest to rest, pauses", colour, seed):
+            assert verdict == "ok" or seed > 20, name  # of other draws some are doubtful, though right
+            assert error < 0.02, name  # 1.4 % was the largest of twelve colours, six seeds and two rates
+            covered += [] if within is None else [within]
+    # errors of one record go together: of single ones 0.82 to 1; of a colour 0.935 to 0.975 were seen
+    assert not covered or 0.9 < np.mean(covered) < 0.99
 
 
 @pytest.mark.parametrize(

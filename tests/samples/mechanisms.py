@@ -307,7 +307,9 @@ DEVICES = {
     "variable_ratio, measured scale": Device(  # a spline through the points of a cubic is that cubic
         mechanism=VariableRatio(
             setting=(0, 3),
-            scale=MeasuredScale(file=scale_table(np.linspace(0, 3, 7), lambda s: 3 - 0.5 * s - 0.02 * s**3)),
+            scale=MeasuredScale(
+                file=scale_table(np.linspace(-0.1, 3.1, 7), lambda s: 3 - 0.5 * s - 0.02 * s**3)
+            ),
             torque=Cubic(k=300, k_c=500),
         ),
         potential=_ratio(lambda s: 3 - 0.5 * s - 0.02 * s**3, lambda phi: 150 * phi**2 + 125 * phi**4),

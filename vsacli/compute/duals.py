@@ -239,8 +239,8 @@ FLAT = frozenset(
 )
 """Functions whose results do not change with their operands, but for jumps."""
 
-ALIKE = frozenset({np.zeros_like, np.ones_like, np.empty_like, np.shape, np.ndim})
-"""Functions that take of their first argument the shape alone."""
+ALIKE = frozenset({np.zeros_like, np.ones_like, np.empty_like, np.shape, np.ndim, np.searchsorted})
+"""Functions whose results are shapes and places, which do not change with what numbers are."""
 
 
 def _where(condition: Any, a: Any, b: Any) -> Dual:
