@@ -286,7 +286,7 @@ def test_motions_inside_go_as_far_as_the_trajectory() -> None:
     inside = internal_motions(pendulum("awas"), swing("awas"))
     assert inside.joints == (0,)
     assert not inside.stops
-    assert np.isfinite(inside.at(np.linspace(0, DURATION, 9))[0].phi).all()
+    assert np.isfinite(inside.at(np.linspace(0, DURATION, 9))[0].acceleration).all()
 
 
 def test_simulation_knows_how_fast_it_settles() -> None:

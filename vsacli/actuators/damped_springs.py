@@ -45,8 +45,7 @@ class InternalMotion(NamedTuple):
     Attributes:
         phi: deflections, or what else describes the springs, (2, samples): their spread counts, the rest is
             a guess from which the stiffness is found.
-        velocity: w, the rate of the spread, (samples,); where it is NaN, or if it is None, it follows from
-            the damping.
+        velocity: w, the rate of the spread, (samples,); what follows from the damping if None.
         acceleration: its derivative, (samples,), likewise.
     """
 
@@ -166,10 +165,9 @@ class DampedSprings:
         det A is; INTERNAL_INSTABILITY says that the slope is not positive.
         """
         phi = self.settled(self.spread(motion.phi), motion.phi, command)
-        rate, acceleration = (
-            following if known is None else np.where(np.isnan(known), following, known)
-            for known, following in zip(motion[1:], self.driven(phi, command), strict=True)
-        )
+        _, rate, acceleration = motion
+        if rate is None or acceleration is None:
+            rate, acceleration = self.driven(phi, command)
         springs = self._springs(phi, command.q)
         lower, upper, reached = self._reach(springs, phi, command, near_singular)
         velocity = np.where(reached.singular | reached.infeasible, np.nan, rate)

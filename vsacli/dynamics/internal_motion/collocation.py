@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.arrays import FloatArray
 
 STAGES = 12
 """With so many, a motion of half a second from rest to rest is exact to rounding in some forty cells."""
@@ -23,11 +23,13 @@ class _Rule(NamedTuple):
     Attributes:
         nodes: (stages,), the last at 1.
         to_coefficients: of Chebyshev's polynomials, from values at -1 and at the nodes.
-        slopes: derivatives at the nodes from the same values.
+        through_nodes: the same from values at the nodes alone.
+        slopes: derivatives at the nodes from values at -1 and at the nodes.
     """
 
     nodes: FloatArray
     to_coefficients: FloatArray
+    through_nodes: FloatArray
     slopes: FloatArray
 
 
@@ -38,7 +40,8 @@ def _rule(stages: int) -> _Rule:
     nodes = np.append(roots_jacobi(stages - 1, 1, 0)[0], 1.0)
     to_coefficients = np.linalg.inv(chebyshev.chebvander(np.append(-1.0, nodes), stages))
     slopes: FloatArray = chebyshev.chebvander(nodes, stages - 1) @ chebyshev.chebder(to_coefficients)
-    return _Rule(nodes, to_coefficients, slopes)
+    through_nodes = np.linalg.inv(chebyshev.chebvander(nodes, stages - 1))
+    return _Rule(nodes, to_coefficients, through_nodes, slopes)
 
 
 class Collocation:
@@ -56,8 +59,12 @@ class Collocation:
         return self._rule.slopes * (2 / (end - start))
 
     def coefficients(self, values: FloatArray) -> FloatArray:
-        """Of the polynomial with these values (..., stages + 1)."""
+        """Of the polynomial with these values at the start and at the nodes, (..., stages + 1)."""
         return values @ self._rule.to_coefficients.T
+
+    def coefficients_of_rates(self, values: FloatArray) -> FloatArray:
+        """Of the polynomial with these values at the nodes, (..., stages)."""
+        return values @ self._rule.through_nodes.T
 
 
 class Piecewise:
@@ -69,24 +76,14 @@ class Piecewise:
     """
 
     def __init__(self, ends: FloatArray, coefficients: FloatArray) -> None:
+        self.ends, self._coefficients = ends, coefficients
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Its values, (rows, samples); beyond the ends those of the nearest cell."""
         from numpy.polynomial import chebyshev
 
-        self.ends = ends
-        half = np.diff(ends)[:, None, None] / 2
-        first = chebyshev.chebder(coefficients, axis=2) / half
-        self._orders = coefficients, first, chebyshev.chebder(first, axis=2) / half
-
-    def cell(self, time: FloatArray) -> IndexArray:
-        """Numbers of the cells in which times are; beyond the ends the nearest one."""
-        return np.clip(np.searchsorted(self.ends, time, side="right") - 1, 0, len(self.ends) - 2)
-
-    def at(self, time: FloatArray, order: int = 0) -> FloatArray:
-        """A derivative, (rows, samples); beyond the ends that of the nearest cell."""
-        from numpy.polynomial import chebyshev
-
-        cell = self.cell(time)
+        cell = np.clip(np.searchsorted(self.ends, time, side="right") - 1, 0, len(self.ends) - 2)
         left, right = self.ends[cell], self.ends[cell + 1]
         place = np.clip(2 * (time - left) / (right - left) - 1, -1.0, 1.0)
-        coefficients = self._orders[order]
-        basis = chebyshev.chebvander(place, coefficients.shape[2] - 1)
-        return np.asarray(np.einsum("srd,sd->rs", coefficients[cell], basis), dtype=np.float64)
+        basis = chebyshev.chebvander(place, self._coefficients.shape[2] - 1)
+        return np.asarray(np.einsum("srd,sd->rs", self._coefficients[cell], basis), dtype=np.float64)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.actuators.damped_springs import DampedSprings
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import DAMPING
 from vsacli.dynamics.internal_motion.collocation import Collocation, Piecewise
 
@@ -35,7 +35,7 @@ LAYER = 4.0
 constants: its polynomial passes it over."""
 
 FAST = 100.0
-"""In cells of more time constants, a polynomial knows the rates better than the equation d w = tau_l - T.
+"""In cells of more time constants, the polynomial of the spread knows the rates better than the equation.
 
 By that rounding makes them wrong by eps T/d, by the polynomial by some eps spread STAGES^2 2/duration, which
 is less beyond 288 time constants; for the next derivative beyond 170.
@@ -55,30 +55,36 @@ LOST, SINGULAR = (
 
 
 class Marched(NamedTuple):
-    """Deflections as a function of time, (2, samples).
+    """The motion inside as functions of time.
 
     Attributes:
-        phi: up to where they go; None if they go nowhere.
-        fast: (cells,), where rates are those of the polynomial, see `FAST`.
+        phi: deflections, (2, samples), up to where they go; None if they go nowhere.
+        rates: w and its derivative, (2, samples), likewise.
         end: up to which time, s.
         reason: why not further; None at the end of the trajectory.
     """
 
     phi: Piecewise | None
-    fast: BoolArray
+    rates: Piecewise | None
     end: float
     reason: str | None
 
 
 class _Solution(NamedTuple):
-    """What was found in a cell.
+    """What was found in a cell, at its start and nodes, or at its nodes alone.
 
     Attributes:
-        phi: deflections at start and nodes, (2, 1 + stages).
-        constants: the time constants it lasts.
+        phi: deflections, (2, 1 + stages).
+        rates: w and its derivative by the equation, (2, stages).
+        torque: the largest that is asked of the joint.
+        damping: the largest.
+        constants: the time constants that the cell lasts.
     """
 
     phi: FloatArray
+    rates: FloatArray
+    torque: float
+    damping: float
     constants: float
 
 
@@ -120,8 +126,7 @@ class March:
 
     def through(self, ends: FloatArray, phi: FloatArray) -> Marched:
         """The whole way, from deflections (2, 1); between the ends, s, the demand is smooth."""
-        solved: list[FloatArray] = []
-        reached, fast = [float(ends[0])], list[bool]()
+        ended, solved = [float(ends[0])], list[tuple[FloatArray, FloatArray]]()
         peaks = _Peaks(self._springs)
         todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
         while todo:
@@ -130,21 +135,32 @@ class March:
             if isinstance(found, str):
                 share, unresolved = np.inf, True
             else:
-                coefficients = self._rule.coefficients(found.phi)
-                share = peaks.share(coefficients)
+                fitted = self._fitted(cell, found)
+                share = peaks.share(*fitted, found)
                 settling = cell.new and found.constants > LAYER
                 falling = share < cell.shares[0] / GAIN
                 unresolved = share > RESOLVED and (share > TOLERATED or falling or settling)
             if unresolved and cell.halved < HALVINGS:
                 todo += cell.halves(share)[::-1]
             elif isinstance(found, str):
-                return Marched(_joined(reached, solved), np.array(fast), cell.left, found)
+                return Marched(*_joined(ended, solved), cell.left, found)
             else:
                 phi = found.phi[:, -1:]
-                solved.append(coefficients)
-                reached.append(cell.right)
-                fast.append(found.constants > FAST)
-        return Marched(_joined(reached, solved), np.array(fast), reached[-1], None)
+                solved.append(fitted)
+                ended.append(cell.right)
+        return Marched(*_joined(ended, solved), ended[-1], None)
+
+    def _fitted(self, cell: _Cell, found: _Solution) -> tuple[FloatArray, FloatArray]:
+        """Coefficients of deflections and rates; the latter by the equation, in fast cells derivatives."""
+        from numpy.polynomial import chebyshev
+
+        phi = self._rule.coefficients(found.phi)
+        if found.constants <= FAST:
+            return phi, self._rule.coefficients_of_rates(found.rates)
+        half = (cell.right - cell.left) / 2
+        first = chebyshev.chebder(self._springs.spread(phi)) / half
+        second = np.append(chebyshev.chebder(first) / half, 0.0)
+        return phi, np.stack((first, second))
 
     def _solved(self, cell: _Cell, start: FloatArray) -> _Solution | str:
         """Deflections in a cell from those at its start, by Newton's method; or why there are none."""
@@ -160,8 +176,14 @@ class March:
             if (np.sign(springs.pivot(phi, command.q)) != side).any():
                 return SINGULAR
             if converged:
-                fastest = float(np.max(np.abs(springs.slope(phi, command.q)) / damping))
-                return _Solution(np.hstack((start, phi)), (cell.right - cell.left) * fastest)
+                fastest = np.max(np.abs(springs.slope(phi, command.q)) / damping)
+                return _Solution(
+                    np.hstack((start, phi)),
+                    np.stack(springs.driven(phi, command)),
+                    float(np.max(np.abs(command.tau_e))),
+                    float(np.max(damping)),
+                    (cell.right - cell.left) * float(fastest),
+                )
             rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
             missing = command.tau_e - springs.torque(phi, command.q) - damping * rate
             matrix = damping[:, None] * slopes[:, 1:] + np.diag(springs.slope(phi, command.q))
@@ -172,20 +194,34 @@ class March:
 
 
 class _Peaks:
-    """The largest deflections and the largest spread so far, which the last coefficients are measured by."""
+    """The largest numbers so far, which the last coefficients are measured by."""
 
     def __init__(self, springs: DampedSprings) -> None:
         self._springs = springs
-        self._phi = self._spread = 0.0
+        self._phi = self._spread = self._torque = 0.0
 
-    def share(self, coefficients: FloatArray) -> float:
-        """Of the last coefficients of a polynomial (2, degree + 1), in its own peak or an earlier one."""
-        phi, spread = np.abs(coefficients), np.abs(self._springs.spread(coefficients))
-        self._phi = max(self._phi, float(np.nanmax(phi)))
-        self._spread = max(self._spread, float(spread.max()), LEAST_SHARE * self._phi, LEAST_SPREAD)
-        of_phi = float(np.nanmax(phi[:, -2:])) / max(self._phi, LEAST_SPREAD)
-        return max(of_phi, float(spread[-2:].max()) / self._spread)
+    def share(self, phi: FloatArray, rates: FloatArray, found: _Solution) -> float:
+        """Of the last coefficients of deflections, spread and torque of the damper, in its peak so far."""
+        spread = self._springs.spread(phi)
+        self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
+        self._spread = max(self._spread, _largest(spread), LEAST_SHARE * self._phi, LEAST_SPREAD)
+        self._torque = max(self._torque, found.torque)
+        of_phi = float(np.nanmax(np.abs(phi[:, -2:]))) / max(self._phi, LEAST_SPREAD)
+        share = max(of_phi, _largest(spread[-2:]) / self._spread)
+        if found.constants > FAST or not self._torque:
+            return share
+        return max(share, found.damping * _largest(rates[0, -2:]) / self._torque)
 
 
-def _joined(reached: list[float], solved: list[FloatArray]) -> Piecewise | None:
-    return Piecewise(np.array(reached), np.stack(solved)) if solved else None
+def _largest(values: FloatArray) -> float:
+    return float(np.max(np.abs(values)))
+
+
+def _joined(
+    ended: list[float], solved: list[tuple[FloatArray, FloatArray]]
+) -> tuple[Piecewise | None, Piecewise | None]:
+    """Deflections and rates over all cells."""
+    if not solved:
+        return None, None
+    phi, rates = (Piecewise(np.array(ended), np.stack(each)) for each in zip(*solved, strict=True))
+    return phi, rates

@@ -31,7 +31,6 @@ class InternalMotions:
 
     joints: tuple[int, ...]
     stops: Mapping[int, Stop]
-    _springs: Mapping[int, DampedSprings] = field(repr=False)
     _marched: Mapping[int, Marched] = field(repr=False)
 
     @property
@@ -45,16 +44,12 @@ class InternalMotions:
         return {joint: self._at(joint, elapsed) for joint in self.joints}
 
     def _at(self, joint: int, elapsed: FloatArray) -> InternalMotion:
-        marched, springs = self._marched[joint], self._springs[joint]
-        if marched.phi is None:
+        marched = self._marched[joint]
+        if marched.phi is None or marched.rates is None:
             none = np.full_like(elapsed, np.nan)
             return InternalMotion(np.stack((none, none)), none, none)
         gone = (elapsed >= marched.end) & (marched.reason is not None)
-        phi, rate, acceleration = (
-            np.where(gone, np.nan, marched.phi.at(elapsed, order)) for order in range(3)
-        )
-        fast = marched.fast[marched.phi.cell(elapsed)]
-        rates = (np.where(fast, springs.spread(each), np.nan) for each in (rate, acceleration))
+        phi, rates = (np.where(gone, np.nan, each.at(elapsed)) for each in (marched.phi, marched.rates))
         return InternalMotion(phi, *rates)
 
 
@@ -75,15 +70,13 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
             begin = springs[index].equilibrium(demand.of(index, ends[:1]), robot.joints[index].damper_start)
             march = March(springs[index], partial(demand.of, index))
             started = not np.isnan(begin[0]).any()
-            marched[index] = (
-                march.through(ends, begin) if started else Marched(None, np.zeros(0, dtype=bool), 0.0, LOST)
-            )
+            marched[index] = march.through(ends, begin) if started else Marched(None, None, 0.0, LOST)
     stops = {
         index: Stop(first + each.end, each.reason)
         for index, each in marched.items()
         if each.reason is not None
     }
-    return InternalMotions(joints, stops, springs, marched)
+    return InternalMotions(joints, stops, marched)
 
 
 def damped_joints(robot: Robot, trajectory: Trajectory) -> tuple[int, ...]:
