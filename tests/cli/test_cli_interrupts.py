@@ -124,3 +124,27 @@ def test_interrupt_in_the_first_instants_is_quiet(tmp_path, motion, imported):
         said = [line for line in process.stderr if not line.startswith("import time:")]
     assert (process.returncode, said) in [(130, ["interrupted\n"]), (-signal.SIGINT, [])]
     assert not (tmp_path / "r.h5").exists()
+
+
+def test_a_signal_in_a_callback_of_python_comes_again() -> None:
+    """There an exception is not passed on; nothing is printed about that either."""
+    program = """
+import os, signal, time, weakref
+from vsacli.base.interrupts import Interrupted, unwinding_when_ended
+
+class Thing:
+    pass
+
+with unwinding_when_ended():
+    thing = Thing()
+    kept = weakref.ref(thing, lambda _: os.kill(os.getpid(), signal.SIGTERM))
+    try:
+        del thing
+        time.sleep(10)
+    except Interrupted as error:
+        print(error)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
+    )
+    assert (done.stdout, done.stderr) == ("ended from outside by SIGTERM\n", "")

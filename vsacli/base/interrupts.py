@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from typing import Any
 
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Ctrl-C, the end of a batch job or its preemption, a terminal that is closed."""
+
+AGAIN = 0.01
+"""After which a signal comes again that came where nothing can be unwound, s."""
 
 
 class Interrupted(BaseException):
@@ -34,9 +39,21 @@ def unwinding_when_ended() -> Iterator[None]:
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _unwind)
+    otherwise = sys.unraisablehook
+
+    def unraisable(what: sys.UnraisableHookArgs) -> None:
+        if isinstance(what.exc_value, Interrupted):  # in a callback of Python's own, as of an import's lock
+            ended = threading.Timer(AGAIN, os.kill, (os.getpid(), what.exc_value.number))
+            ended.daemon = True
+            ended.start()
+        else:
+            otherwise(what)
+
+    sys.unraisablehook = unraisable
     try:
         yield
     finally:
+        sys.unraisablehook = otherwise
         for number in ENDING:
             if signal.getsignal(number) is _unwind:
                 signal.signal(number, signal.SIG_DFL)
