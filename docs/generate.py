@@ -35,7 +35,7 @@ from vsacli.cli.console import Exit
 from vsacli.cli.main import vsacli
 from vsacli.control.poles import PolesFile
 from vsacli.documents.plausibility import Rule
-from vsacli.files.examples import Example, examples, opening_comment
+from vsacli.files.examples import Example, examples, examples_root, opening_comment
 from vsacli.robot.file import RobotFile
 from vsacli.robot.plausibility import ROBOT_RULES
 from vsacli.trajectory.file import content
@@ -198,15 +198,16 @@ def _robot_row(example: Example) -> tuple[str, ...]:
     joints = example.robot.joints
     kinds = Counter(joint.actuator_type for joint in joints)
     return (
-        f"[{example.name}](../{_below_root(example.path)})",
+        _link(example.path),
         "".join("R" if joint.is_revolute else "P" for joint in joints),
         ", ".join(f"{count} {kind}" for kind, count in kinds.items()),
-        ", ".join(f"[{each.name}](../{_below_root(each.path)})" for each in example.trajectories),
+        ", ".join(_link(each.path) for each in example.trajectories),
     )
 
 
-def _below_root(path: Path) -> str:
-    return path.relative_to(ROOT).as_posix()
+def _link(path: Path) -> str:
+    """To an example, wherever the package is installed."""
+    return f"[{path.stem}](../{path.relative_to(examples_root()).as_posix()})"
 
 
 def _origin(example: Example) -> str:

@@ -68,10 +68,10 @@ def examples(names: Iterable[str] = ()) -> list[Example]:
     Raises:
         InputError: for each name that is no robot's, the nearest one that is.
     """
-    trajectories = [_trajectory(path) for path in sorted((_root() / "trajectories").rglob("*.yaml"))]
+    trajectories = [_trajectory(path) for path in sorted((examples_root() / "trajectories").rglob("*.yaml"))]
     found = {
         path.stem: Example(path, tuple(each for each in trajectories if path.stem in each.robots))
-        for path in sorted((_root() / "robots").rglob("*.yaml"), key=lambda path: path.stem)
+        for path in sorted((examples_root() / "robots").rglob("*.yaml"), key=lambda path: path.stem)
     }
     wanted = set(names)
     if unknown := sorted(wanted - found.keys()):
@@ -99,7 +99,7 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
     """
     chosen = list(names)
     sources = [path for example in examples(chosen) for path in example.files()] if chosen else _every_file()
-    copies = {path: Path(folder) / path.relative_to(_root()) for path in sources}
+    copies = {path: Path(folder) / path.relative_to(examples_root()) for path in sources}
     for copy in copies.values():
         outputs.folder(copy.parent)
     for path, copy in copies.items():
@@ -109,7 +109,7 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
 
 def example_tables() -> list[Path]:
     """The tables that robots name, as springs measured and profiles of cams."""
-    return sorted((_root() / "robots").rglob("*.csv"))
+    return sorted((examples_root() / "robots").rglob("*.csv"))
 
 
 def opening_comment(path: Path) -> str:
@@ -119,11 +119,11 @@ def opening_comment(path: Path) -> str:
 
 
 def _every_file() -> list[Path]:
-    found = (path for folder in ("robots", "trajectories") for path in (_root() / folder).rglob("*"))
+    found = (path for folder in ("robots", "trajectories") for path in (examples_root() / folder).rglob("*"))
     return sorted(path for path in found if path.is_file() and not path.name.startswith("."))
 
 
-def _root() -> Path:
+def examples_root() -> Path:
     """The folder of `robots` and `trajectories`: the package, or beside it in a clone of the repository."""
     package = Path(str(files("vsacli")))
     return package if (package / "robots").is_dir() else package.parent
