@@ -26,7 +26,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.analysis.run import Run
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
-from vsacli.base.signals import DAMPING, POSITION
+from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
 from vsacli.dynamics.internal_motion import internal_motions
 from vsacli.dynamics.internal_motion.march import March
 from vsacli.trajectory.curves import RestToRest
@@ -274,6 +274,22 @@ def test_little_much_and_changing_damping_pass_the_self_check(offset: float, sin
     check = result.report.self_check
     assert check.spring_residual < 1e-12
     assert check.ladder < check.ladder_bound == 1e-8  # springs held by 1e6 N m s/rad move by 1e-6 rad
+
+
+@pytest.mark.parametrize("end", [0.2, 0.9])
+def test_loads_that_begin_and_pass_zero_do_not_make_cells_small(end: float) -> None:
+    """Without gravity the load is rounding at rest, and again where the motion begins to brake."""
+    pendular = pendulum("awas", Damper(location="transmission", range=(0, 1)))
+    light = replace(pendular.joints[0], damping=0.0)
+    robot = replace(pendular, gravity=(0, 0, 0), joints=(light,))
+    span = (0.0, 2.0)
+    position = RestToRest(signal=POSITION, span=span, degree=9, start=(0.2,), end=(end,))
+    stiffness = RestToRest(signal=STIFFNESS, span=span, degree=5, start=(600.0,), end=(600.0,))
+    damping = RestToRest(signal=DAMPING, span=span, degree=3, start=(0.001,), end=(0.001,))
+    profiles = {STIFFNESS.key: stiffness, DAMPING.key: damping}
+    inside = internal_motions(robot, Trajectory(UniformTimes(2.0, 200), position, profiles, name="rest"))
+    assert not inside.stops
+    assert len(inside.breakpoints) < 200
 
 
 def test_feedback_linearization_says_why_not() -> None:

@@ -137,6 +137,6 @@ def test_a_trajectory_that_names_no_robot_belongs_to_none(tmp_path: Path, monkey
     first, second = (tmp_path / "trajectories" / f"{name}.yaml" for name in "ab")
     first.write_text("# For robots/arm.yaml: it\n# rises. As robots/leg.yaml.\nname: a\n# For all.\n")
     second.write_text("name: b\n# For robots/arm.yaml: it falls.\n")
-    monkeypatch.setattr(module, "_root", lambda: tmp_path)
+    monkeypatch.setattr(module, "examples_root", lambda: tmp_path)
     [example] = examples()
     assert example.trajectories == (ExampleTrajectory(first, ("arm",), "it rises"),)

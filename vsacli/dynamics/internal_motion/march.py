@@ -45,7 +45,11 @@ NEWTON_STEPS = 20
 """Mostly five are taken."""
 
 CONVERGED = 1e-12
-"""Step, relative to the deflections, after which the next one, which is quadratic in it, is rounding."""
+"""Step, relative to the spread, after which the next one, which is quadratic in it, is rounding.
+
+Where the load passes zero, so does the spread, and is rounding itself: there, relative to that of the peak
+torque.
+"""
 
 LOST, SINGULAR = (
     "its springs cannot have the stiffness at the deflection that the damper has let through",
@@ -127,11 +131,11 @@ class March:
     def through(self, ends: FloatArray, phi: FloatArray) -> Marched:
         """The whole way, from deflections (2, 1); between the ends, s, the demand is smooth."""
         ended, solved = [float(ends[0])], list[tuple[FloatArray, FloatArray]]()
-        peaks = _Peaks(self._springs)
+        peaks = _Peaks(self._springs, self._demand(ends), phi)
         todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
         while todo:
             cell = todo.pop()
-            found = self._solved(cell, phi)
+            found = self._solved(cell, phi, peaks.torque)
             if isinstance(found, str):
                 share, unresolved = np.inf, True
             else:
@@ -162,8 +166,14 @@ class March:
         second = np.append(chebyshev.chebder(first) / half, 0.0)
         return phi, np.stack((first, second))
 
-    def _solved(self, cell: _Cell, start: FloatArray) -> _Solution | str:
-        """Deflections in a cell from those at its start, by Newton's method; or why there are none."""
+    def _solved(self, cell: _Cell, start: FloatArray, peak: float) -> _Solution | str:
+        """Deflections in a cell from those at its start, by Newton's method; or why there are none.
+
+        Args:
+            cell: where.
+            start: deflections (2, 1).
+            peak: torque so far, N m (N).
+        """
         springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
         before, side = springs.spread(start), np.sign(springs.pivot(start, command.q[:1]))
@@ -186,31 +196,45 @@ class March:
                 )
             rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
             missing = command.tau_e - springs.torque(phi, command.q) - damping * rate
-            matrix = damping[:, None] * slopes[:, 1:] + np.diag(springs.slope(phi, command.q))
-            step = np.linalg.solve(matrix, missing)
+            slope = springs.slope(phi, command.q)
+            matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
+            step = np.asarray(np.linalg.solve(matrix, missing), dtype=np.float64)
             spread = spread + step
-            converged = bool(np.abs(step).max() <= CONVERGED * np.abs(spread).max())
+            converged = _largest(step) <= CONVERGED * max(_largest(spread), peak / _largest(slope))
         return LOST
 
 
 class _Peaks:
-    """The largest numbers so far, which the last coefficients are measured by."""
+    """The largest numbers so far, which the last coefficients are measured by.
 
-    def __init__(self, springs: DampedSprings) -> None:
+    A motion from rest begins with torques that are nothing but rounding, so these are looked at beforehand.
+
+    Args:
+        springs: of the joint.
+        demand: at the ends of the first cells.
+        start: deflections at the first of them.
+
+    Attributes:
+        torque: N m (N).
+    """
+
+    def __init__(self, springs: DampedSprings, demand: Command, start: FloatArray) -> None:
         self._springs = springs
-        self._phi = self._spread = self._torque = 0.0
+        self._slope = _largest(springs.slope(start, demand.q[:1]))
+        self.torque = _largest(demand.tau_e)
+        self._phi, self._spread = 0.0, LEAST_SPREAD
 
     def share(self, phi: FloatArray, rates: FloatArray, found: _Solution) -> float:
         """Of the last coefficients of deflections, spread and torque of the damper, in its peak so far."""
         spread = self._springs.spread(phi)
         self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
-        self._spread = max(self._spread, _largest(spread), LEAST_SHARE * self._phi, LEAST_SPREAD)
-        self._torque = max(self._torque, found.torque)
+        self._spread = max(self._spread, _largest(spread), LEAST_SHARE * self._phi)
+        self.torque = max(self.torque, found.torque, self._slope * self._spread)
         of_phi = float(np.nanmax(np.abs(phi[:, -2:]))) / max(self._phi, LEAST_SPREAD)
         share = max(of_phi, _largest(spread[-2:]) / self._spread)
-        if found.constants > FAST or not self._torque:
+        if found.constants > FAST:
             return share
-        return max(share, found.damping * _largest(rates[0, -2:]) / self._torque)
+        return max(share, found.damping * _largest(rates[0, -2:]) / self.torque)
 
 
 def _largest(values: FloatArray) -> float:
