@@ -1,0 +1,74 @@
+"""Which columns of a matrix are independent, and of which the others are combinations.
+
+Householder QR with column pivoting (G. H. Golub, C. F. Van Loan, Matrix Computations, 4th ed., 2013, section
+5.4.2), as M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of Robotic
+Systems 8 (1991), uses it for parameters of robots.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+
+NOTHING = 1e-13
+"""Norm of a column, over that of the largest, up to which it holds nothing but rounding."""
+
+CERTAIN = 10.0
+"""A share of a column in another one that is less than this many times the tolerance is taken for zero: it is
+as uncertain as the dependence itself, some times more by the condition of the independent columns."""
+
+
+class Independence(NamedTuple):
+    """Columns of a matrix, split.
+
+    Attributes:
+        kept: independent ones, (kept,), the largest first; each adds most to those before it.
+        dropped: those that are combinations of them, (dropped,).
+        nothing: those that are zero, (nothing,).
+        shares: of the kept columns in the dropped ones, (kept, dropped).
+        scale: norm of each column, (columns,).
+        q: orthonormal basis of the kept columns, (rows, kept).
+        r: triangular, `q r` are the kept columns divided by their norms.
+        condition: of all columns that are not zero, divided by their norms.
+    """
+
+    kept: IndexArray
+    dropped: IndexArray
+    nothing: IndexArray
+    shares: FloatArray
+    scale: FloatArray
+    q: FloatArray
+    r: FloatArray
+    condition: float
+
+
+def independence(columns: FloatArray, tolerance: float) -> Independence:
+    """Split the columns of a matrix, of any units.
+
+    Args:
+        columns: (rows, columns).
+        tolerance: distance of a column from its best combination of those kept, over its norm, from which on
+            it is independent.
+    """
+    from scipy.linalg import qr, solve_triangular
+
+    scale = np.linalg.norm(columns, axis=0)
+    there = np.flatnonzero(scale > NOTHING * scale.max(initial=0.0))
+    q, r, order = qr(columns[:, there] / scale[there], mode="economic", pivoting=True)
+    rank = int(np.count_nonzero(np.abs(np.diagonal(r)) > tolerance))
+    kept, dropped = there[order[:rank]], there[order[rank:]]
+    shares = solve_triangular(r[:rank, :rank], r[:rank, rank:])
+    shares[np.abs(shares) < CERTAIN * tolerance] = 0.0
+    return Independence(
+        kept=kept,
+        dropped=dropped,
+        nothing=np.setdiff1d(np.arange(len(scale)), there),
+        shares=shares * scale[dropped] / scale[kept][:, None],
+        scale=scale,
+        q=q[:, :rank],
+        r=r[:rank, :rank],
+        condition=float(np.linalg.cond(r)) if there.size else 1.0,
+    )
