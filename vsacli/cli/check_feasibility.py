@@ -16,6 +16,7 @@ from vsacli.cli.command_parts import (
     overwrite_option,
     robot_argument,
     run_stem,
+    set_option,
     show_report,
     stop_option,
     trajectory_argument,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 )
 @robot_argument
 @trajectory_argument
+@set_option
 @json_option
 @stop_option
 @click.option(
@@ -71,6 +73,7 @@ if TYPE_CHECKING:
 def check_feasibility(
     robot: str,
     trajectory: str,
+    changes: tuple[str, ...],
     as_json: bool,
     stop_on_infeasible: bool,
     near_singular: float | None,
@@ -95,7 +98,9 @@ def check_feasibility(
     """
     if remedy is not None and fixed is None:
         raise click.UsageError("--remedy says which suggestion to write; give --write-fixed FILE, too")
-    inputs = load_inputs(robot, trajectory, talk)
+    if changes and fixed is not None:
+        raise click.UsageError("--write-fixed starts from the files as they are; change them instead")
+    inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.run import Run
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
     from vsacli.base.outputs import Outputs

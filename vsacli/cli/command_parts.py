@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from vsacli.base.errors import InputError
 from vsacli.base.streams import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
+    from vsacli.documents.changes import Changes
     from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
     from vsacli.robot.model import Robot
@@ -68,6 +70,16 @@ deflections_option = click.option(
 stop_option = click.option("--stop-on-infeasible", is_flag=True, help="End with the first infeasible step.")
 
 
+set_option = click.option(
+    "--set",
+    "changes",
+    metavar="PATH=VALUE",
+    multiple=True,
+    help="Another value in the robot or the trajectory, e.g. joints.*.link.mass=2.5 or duration=3; may be "
+    "given several times.",
+)
+
+
 def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """`--engine` and `--threads`."""
     engine = click.option(
@@ -98,22 +110,45 @@ class Inputs(NamedTuple):
         return [source.path for source in (*self.robot.sources, *self.trajectory.sources)]
 
 
-def load_inputs(robot_path: str, trajectory_path: str, talk: Talk) -> Inputs:
-    """Read and check both files.
+def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tuple[str, ...] = ()) -> Inputs:
+    """Read and check both files, with changes as `--set` gives them.
 
     Raises:
-        InputError: every problem of the robot, or else of the trajectory.
+        InputError: every problem of the robot, or else of the trajectory; or a change that cannot be made.
     """
     from vsacli.robot.file import load_robot
     from vsacli.trajectory.file import load_trajectory
 
-    robot = load_robot(robot_path)
-    trajectory = load_trajectory(trajectory_path, robot, progress=talk.fitting)
+    with _naming_option():
+        of_robot, of_trajectory = _divided(changes)
+        robot = load_robot(robot_path, of_robot)
+        trajectory = load_trajectory(trajectory_path, robot, of_trajectory, progress=talk.fitting)
     talk.detail(
         f"{robot.name}: {len(robot.joints)} joints; {trajectory.name}: {trajectory.samples} steps over "
         f"{trajectory.duration:g} s"
     )
     return Inputs(robot, trajectory)
+
+
+@contextmanager
+def _naming_option() -> Iterator[None]:
+    """Say of a change that cannot be made where it comes from."""
+    from vsacli.documents.changes import ChangeError
+
+    try:
+        yield
+    except ChangeError as error:
+        raise InputError(each._replace(message=f"--set: {each.message}") for each in error.problems) from None
+
+
+def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
+    """Those of the robot and those of the trajectory."""
+    if not changes:
+        return {}, {}
+    from vsacli.documents.changes import read_changes
+    from vsacli.trajectory.changes import divided
+
+    return divided(read_changes(changes))
 
 
 def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -91,14 +92,19 @@ def _cache(folder: str, clear: bool) -> dict[str, Any]:
 
 def _extract(file: str, folder: str, talk: Talk) -> None:
     from vsacli.base.outputs import Outputs
+    from vsacli.documents.changes import written
     from vsacli.files.repetition import extract
 
+    found = extract(file)
     with Outputs(inputs=[file]) as outputs:
-        for place, content in extract(file).items():
+        for place, content in found.files.items():
             target = Path(folder) / place
             outputs.folder(target.parent)
             outputs.file(target).write_bytes(content)
     talk.wrote(outputs)
+    if found.changes:
+        again = shlex.join(part for change in written(found.changes) for part in ("--set", change))
+        talk.note(f"the files are as they were read; {file} was computed from them with {again}")
 
 
 def _found(description: dict[str, Any], field: str) -> str:

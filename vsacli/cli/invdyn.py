@@ -20,6 +20,7 @@ from vsacli.cli.command_parts import (
     overwrite_option,
     robot_argument,
     run_stem,
+    set_option,
     show_report,
     stop_option,
     trajectory_argument,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
 )
 @robot_argument
 @trajectory_argument
+@set_option
 @click.option(
     "-o",
     "--output",
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
 def invdyn(
     robot: str,
     trajectory: str,
+    changes: tuple[str, ...],
     output: str | None,
     variables: tuple[str, ...] | None,
     plot_folder: str | None,
@@ -78,7 +81,7 @@ def invdyn(
     singular or over a limit, and by how much.
     """
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
-    inputs = load_inputs(robot, trajectory, talk)
+    inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.joint_report import JUDGED
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs

@@ -20,6 +20,7 @@ from vsacli.cli.command_parts import (
     overwrite_option,
     robot_argument,
     run_stem,
+    set_option,
     trajectory_argument,
 )
 from vsacli.cli.console import Talk, say, talk_options
@@ -41,6 +42,7 @@ SHOWN_FROM = 20_000
 )
 @robot_argument
 @trajectory_argument
+@set_option
 @click.option(
     "--parameters",
     "patterns",
@@ -73,6 +75,7 @@ SHOWN_FROM = 20_000
 def sensitivity(
     robot: str,
     trajectory: str,
+    changes: tuple[str, ...],
     patterns: tuple[str, ...],
     tolerances: str | None,
     runs: int | None,
@@ -92,7 +95,7 @@ def sensitivity(
         raise click.UsageError("--monte-carlo draws from tolerances: give --tolerances, e.g. 2%")
     from vsacli.base.outputs import Outputs
 
-    inputs = load_inputs(robot, trajectory, talk)
+    inputs = load_inputs(robot, trajectory, talk, changes)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = None if output is None else outputs.file(Path(output))
         found = _analysed(inputs, patterns, tolerances, runs or 0, seed, file, talk)

@@ -23,6 +23,7 @@ from vsacli.cli.command_parts import (
     overwrite_option,
     robot_argument,
     run_stem,
+    set_option,
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
@@ -61,6 +62,7 @@ def _numbers(
 )
 @robot_argument
 @trajectory_argument
+@set_option
 @click.option(
     "--controller",
     type=click.Choice(["feedforward", FEEDBACK]),
@@ -146,6 +148,7 @@ def _numbers(
 def simulate(
     robot: str,
     trajectory: str,
+    changes: tuple[str, ...],
     output: str | None,
     plot_folder: str | None,
     as_json: bool,
@@ -160,7 +163,7 @@ def simulate(
     range of its law.
     """
     path = Path(f"{run_stem(robot, trajectory)}-simulation.h5" if output is None else output)
-    inputs = load_inputs(robot, trajectory, talk)
+    inputs = load_inputs(robot, trajectory, talk, changes)
     simulation = _prepared(inputs, **choices)
     gains: Gains | None = simulation.keywords["gains"]
     if gains is not None:  # the file of the poles is one of the inputs that the result records

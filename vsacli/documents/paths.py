@@ -79,7 +79,14 @@ def _joined(place: Iterable[str]) -> str:
     return ".".join(place)
 
 
-def replace(record: _Record, path: str, value: Any, members: Mapping[str, str] | None = None) -> _Record:
+def replace(
+    record: _Record,
+    path: str,
+    value: Any,
+    members: Mapping[str, str] | None = None,
+    exempt: Mapping[str, Mapping[str, str]] | None = None,
+    file: str = "",
+) -> _Record:
     """A record of declared fields with another value at a path; the given record stays as it is.
 
     `replace(robot, "joints.elbow.actuator.spring.k", 500)`, for example, which `Robot.replace` offers. Of a
@@ -91,12 +98,14 @@ def replace(record: _Record, path: str, value: Any, members: Mapping[str, str] |
         path: to a declared field, or to an entry of its list.
         value: what a file could hold there: a number, a text such as `90 deg`, a list or a mapping of those.
         members: name and unit variant of every joint, where the document has PerJoint values.
+        exempt: for a purpose of these the joints that have none, each with the reason.
+        file: path of the document, to which those of other files in the value are relative.
 
     Raises:
         InputError: the path leads nowhere, saying what there is instead; or the value cannot stand there,
             with every problem and the path to it.
     """
-    scope = Scope(Problems(""), members or {}, {})
+    scope = Scope(Problems(file), members or {}, exempt or {})
     found: _Record = _Replacement(_node(value), scope).in_record(record, path.split("."), ())
     return found
 
@@ -159,7 +168,7 @@ class _Replacement(NamedTuple):
         raise _nowhere(words[0], (), place)
 
     def _read(self, kind: Kind, place: tuple[str, ...]) -> Any:
-        label, problems = _joined(place), Problems("")
+        label, problems = _joined(place), Problems(self.scope.problems.file)
         content = kind.read(self.node, label, self.scope._replace(problems=problems))
         try:
             problems.check()
@@ -187,7 +196,12 @@ class _Replacement(NamedTuple):
         if word != ALL and word not in indices:
             raise _nowhere(word, indices, place)
         entries = list(content)
-        for index in range(len(entries)) if word == ALL else [indices[word]]:
+        if word != ALL and entries[indices[word]] is None:
+            exempt = self.scope.exempt.get(getattr(kind, "purpose", ""), {})
+            reason = exempt.get(names[indices[word]], "it has none")
+            raise InputError.one(f"{_joined((*place, word))}: no value goes there: {reason}")
+        there = [index for index, entry in enumerate(entries) if entry is not None]
+        for index in there if word == ALL else [indices[word]]:
             inside = self._replace(scope=self.scope.of_member(names[index]))
             here = (*place, str(index) if word == ALL else word)
             entries[index] = inside.in_value(each, content[index], rest, here)

@@ -27,11 +27,19 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 class Source(NamedTuple):
-    """A file that was read: its path as given, SHA-256 in hex, and its text (None if too large to keep)."""
+    """A file that was read.
+
+    Attributes:
+        path: as given.
+        sha256: of its content, in hex.
+        text: its text; None if it is too large to keep.
+        changes: what was changed after reading: JSON of values by path, empty if nothing was.
+    """
 
     path: str
     sha256: str
     text: str | None
+    changes: str = ""
 
 
 def read_source(path: str | os.PathLike[str], max_bytes: int = MAX_DOCUMENT_BYTES) -> tuple[Source, str]:

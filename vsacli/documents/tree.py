@@ -57,6 +57,19 @@ class Mapping(NamedTuple):
 Node: TypeAlias = Scalar | Sequence | Mapping
 """Each prints as what was found, for "expected ..., found ...". Nodes behind aliases are shared."""
 
+
+def plain(node: Node) -> Any:
+    """A node as plain data: texts as written, but null, true and false without quotes as these."""
+    match node:
+        case Mapping(entries=entries):
+            return {key: plain(entry) for key, entry in entries.items()}
+        case Sequence(items=items):
+            return [plain(item) for item in items]
+        case Scalar(text="true" | "false" as word, plain=True):
+            return word == "true"
+    return None if node.is_null else node.text
+
+
 INVALID: Final = object()
 """In place of a value that cannot be used; its problem is noted already."""
 

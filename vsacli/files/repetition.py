@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -58,11 +58,12 @@ def repeat(path: str | Path, tell: Tell = unheard) -> list[Difference]:
     Raises:
         InputError: the result does not hold its inputs, they cannot be used, or its engine is not to be had.
     """
-    with StoredResult.open(path) as result, _reading(result.inputs(), path) as (robot_path, trajectory_path):
-        robot = load_robot(robot_path)
+    with StoredResult.open(path) as result, _reading(result.inputs(), path) as (of_robot, of_trajectory):
+        robot = load_robot(of_robot.path, of_robot.changes)
         options: dict[str, Any] = result.provenance()["options"]
         engine = str(result.attributes.get("engine", "numpy"))
-        run = Run(robot, load_trajectory(trajectory_path, robot), engine=engine, tell=tell, **options)
+        trajectory = load_trajectory(of_trajectory.path, robot, of_trajectory.changes)
+        run = Run(robot, trajectory, engine=engine, tell=tell, **options)
         comparisons = [_Comparison(result, name) for name in result.variables]
         for block in run:
             for comparison in comparisons:
@@ -71,9 +72,9 @@ def repeat(path: str | Path, tell: Tell = unheard) -> list[Difference]:
 
 
 @contextmanager
-def _reading(inputs: Sequence[StoredInput], path: str | Path) -> Iterator[tuple[str, str]]:
-    """Read files as they were then; the paths of robot and trajectory."""
-    roles = {each.role: each.path for each in inputs}
+def _reading(inputs: Sequence[StoredInput], path: str | Path) -> Iterator[tuple[StoredInput, StoredInput]]:
+    """Read files as they were then; those of robot and trajectory."""
+    roles = {each.role: each for each in inputs}
     if not {"robot", "trajectory"} <= roles.keys():
         raise InputError.one("does not say from which files it was computed, so it cannot be repeated", path)
     with ExitStack() as stack:
@@ -122,8 +123,20 @@ def _equal(a: AnyArray, b: AnyArray) -> AnyArray:
     return both
 
 
-def extract(path: str | Path) -> dict[Path, bytes]:
-    """The inputs of a result by where they stood, relative to what they have in common.
+class Extracted(NamedTuple):
+    """The inputs of a result.
+
+    Attributes:
+        files: contents as they were read, by where they stood, relative to what they have in common.
+        changes: what was changed then, values by path.
+    """
+
+    files: dict[Path, bytes]
+    changes: dict[str, Any]
+
+
+def extract(path: str | Path) -> Extracted:
+    """The inputs of a result.
 
     Raises:
         InputError: it is no result, or does not hold one of them.
@@ -135,9 +148,10 @@ def extract(path: str | Path) -> dict[Path, bytes]:
         what = ", ".join(missing) if missing else "any input"
         raise InputError.one(f"does not hold {what}", path)
     places = _places([each.path for each in inputs])
-    return {
+    files = {
         place: each.content for place, each in zip(places, inputs, strict=True) if each.content is not None
     }
+    return Extracted(files, {path: value for each in inputs for path, value in each.changes.items()})
 
 
 def _places(paths: Sequence[str]) -> list[Path]:

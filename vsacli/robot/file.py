@@ -5,8 +5,10 @@ from __future__ import annotations
 import dataclasses
 import os
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from vsacli.base.errors import InputError, check_path
+from vsacli.documents.changes import Changes
 from vsacli.documents.fields import choice, declared
 from vsacli.documents.reading import read_document
 from vsacli.robot.model import Robot
@@ -35,15 +37,19 @@ class RobotFile(Robot):
         return as_standard(robot)
 
 
-def load_robot(path: str | os.PathLike[str]) -> Robot:
+def load_robot(path: str | os.PathLike[str], changes: Changes = MappingProxyType({})) -> Robot:
     """Read a robot from a YAML file.
+
+    Args:
+        path: of the file.
+        changes: other values by paths into the file, e.g. `{"joints.*.link.mass": 2}`; results remember them.
 
     Raises:
         InputError: with every problem of the file, each with its line.
         TypeError: path is none.
     """
     check_path(path, "load_robot(path)")
-    document, source = read_document(path, RobotFile, FORMAT)
+    document, source = read_document(path, RobotFile, FORMAT, changes=changes)
     try:
         robot = document.robot()
     except InputError as error:

@@ -8,12 +8,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, make_dataclass
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.documents.changes import Changes
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
 from vsacli.documents.plausibility import numbers
 from vsacli.documents.reading import read_document
@@ -140,12 +142,19 @@ OF_ANY_ROBOT = content(frozenset(), rigid=True)
 """The content for a robot that is not known: what some robot would accept."""
 
 
-def load_trajectory(path: str | os.PathLike[str], robot: Robot, *, progress: Progress = unseen) -> Trajectory:
+def load_trajectory(
+    path: str | os.PathLike[str],
+    robot: Robot,
+    changes: Changes = MappingProxyType({}),
+    *,
+    progress: Progress = unseen,
+) -> Trajectory:
     """Read a trajectory for a robot from a YAML file, or from a CSV file with position and stiffness.
 
     Args:
         path: of the file.
         robot: that is to move.
+        changes: other values by paths into a YAML file, e.g. `{"duration": 2}`; results remember them.
         progress: opens a bar over the samples of all components of a recorded signal while splines are
             fitted to them, which takes seconds for millions; `lambda samples: tqdm(total=samples)` is one.
 
@@ -159,9 +168,12 @@ def load_trajectory(path: str | os.PathLike[str], robot: Robot, *, progress: Pro
     if is_table(path):
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
+        if changes:
+            reason = "is a table, in which nothing can be set; name it in a YAML trajectory and set its keys"
+            raise InputError.one(reason, os.fspath(path))
         return _with_devices(recorded_trajectory(path, joints, progress), robot)
     cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
-    document, source = read_document(path, cls, FORMAT, joints.types, joints.exempt)
+    document, source = read_document(path, cls, FORMAT, joints.types, joints.exempt, changes)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
     times = _times(document, recordings, source.path)
     if recordings:

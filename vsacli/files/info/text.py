@@ -11,6 +11,7 @@ from vsacli.analysis.report import Report
 from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE
+from vsacli.documents.changes import written
 
 Description = Mapping[str, Any]
 
@@ -123,7 +124,9 @@ def _result(result: Description) -> Iterator[str]:
     if "engine" in source:
         compiled = f", compiled by {source['compiler']}, threads: {source['threads']}"
         yield f"engine: {source['engine']}{compiled if source['compiler'] else ''}"
-    yield from (f"input {each['path']}, SHA-256 {each['sha256']}" for each in source["inputs"])
+    for each in source["inputs"]:
+        yield f"input {each['path']}, SHA-256 {each['sha256']}"
+        yield from (f"  with --set {change}" for change in written(each.get("changes", {})))
     rows = [("joint", "type", "actuator")]
     rows += [(joint["name"], joint["type"], joint["actuator"]) for joint in result["joints"]]
     yield from ("", *aligned(rows), "")

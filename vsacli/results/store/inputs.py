@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -31,12 +32,14 @@ class StoredInput(NamedTuple):
         sha256: of its content, in hex.
         role: "robot" or "trajectory" of the file that describes one, else empty.
         content: what it held; None if it was too large to be stored.
+        changes: what was changed after reading, values by path.
     """
 
     path: str
     sha256: str
     role: str
     content: bytes | None
+    changes: Mapping[str, Any]
 
 
 def write_sources(inputs: h5py.Group, sources: Mapping[str, tuple[Source, ...]]) -> None:
@@ -51,6 +54,8 @@ def write_sources(inputs: h5py.Group, sources: Mapping[str, tuple[Source, ...]])
     for number, source in enumerate(every, start=1):
         group = inputs.create_group(f"file_{number}", track_order=True)
         group.attrs.update({"path": storable(source.path), "sha256": source.sha256})
+        if source.changes:
+            group.attrs["changes"] = storable(source.changes)
         if source in roles:
             group.attrs["role"] = roles[source]
         if source.text is not None:
@@ -92,6 +97,7 @@ def read_sources(file: CheckedFile) -> Iterator[StoredInput]:
             sha256=attributes["sha256"],
             role=attributes.get("role", ""),
             content=_content(file, name),
+            changes=json.loads(attributes.get("changes", "{}")),
         )
         number += 1
 

@@ -202,7 +202,9 @@ class StoredResult:
                 **{name: str(self.attributes[name]) for name in COMPUTED_BY if name in self.attributes},
                 "versions": json.loads(self.attributes["versions"]),
                 "options": json.loads(self.attributes.get("options", "{}")),
-                "inputs": [{"path": path, "sha256": sha} for path, sha, _, _ in self.inputs()],
+                "inputs": [
+                    {"path": each.path, "sha256": each.sha256, **_changes(each)} for each in self.inputs()
+                ],
             }
         return cast("dict[str, Any]", shown(provenance))
 
@@ -226,6 +228,10 @@ class StoredResult:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _changes(file: StoredInput) -> dict[str, Any]:
+    return {"changes": file.changes} if file.changes else {}
 
 
 _Stored = TypeVar("_Stored", bound=StoredResult)

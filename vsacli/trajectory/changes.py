@@ -1,0 +1,37 @@
+"""Changes that are given together, to a robot and to its trajectory."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.documents.changes import KEPT, ChangeError, Changes, check_path_of_change
+from vsacli.documents.fields import declared
+from vsacli.robot.file import RobotFile
+from vsacli.trajectory.file import OF_ANY_ROBOT
+
+
+class Divided(NamedTuple):
+    """Changes by the file that they are made to."""
+
+    robot: Changes
+    trajectory: Changes
+
+
+def divided(changes: Changes) -> Divided:
+    """Changes by the file whose key the path begins with; no key but those that are kept is one of both.
+
+    Raises:
+        ChangeError: neither file has such a key, or it is one that is kept.
+    """
+    robot, trajectory = declared(RobotFile), declared(OF_ANY_ROBOT)
+    found = Divided({}, {})
+    for path, value in changes.items():
+        check_path_of_change(path)
+        first = path.partition(".")[0]
+        if first not in robot and first not in trajectory:
+            hint = did_you_mean(first, [key for key in (*robot, *trajectory) if key not in KEPT])
+            raise ChangeError.one(f"neither robot nor trajectory has a {first!r}{hint}")
+        of = found.robot if first in robot else found.trajectory
+        of[path] = value  # type: ignore[index]
+    return found
