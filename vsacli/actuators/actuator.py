@@ -56,11 +56,13 @@ class Carried(NamedTuple):
         tau_e: torque on the link.
         size: of the torques that it is the sum of.
         stiffness: of the joint.
+        tau_spring: torque against each motor, (motors, samples).
     """
 
     tau_e: FloatArray
     size: FloatArray
     stiffness: FloatArray
+    tau_spring: FloatArray
 
 
 class Actuator(ABC):
@@ -178,7 +180,7 @@ class Actuator(ABC):
         """Rate of tau_spring of each motor, (motors, samples), from the other variables of the joint."""
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """What the springs carry by their laws, from the motion of joint and motors, for the self-check."""
+        """What the springs carry by their laws, from the motion of joint and motors."""
         raise NotImplementedError(f"{type(self).__name__} has no springs")
 
     @property

@@ -178,7 +178,8 @@ class Antagonistic(Actuator):
         sides = list(zip(self.laws, of_joint["phi"], strict=True))
         tau = np.stack([law.torque(deflection) for law, deflection in sides])
         sigma = np.stack([law.stiffness(deflection) for law, deflection in sides])
-        return Carried(tau.sum(axis=0), np.abs(tau).sum(axis=0), sigma.sum(axis=0))
+        against = tau if self.coupling is None else tau + _between(self.coupling, of_joint["phi"])
+        return Carried(tau.sum(axis=0), np.abs(tau).sum(axis=0), sigma.sum(axis=0), against)
 
     @property
     def spring_group(self) -> Hashable:
@@ -219,9 +220,13 @@ class Antagonistic(Actuator):
 
 def _coupled(moved: Transmission, coupling: SpringLaw) -> Transmission:
     """The same with a spring between the motors, which changes what they feel, and stores energy."""
-    apart = moved.phi[0] - moved.phi[1]
-    torque = coupling.torque(apart)
     return moved._replace(
-        tau_spring=moved.tau_spring + np.stack((torque, -torque)),
-        elastic_energy=moved.elastic_energy + coupling.energy(apart),
+        tau_spring=moved.tau_spring + _between(coupling, moved.phi),
+        elastic_energy=moved.elastic_energy + coupling.energy(moved.phi[0] - moved.phi[1]),
     )
+
+
+def _between(coupling: SpringLaw, phi: FloatArray) -> FloatArray:
+    """Torque of a spring between the motors against each of them, (2, samples)."""
+    torque = coupling.torque(phi[0] - phi[1])
+    return np.stack((torque, -torque))

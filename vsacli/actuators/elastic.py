@@ -174,7 +174,7 @@ class Elastic(Actuator):
         """Torque and stiffness by the law."""
         phi = of_joint["phi"][0]
         tau_e = self.law.torque(phi)
-        return Carried(tau_e, np.abs(tau_e), self.law.stiffness(phi))
+        return Carried(tau_e, np.abs(tau_e), self.law.stiffness(phi), tau_e[None])
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:

@@ -54,11 +54,18 @@ class Friction:
     def geared(self, ratio: float) -> Friction:
         """On the joint's side of a gear, with what it is on the motor's shaft, which turns `ratio` times."""
         backward, forward = (abs(ratio) * size for size in self.coulomb)
-        return Friction(
+        return _Geared(
             coulomb=(backward, forward) if ratio > 0 else (forward, backward),
             offset=ratio * self.offset or 0.0,
             width=self.width / abs(ratio),
         )
+
+
+class _Geared(Friction):
+    """Friction on the joint side of a gear; its numbers were checked on the shaft, or carry derivatives."""
+
+    def __post_init__(self) -> None:
+        pass
 
 
 NO_FRICTION = Friction(coulomb=(0.0, 0.0))

@@ -170,7 +170,7 @@ class Serial(Actuator):
         """What the mechanism carries."""
         state = self._state_of(of_joint)
         size = np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
-        return Carried(state.tau_e, size, state.stiffness)
+        return Carried(state.tau_e, size, state.stiffness, state.tau_spring.T)
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:

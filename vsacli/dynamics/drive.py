@@ -97,13 +97,7 @@ def driven_by(
     else:
         transmission = _damped(actuator, command, near_singular, internal)
     dtheta = actuator.motor_positions(transmission.dphi, command.dq)  # (69)
-    motors = actuator.motors
-    damping = _by_motor([motor.damping for motor in motors])
-    of_rotors = _rotor_torques(actuator, transmission.ddtheta)
-    tau_motor = of_rotors + damping * dtheta + transmission.tau_spring  # (73)-(74)
-    friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
-    if friction is not None:
-        tau_motor = tau_motor + friction.with_axis_behind().torque(dtheta)
+    tau_motor = motor_torques(actuator, dtheta, transmission.ddtheta, transmission.tau_spring)
     tau_damper, beside = _damper_torques(joint, command, transmission.dphi)
     if beside is not None:
         tau_motor = tau_motor + beside
@@ -120,6 +114,18 @@ def driven_by(
         tau_damper=tau_damper,
     )._replace(**electrical)
     return driven._replace(phi=_published(actuator, driven.phi), dphi=_published(actuator, driven.dphi))
+
+
+def motor_torques(
+    actuator: Actuator, dtheta: FloatArray, ddtheta: FloatArray, tau_spring: FloatArray
+) -> FloatArray:
+    """Torques of motors that move and bear springs so, (73)-(74) with friction; all (2, samples)."""
+    damping = _by_motor([motor.damping for motor in actuator.motors])
+    torques = _rotor_torques(actuator, ddtheta) + damping * dtheta + tau_spring
+    friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
+    if friction is not None:
+        torques = torques + friction.with_axis_behind().torque(dtheta)
+    return torques
 
 
 def _damped(

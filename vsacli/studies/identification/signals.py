@@ -7,7 +7,7 @@ second does not let through, so that no column of an equation is biased against 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -36,11 +36,13 @@ class Filter(NamedTuple):
         sections: of second order, as of `scipy.signal.butter`.
         stride: samples to one row of an equation, so that rows come at about twice the bandwidth and their
             noise is nearly white.
+        reach: samples after which it has forgotten nearly all.
     """
 
     bandwidth: float
     sections: FloatArray
     stride: int
+    reach: int
 
     @classmethod
     def low_pass(cls, bandwidth: float, rate: float) -> Filter:
@@ -48,14 +50,20 @@ class Filter(NamedTuple):
         from scipy.signal import butter
 
         sections = butter(ORDER, bandwidth, fs=rate, output="sos")
-        stride = max(1, int(rate / (2 * bandwidth)))
-        return cls(bandwidth, sections, stride)
+        return cls(bandwidth, sections, max(1, int(rate / (2 * bandwidth))), int(RINGING * rate / bandwidth))
 
-    def smoothed(self, columns: FloatArray) -> FloatArray:
-        """The same columns, (samples, ...), filtered; those with NaN are NaN."""
+    def smoothed(self, columns: FloatArray, ends: Literal["even", "odd"] = "even") -> FloatArray:
+        """The same columns, (samples, ...), filtered; those with NaN are NaN.
+
+        Args:
+            columns: as they are; beyond either end they are taken to go on.
+            ends: how: "even", as in a mirror, which keeps the noise of the last sample as small as that of
+                others, or "odd", as turned about the last sample, which keeps the slope.
+        """
         from scipy.signal import sosfiltfilt
 
-        return np.asarray(sosfiltfilt(self.sections, columns, axis=0))
+        beyond = min(self.reach, len(columns) - 1)
+        return np.asarray(sosfiltfilt(self.sections, columns, axis=0, padtype=ends, padlen=beyond))
 
     def applied(self, columns: FloatArray) -> FloatArray:
         """Rows of equations, (rows, ...), from columns at the rate of the record, (samples, ...).
@@ -104,9 +112,9 @@ def conditioned(
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     positions = np.concatenate((q[..., None], theta), axis=-1)
-    smooth = Filter.low_pass(WIDER * bandwidth, rate).smoothed(positions)
-    end = int(RINGING * rate / bandwidth)
-    inside = slice(end, len(time) - end)
+    smooth = Filter.low_pass(WIDER * bandwidth, rate).smoothed(positions, ends="odd")
+    low_pass = Filter.low_pass(bandwidth, rate)
+    inside = slice(low_pass.reach, len(time) - low_pass.reach)
     smooth, rates, accelerations = (each[inside] for each in (smooth, *_derivatives(time, smooth)))
     return Signals(
         time=time[inside],
@@ -118,7 +126,7 @@ def conditioned(
         ddtheta=accelerations[..., 1:],
         tau_motor=tau_motor[inside],
         rate=rate,
-        filter=Filter.low_pass(bandwidth, rate),
+        filter=low_pass,
     )
 
 

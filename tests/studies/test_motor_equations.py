@@ -1,0 +1,67 @@
+"""Equations of motors: they hold on what inverse dynamics computes, and their slopes are derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from samples.marks import slow_but
+from samples.shipped import shipped_run
+
+from vsacli import inverse_dynamics
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.model import Robot
+from vsacli.studies.identification.motor_equations import motor_equations, motor_names
+from vsacli.studies.identification.signals import Filter, Signals
+from vsacli.studies.identification.unknowns import unknowns
+
+RUNS = {
+    "vsa_3r": "rest_to_rest",
+    "coupled_1r": "coupled_1r",
+    "hardening_1r": "hardening_1r",
+    "maccepa_1r": "maccepa_1r",
+    "mixed_3r": "mixed_3r",
+    "puma_560": "puma_560",
+    "qbmove_arm_manual": "qbmove_arm",
+    "tendon_1r": "tendon_1r",
+    **{name: name for name in ("awas_1r", "cam_1r", "shifted_cams_1r")},
+}
+"""Trajectories by robot: every law and kind of actuator whose numbers stand in the file, and friction."""
+
+
+def computed_signals(robot: str, trajectory: str) -> tuple[Robot, Signals]:
+    """A motion with the torques that inverse dynamics gives, in place of a record."""
+    loaded, motion = shipped_run(robot, trajectory)
+    run = inverse_dynamics(loaded, motion)
+    names = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta", "tau_motor")
+    rate = (len(run.time) - 1) / float(run.time[-1])
+    arrays: list[FloatArray] = [getattr(run, name) for name in names]
+    return loaded, Signals(*arrays, rate=rate, filter=Filter.low_pass(rate / 20, rate))
+
+
+@pytest.mark.parametrize(
+    "robot", slow_but(("coupled_1r", "maccepa_1r", "mixed_3r", "puma_560", "tendon_1r"), RUNS)
+)
+def test_equations_of_motors_hold_and_their_slopes_are_derivatives(robot: str) -> None:
+    loaded, signals = computed_signals(robot, RUNS[robot])
+    for index, joint in enumerate(loaded.joints):
+        if not joint.actuator.sprung:
+            continue
+        chosen = unknowns(loaded, index, ("springs", "motors", "friction"))
+        values = np.array([each.value for each in chosen])
+        found = motor_equations(loaded, index, chosen, values, signals)
+        size = np.max(np.abs(found.measured))
+        assert set(found.group) == set(motor_names(loaded, index))
+        assert np.max(np.abs(found.predicted - found.measured)) < 1e-9 * size  # rounding of filters
+        for place, value in enumerate(values):
+            step = 1e-4 * (abs(value) or 1.0)
+            ahead, behind = (
+                motor_equations(
+                    loaded, index, chosen, values + sign * step * np.eye(len(values))[place], signals
+                )
+                for sign in (1, -1)
+            )
+            slope = (ahead.predicted - behind.predicted) / (2 * step)
+            # third derivatives times 1e-8, and rounding of torques over 1e-4
+            assert slope == pytest.approx(
+                found.slopes[:, place], abs=1e-6 * np.max(np.abs(slope)) + 1e-11 * size / step
+            )
