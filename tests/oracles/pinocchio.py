@@ -32,6 +32,14 @@ def torques(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Flo
     return np.array(rows) + damping * dq
 
 
+def torque_regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+    """Derivatives of tau_e, (samples, joints, 10 joints), by inertial parameters in Pinocchio's frames."""
+    model = build(robot)
+    data = model.createData()
+    rows = [pin.computeJointTorqueRegressor(model, data, *row).copy() for row in zip(q, dq, ddq, strict=True)]
+    return np.array(rows)
+
+
 def poses(robot: Robot, q: FloatArray) -> FloatArray:
     """Link frames and tool frame in the base frame, (samples, joints + 1, 4, 4)."""
     model, data = build(robot), build(robot).createData()

@@ -7,6 +7,7 @@ Systems 8 (1991), uses it for parameters of robots.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -72,3 +73,38 @@ def independence(columns: FloatArray, tolerance: float) -> Independence:
         r=r[:rank, :rank],
         condition=float(np.linalg.cond(r)) if there.size else 1.0,
     )
+
+
+def first_independent(columns: FloatArray, tolerance: float) -> IndexArray:
+    """Places of the columns that are no combinations of those before them; as `independence` otherwise."""
+    scale = np.linalg.norm(columns, axis=0)
+    there = np.flatnonzero(scale > NOTHING * scale.max(initial=0.0))
+    r = np.linalg.qr(columns[:, there] / scale[there], mode="r")
+    independent: IndexArray = there[np.abs(np.diagonal(r)) > tolerance]
+    return independent
+
+
+def shares_of(kept: FloatArray, columns: FloatArray, tolerance: float) -> FloatArray:
+    """Shares of independent columns (rows, kept) in others, (kept, columns)."""
+    scale, of_others = np.linalg.norm(kept, axis=0), np.linalg.norm(columns, axis=0)
+    shares, *_ = np.linalg.lstsq(kept / scale, columns, rcond=None)
+    shares[:, of_others <= NOTHING * of_others.max(initial=0.0)] = 0.0
+    shares[np.abs(shares) < CERTAIN * tolerance * of_others] = 0.0
+    found: FloatArray = shares / scale[:, None]
+    return found
+
+
+def in_words(terms: Iterable[tuple[int, float]], names: Sequence[str]) -> str:
+    """A combination of unknowns, e.g. `k + 0.0123 k_c`.
+
+    Args:
+        terms: index of each unknown with its factor; that of the first one is 1.
+        names: of the unknowns.
+    """
+    (first, _), *others = terms
+    signed = (f" {'-' if factor < 0 else '+'} {_times(abs(factor))}{names[at]}" for at, factor in others)
+    return "".join((names[first], *signed))
+
+
+def _times(factor: float) -> str:
+    return "" if f"{factor:.4g}" == "1" else f"{factor:.4g} "

@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError
 from vsacli.studies.identification.equations import Equations, System
-from vsacli.studies.identification.independence import Independence, independence
+from vsacli.studies.identification.independence import Independence, in_words, independence
 from vsacli.studies.identification.score_covariance import score_covariance
 
 SEPARABLE = 1 / 300
@@ -45,13 +45,7 @@ class Combination(NamedTuple):
 
     def words(self, names: Sequence[str]) -> str:
         """The sum in names of the unknowns, e.g. `k + 0.0123 k_c`."""
-        (first, _), *others = self.terms
-        signed = (f" {'-' if factor < 0 else '+'} {_times(abs(factor))}{names[at]}" for at, factor in others)
-        return "".join((names[first], *signed))
-
-
-def _times(factor: float) -> str:
-    return "" if f"{factor:.4g}" == "1" else f"{factor:.4g} "
+        return in_words(self.terms, names)
 
 
 class Fit(NamedTuple):
