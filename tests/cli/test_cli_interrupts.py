@@ -12,6 +12,9 @@ import pytest
 from samples.command_line import COMMAND, ROBOT, SEVEN_JOINTS, contents, installed, seven_joint_motion
 from samples.disturbed import allow_interrupts
 
+from vsacli.base.interrupts import Interrupted
+from vsacli.cli.main import vsacli as group
+
 PATIENCE = 60
 """Seconds until a run that should have started writing counts as broken."""
 
@@ -148,3 +151,18 @@ with unwinding_when_ended():
         [sys.executable, "-c", program], capture_output=True, text=True, timeout=30, check=True
     )
     assert (done.stdout, done.stderr) == ("ended from outside by SIGTERM\n", "")
+
+
+def test_a_signal_in_the_making_of_a_class_is_no_bug(vsacli, monkeypatch) -> None:
+    """Where a class is made, Python 3.11 passes an exception on as the cause of another one."""
+
+    class Begins:
+        def __set_name__(self, _owner: type, _name: str) -> None:
+            raise Interrupted(signal.SIGTERM)
+
+    def command(**_: object) -> None:
+        type("Made", (), {"attribute": Begins()})
+
+    monkeypatch.setattr(group, "main", command)
+    outcome = vsacli("schema")
+    assert (outcome.code, outcome.err) == (143, "ended from outside by SIGTERM\n")

@@ -110,7 +110,7 @@ def run(arguments: Sequence[str]) -> int:
         error.show(shown)
         return _fail(shown.getvalue().rstrip("\n"), Exit.USAGE)
     except Interrupted as error:
-        return _fail(str(error), 128 + error.number)  # as shells call a process that a signal ended
+        return _interrupted(error)
     except (click.Abort, KeyboardInterrupt):
         return _fail("interrupted", Exit.INTERRUPTED)
     except InputError as error:
@@ -119,12 +119,18 @@ def run(arguments: Sequence[str]) -> int:
         return Exit.CUT_OFF
     except StorageError as error:
         return _fail(str(error), Exit.STORAGE)
-    except Exception:
+    except Exception as error:
+        if isinstance(error.__cause__, Interrupted):  # Python 3.11 makes another of it in `__set_name__`
+            return _interrupted(error.__cause__)
         import traceback
 
         lines = traceback.format_exc()
         return _fail(f"{lines}vsacli: this is a bug; please report it with the lines above", Exit.BUG)
     return int(code or Exit.OK)
+
+
+def _interrupted(ended: Interrupted) -> int:
+    return _fail(str(ended), 128 + ended.number)  # as shells call a process that a signal ended
 
 
 def _fail(message: str, code: int) -> int:
