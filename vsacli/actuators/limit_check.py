@@ -75,12 +75,18 @@ class LimitCheck(NamedTuple):
         where the bit is no limit, but says that there is no way.
         """
         deviations = of_joint.get(deviation(self.variable))
-        if deviations is None or self.flag not in LIMITS:
+        if deviations is None:
+            return 0.0
+        of_motor = deviations if self.motor is None else deviations[self.motor - 1]
+        return np.minimum(ALLOWED_DEVIATIONS * np.nan_to_num(of_motor), self.largest_allowance)
+
+    @property
+    def largest_allowance(self) -> float:
+        """How far outside values may seem to be at most, however uncertain they are."""
+        if self.flag not in LIMITS:
             return 0.0
         width = self.range[1] - self.range[0]
-        most = LARGEST_ALLOWANCE * (width if np.isfinite(width) else self._largest)
-        of_motor = deviations if self.motor is None else deviations[self.motor - 1]
-        return np.minimum(ALLOWED_DEVIATIONS * np.nan_to_num(of_motor), most)
+        return LARGEST_ALLOWANCE * (width if np.isfinite(width) else self._largest)
 
     def clearance(self, of_joint: OfJoint) -> FloatArray:
         """How far within the range values are, relative to its larger end; negative outside, NaN for NaN."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.actuators.limit_check import LimitCheck, OfJoint
-from vsacli.base.arrays import FlagArray
+from vsacli.base.arrays import BoolArray, FlagArray
 from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING
 from vsacli.robot.joint import Joint
@@ -26,8 +26,25 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
 
 
 def limit_flags(joint: Joint, of_joint: OfJoint, flags: FlagArray) -> FlagArray:
-    """The flags, (samples,), and those of all limits of a joint on variables that are given."""
+    """The flags, (samples,), and those of all limits of a joint on variables that are given.
+
+    Of variables whose standard deviations are given, too, limits count beyond what these allow.
+    """
     for check in limit_checks(joint):
         if check.variable in of_joint:
-            flags = flags | check.flags(of_joint)
+            flags = flags | check.flags(of_joint, check.allowance(of_joint))
     return flags
+
+
+def open_steps(joint: Joint, of_joint: OfJoint) -> BoolArray:
+    """The steps at which it depends on standard deviations whether limits count as exceeded, (samples,).
+
+    Something is beyond a limit there, but nothing by more than is allowed at most.
+    """
+    beyond, too_far = np.zeros((2, len(of_joint["flags"])), dtype=np.uint16)
+    for check in limit_checks(joint):
+        if check.variable in of_joint:
+            beyond |= check.flags(of_joint)
+            too_far |= check.flags(of_joint, check.largest_allowance)
+    found: BoolArray = (beyond != 0) & (too_far == 0)
+    return found

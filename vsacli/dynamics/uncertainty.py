@@ -8,9 +8,9 @@ standard deviation to both sides, all of them one batch of samples for the kerne
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.trajectory.recorded.samples import SampledProfile
 
 MARGIN = "margin"
 """Of the stiffness to the nearer end of its corridor: has a deviation, too, but is no variable of results."""
@@ -54,19 +57,17 @@ class Uncertainty:
             trajectory: for this robot, with estimated signals.
             engine: what computes.
         """
-        fits = [estimate.fit for estimate in trajectory.estimates.values()]
-        knots = [len(part.knots) for fit in fits for part in fit.parts if not part.exact]
-        wanted = max(FEWEST_PROBES, PROBES_OF_A_KNOT * max(knots, default=0))
-        count = max(2, min(wanted, MOST_PROBES, trajectory.samples))
-        self._start = trajectory.start
-        self._elapsed = np.linspace(0.0, trajectory.duration, count)
-        components = sum(fit.components for fit in fits)
+        estimates = trajectory.estimates
+        self._start, self._elapsed = trajectory.start, probed_times(trajectory)
+        components = sum(estimate.fit.components for estimate in estimates.values())
         # each component has at most five orders, each shifted to both sides
         batch = max(1, usual_block(len(robot.joints)) // (10 * components))
-        parts = [
-            _deviations(robot, trajectory, self._elapsed[start : start + batch], engine)
-            for start in range(0, count, batch)
-        ]
+        parts: list[Deviations] = []
+        for start in range(0, len(self._elapsed), batch):
+            elapsed = self._elapsed[start : start + batch]
+            motion = trajectory.at(trajectory.start + elapsed)
+            covariances = {signal: each.covariance(elapsed) for signal, each in estimates.items()}
+            parts.append(deviations(robot, motion, estimates, covariances, engine))
         names = list(parts[0].deviations)
         self._known = {name: np.concatenate([part.deviations[name] for part in parts]) for name in names}
         self.unstated = {name: np.any([part.unstated[name] for part in parts], axis=0) for name in names}
@@ -85,7 +86,15 @@ class Uncertainty:
         return np.moveaxis(found.reshape(*known.shape[1:], len(time)), -1, 0)
 
 
-class _Part(NamedTuple):
+def probed_times(trajectory: Trajectory) -> FloatArray:
+    """Times at which deviations along a trajectory are computed, equally spaced, from the first step on."""
+    fits = [estimate.fit for estimate in trajectory.estimates.values()]
+    knots = [len(part.knots) for fit in fits for part in fit.parts if not part.exact]
+    wanted = max(FEWEST_PROBES, PROBES_OF_A_KNOT * max(knots, default=0))
+    return np.linspace(0.0, trajectory.duration, max(2, min(wanted, MOST_PROBES, trajectory.samples)))
+
+
+class Deviations(NamedTuple):
     """What is found at some times, by name of the variable.
 
     Attributes:
@@ -113,11 +122,22 @@ class _Shift(NamedTuple):
     size: FloatArray
 
 
-def _deviations(robot: Robot, trajectory: Trajectory, elapsed: FloatArray, engine: Engine) -> _Part:
-    """Of all variables that recorded signals have a part in, at some times from the first step on, s."""
-    motion = trajectory.at(trajectory.start + elapsed)
-    estimates = trajectory.estimates
-    covariances = {signal: estimate.covariance(elapsed) for signal, estimate in estimates.items()}
+def deviations(
+    robot: Robot,
+    motion: Motion,
+    estimates: Mapping[Signal, SampledProfile],
+    covariances: Mapping[Signal, FloatArray],
+    engine: Engine = NUMPY,
+) -> Deviations:
+    """Of all variables that recorded signals have a part in, along a motion.
+
+    Args:
+        robot: the robot.
+        motion: at some times.
+        estimates: the signals that were recorded.
+        covariances: of these at the times, (components, orders, orders, times), as of `SampledProfile`.
+        engine: what computes.
+    """
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [
         _Shift(name, component, bool(estimates[signal].stated[component]), row)
@@ -142,7 +162,7 @@ def _deviations(robot: Robot, trajectory: Trajectory, elapsed: FloatArray, engin
             if name in estimates[signal].estimated:
                 rows[_ignored(robot, signal)] = np.nan
                 found[name], unstated[name] = rows.T, ~estimates[signal].stated
-    return _Part(found, unstated)
+    return Deviations(found, unstated)
 
 
 def _ignored(robot: Robot, signal: Signal) -> list[int]:

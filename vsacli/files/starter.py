@@ -8,6 +8,7 @@ from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.remedies.motions import Passage
 from vsacli.studies.remedies.slow_down import smallest_slow_down
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
@@ -27,7 +28,7 @@ def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str
     acceptance, trajectory = Acceptance(robot, NEAR_SINGULAR_MARGIN), _read(text, robot)
     if not acceptance.refused_joints(trajectory).any():
         return usual, ""
-    reasons = "; ".join(acceptance.reasons(trajectory.block(0, trajectory.samples)))
+    reasons = "; ".join(acceptance.reasons(Passage.of(trajectory, 0, trajectory.samples)))
     try:
         duration = usual * smallest_slow_down(acceptance, trajectory)
     except ImpossibleError as error:

@@ -11,17 +11,17 @@ import numpy as np
 
 from vsacli.actuators.limit_check import Excess, LimitCheck, OfJoint
 from vsacli.actuators.reach import margin
-from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import VsacliError
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.units import STIFFNESS
-from vsacli.dynamics.drive import Drive, drive
-from vsacli.dynamics.inverse import command_of, compute_block, elastic_torques, usual_block
-from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.drive import drive
+from vsacli.dynamics.inverse import compute_block, usual_block
+from vsacli.dynamics.limits import limit_checks, limit_flags
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
+from vsacli.studies.remedies.motions import Instants, Load, Passage
+from vsacli.studies.remedies.recorded_limits import RecordedLimits
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -39,93 +39,110 @@ class ImpossibleError(VsacliError):
 
 @dataclass(frozen=True)
 class Acceptance:
-    """When a step of a robot is accepted: a margin of at least `near_singular`, and every limit kept."""
+    """When a step of a robot is accepted: a margin of at least `near_singular`, and every limit kept.
+
+    Attributes:
+        robot: the robot.
+        near_singular: the margin.
+        recorded: how limits are judged if the task was recorded.
+    """
 
     robot: Robot
     near_singular: float
+    recorded: RecordedLimits | None = None
 
-    def refused(self, motion: Motion) -> BoolArray:
+    def refused(self, passage: Passage) -> BoolArray:
         """The steps that are not accepted, (samples, joints)."""
-        block = compute_block(self.robot, motion, self.near_singular)
-        return self._refused(block.flags, block.stiffness, block.stiffness_lower, block.stiffness_upper)
+        block = compute_block(self.robot, passage.motion, self.near_singular)
+        values = map(block.of_joint, range(len(self.robot.joints)))
+        by_joint = [
+            self._refused(joint, of_joint, passage.instants)
+            for joint, of_joint in zip(self.robot.joints, values, strict=True)
+        ]
+        return np.stack(by_joint, axis=1)
 
-    def blocks(self, trajectory: Trajectory) -> Iterator[Motion]:
-        """All steps of a trajectory, block by block."""
+    def passages(self, trajectory: Trajectory, factor: float = 1.0) -> Iterator[Passage]:
+        """All steps of a task, or of one that was stretched by a factor, block by block."""
         samples = usual_block(len(self.robot.joints))
         for start in range(0, trajectory.samples, samples):
-            yield trajectory.block(start, start + samples)
+            yield Passage.of(trajectory, start, start + samples, factor)
 
-    def refused_joints(self, trajectory: Trajectory) -> BoolArray:
+    def refused_joints(self, trajectory: Trajectory, factor: float = 1.0) -> BoolArray:
         """The joints with any step that is not accepted, (joints,)."""
         joints: BoolArray = np.any(
-            [np.any(self.refused(motion), axis=0) for motion in self.blocks(trajectory)], axis=0
+            [np.any(self.refused(passage), axis=0) for passage in self.passages(trajectory, factor)], axis=0
         )
         return joints
 
-    def refused_commands(self, joint: Joint, command: Command) -> BoolArray:
+    def refused_steps(self, joint: Joint, load: Load) -> BoolArray:
         """The steps of one joint that are not accepted, (samples,)."""
-        driven = drive(joint, command, self.near_singular)
-        asked = command.commanded["stiffness"]
-        return self._refused(driven.flags, asked, driven.stiffness_lower, driven.stiffness_upper)
+        return self._refused(joint, self._driven(joint, load), load.instants)
 
     def position_reasons(self, trajectory: Trajectory) -> tuple[str, ...]:
         """For each joint the limit of its position that the motion exceeds, at whatever speed, if it does."""
         found: dict[str, str] = {}
-        for motion in self.blocks(trajectory):
+        for passage in self.passages(trajectory):
             for index, joint in enumerate(self.robot.joints):
-                if reason := _limit_reason(joint, motion.time, {"q": motion.q[:, index]}):
+                values = {"q": passage.motion.q[:, index]}
+                if reason := self._limit_reason(joint, values, passage.motion.time, passage.instants):
                     found.setdefault(joint.name, reason)
         return tuple(found.values())
 
-    def reasons(self, motion: Motion) -> tuple[str, ...]:
+    def reasons(self, passage: Passage) -> tuple[str, ...]:
         """For each joint that is not accepted throughout, the worst that is wrong with it."""
-        commanded = {**motion.variables(), **elastic_torques(self.robot, motion)}
-        found = (
-            self.reason(joint, motion.time, command_of(index, commanded))
-            for index, joint in enumerate(self.robot.joints)
-        )
+        loads = passage.loads(self.robot)
+        found = (self.reason(joint, load) for joint, load in zip(self.robot.joints, loads, strict=True))
         return tuple(reason for reason in found if reason)
 
-    def reason(self, joint: Joint, time: FloatArray, command: Command) -> str:
+    def reason(self, joint: Joint, load: Load) -> str:
         """The worst that is wrong with the steps of one joint, in a clause; empty if they are accepted."""
-        driven = drive(joint, command, self.near_singular)
-        computed = {**command.arrays(), **driven._asdict()}
-        return self._reach_reason(joint, time, command, driven) or _limit_reason(joint, time, computed)
+        values = self._driven(joint, load)
+        limit_reason = self._limit_reason(joint, values, load.time, load.instants)
+        return self._reach_reason(joint, load, values) or limit_reason
 
-    def _refused(
-        self, flags: FlagArray, stiffness: FloatArray, lower: FloatArray, upper: FloatArray
-    ) -> BoolArray:
-        short = margin(stiffness, lower, upper) < self.near_singular
-        refused: BoolArray = short | has(flags, Flag.INFEASIBLE | LIMITS)
+    def path_reason(self, joint: Joint, load: Load) -> str:
+        """A limit that the motion itself exceeds, whatever the stiffness, in a clause; empty if none."""
+        values = {"q": load.command.q, "dq": load.command.dq}
+        return self._limit_reason(joint, values, load.time, load.instants)
+
+    def _driven(self, joint: Joint, load: Load) -> OfJoint:
+        """All variables of one joint, by name."""
+        return {**load.command.arrays(), **drive(joint, load.command, self.near_singular).arrays()}
+
+    def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
+        short = margin(values["stiffness"], values["stiffness_lower"], values["stiffness_upper"])
+        flags = values["flags"]
+        if self.recorded is not None:
+            flags = self.recorded.flags(self.robot, joint, values, instants)
+        refused: BoolArray = (short < self.near_singular) | has(flags, Flag.INFEASIBLE | LIMITS)
         return refused
 
-    def _reach_reason(self, joint: Joint, time: FloatArray, command: Command, driven: Drive) -> str:
-        gap = margin(command.commanded["stiffness"], driven.stiffness_lower, driven.stiffness_upper)
+    def _reach_reason(self, joint: Joint, load: Load, values: OfJoint) -> str:
+        asked = load.command.commanded["stiffness"]
+        lower, upper = values["stiffness_lower"], values["stiffness_upper"]
+        gap = margin(asked, lower, upper)
         gap[np.isnan(gap)] = np.inf
-        gap[has(driven.flags, Flag.INFEASIBLE) & np.isnan(driven.stiffness_lower)] = -np.inf
+        gap[has(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf
         step = int(gap.argmin())
         if gap[step] >= self.near_singular:
             return ""
         return _corridor_reason(
             joint,
-            time[step],
-            command.commanded["stiffness"][step],
-            driven.stiffness_lower[step] / (1 - self.near_singular),
-            driven.stiffness_upper[step] / (1 + self.near_singular),
+            load.time[step],
+            asked[step],
+            lower[step] / (1 - self.near_singular),
+            upper[step] / (1 + self.near_singular),
         )
 
-
-def path_reason(joint: Joint, time: FloatArray, command: Command) -> str:
-    """A limit that the motion itself exceeds, whatever the stiffness, in a clause; empty if there is none."""
-    return _limit_reason(joint, time, {"q": command.q, "dq": command.dq})
-
-
-def _limit_reason(joint: Joint, time: FloatArray, computed: OfJoint) -> str:
-    """The first kind of limit that is exceeded, of those on variables that were computed."""
-    for check in limit_checks(joint):
-        if check.variable in computed and (excess := check.worst(computed, check.flags(computed))):
-            return _limit_text(joint, time[excess.step], check, excess)
-    return ""
+    def _limit_reason(self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants) -> str:
+        """The first kind of limit that is exceeded, of those on variables that were computed."""
+        flags = limit_flags(joint, values, np.zeros(len(time), dtype=np.uint16))
+        if self.recorded is not None:
+            flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
+        for check in limit_checks(joint):
+            if check.variable in values and (excess := check.worst(values, flags)):
+                return _limit_text(joint, time[excess.step], check, excess)
+        return ""
 
 
 def stiffness_text(joint: Joint, value: float) -> str:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FloatArray, IndexArray
-from vsacli.base.signals import STIFFNESS
+from vsacli.base.arrays import FloatArray
 from vsacli.dynamics.inverse import elastic_torques, usual_block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, path_reason
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.remedies.motions import Load
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -22,35 +21,11 @@ BISECTIONS = 50
 """Bisections of a share of 0 to 1: down to rounding."""
 
 
-@dataclass(frozen=True, eq=False)
-class Load:
-    """What one joint is asked to do, and its elastic torque.
-
-    Attributes:
-        time: ascending, (instants,) in s.
-        command: rows (instants,).
-    """
-
-    time: FloatArray
-    command: Command
-
-    def at(self, instants: IndexArray | slice) -> Load:
-        """The load at some of the instants."""
-        rows = {name: row[instants] for name, row in self.command.arrays().items()}
-        return Load(self.time[instants], Command.of(rows))
-
-    def changed(self, stiffness: FloatArray | float, *rates: FloatArray) -> Load:
-        """The load with something added to the stiffness and, if given, to its rate and second derivative."""
-        commanded = dict(self.command.commanded)
-        for name, change in zip(STIFFNESS.names, (stiffness, *rates), strict=False):
-            commanded[name] = commanded[name] + change
-        return replace(self, command=self.command._replace(commanded=commanded))
-
-
-def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int]) -> list[Load]:
+def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int], factor: float = 1.0) -> list[Load]:
     """The loads of some joints, given by index: at every step, and half-way from one to the next.
 
-    Every second instant, from the first on, is a step.
+    Every second instant, from the first on, is a step. The trajectory is a task, or one that was stretched by
+    a factor.
     """
     instants = 2 * trajectory.samples - 1
     names = Command.names(trajectory.commanded)
@@ -61,7 +36,8 @@ def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int]) -> list
         middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
         for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
             _fill(robot, motion, joints, names, time[first:], rows[:, :, first:])
-    return [Load(time, Command.of(dict(zip(names, of_joint, strict=True)))) for of_joint in rows]
+    commands = (Command.of(dict(zip(names, of_joint, strict=True))) for of_joint in rows)
+    return [Load.over(trajectory, factor, time, command) for command in commands]
 
 
 def _fill(
@@ -96,11 +72,11 @@ def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
         ImpossibleError: no stiffness mends the joint, or it has none to choose.
     """
     variable_stiffness_actuator(joint)
-    if reason := path_reason(joint, load.time, load.command):
+    if reason := acceptance.path_reason(joint, load):
         raise ImpossibleError(f"no stiffness changes that {reason}")
     admissible = admissible_stiffness(joint, load.command, acceptance.near_singular)
     if np.isnan(admissible.low).any():
-        raise ImpossibleError(acceptance.reason(joint, load.time, load.command))
+        raise ImpossibleError(acceptance.reason(joint, load))
     return admissible
 
 

@@ -13,7 +13,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.remedies.admissible_stiffness import Load, checked_range
+from vsacli.studies.remedies.admissible_stiffness import checked_range
+from vsacli.studies.remedies.motions import Load
 from vsacli.studies.remedies.stiffness_offset import smallest_offset
 
 

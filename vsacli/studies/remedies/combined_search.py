@@ -12,17 +12,15 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, evenly
-from vsacli.dynamics.inverse import command_of, elastic_torques
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.remedies.acceptance import ImpossibleError, path_reason
-from vsacli.studies.remedies.admissible_stiffness import Load
+from vsacli.studies.remedies.acceptance import ImpossibleError
 from vsacli.studies.remedies.combination import Combination, Form, constant_change, preload_path
-from vsacli.studies.remedies.motions import evenly_chosen, joined, select, slowed, stiffened
+from vsacli.studies.remedies.motions import Load, Passage, evenly_chosen, joined
 from vsacli.studies.remedies.slow_down import FACTOR_DENOMINATOR, LARGEST_FACTOR, WATCHED_STEPS
 from vsacli.studies.remedies.task import Task
-from vsacli.trajectory.motion import Motion
 
 STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 """Relative strides of the scan, each up to the factor before it: fine where a slow-down is small."""
@@ -74,19 +72,19 @@ class CombinedSearch:
             self._looking = WatchedSearch(self, joined([self._looking.watched, refused]))
         return None
 
-    def _refused(self, found: Combination) -> Motion | None:
+    def _refused(self, found: Combination) -> Passage | None:
         """Steps of the first block with any that refuse constant changes, with what was commanded at them."""
         acceptance = self.task.acceptance_with(found)
         change = np.zeros(self.task.trajectory.joints)
         change[list(found.constants)] = list(found.constants.values())
-        for motion in acceptance.blocks(self.task.trajectory.stretched(found.factor)):
-            steps = np.flatnonzero(np.any(acceptance.refused(stiffened(motion, change)), axis=1))
+        for passage in acceptance.passages(self.task.trajectory.stretched(found.factor), found.factor):
+            steps = np.flatnonzero(np.any(acceptance.refused(passage.stiffened(change)), axis=1))
             if steps.size:
-                return slowed(select(motion, steps[evenly(len(steps), WATCHED_STEPS)]), 1 / found.factor)
+                return passage.select(steps[evenly(len(steps), WATCHED_STEPS)]).slowed(1 / found.factor)
         return None
 
 
-def _choices(robot: Robot, watched: Motion | None) -> list[dict[str, Joint]]:
+def _choices(robot: Robot, watched: Passage | None) -> list[dict[str, Joint]]:
     """What each joint may be by the word for its preload, which is empty if it stays as it is.
 
     Args:
@@ -96,22 +94,21 @@ def _choices(robot: Robot, watched: Motion | None) -> list[dict[str, Joint]]:
     choices = [{"": joint} for joint in robot.joints]
     if watched is None:
         return choices
-    torques = elastic_torques(robot, watched)["tau_e"]
-    for index, joint in enumerate(robot.joints):
+    for index, (joint, load) in enumerate(zip(robot.joints, watched.loads(robot), strict=True)):
         preload = joint.actuator.opposite_preload
         if preload is not None:
             exchanged = robot.replace(preload_path(robot, index), preload).joints[index]
-            load = torques[:, index], watched.commanded["stiffness"][:, index], watched.q[:, index]
-            if not _alike(joint.actuator, exchanged.actuator, *load):
+            if not _alike(joint.actuator, exchanged.actuator, load.command):
                 choices[index][preload] = exchanged
     return choices
 
 
-def _alike(one: Actuator, other: Actuator, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> bool:
+def _alike(one: Actuator, other: Actuator, command: Command) -> bool:
     """Whether two preloads of an actuator are mirror images, as those of like springs are."""
     if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
         return False
-    first, second = one.solve(tau_e, stiffness, q), other.solve(tau_e, stiffness, q)
+    asked = command.tau_e, command.commanded["stiffness"], command.q
+    first, second = one.solve(*asked), other.solve(*asked)
     pairs = (first.lower, second.lower), (first.upper, second.upper)
     return all(np.allclose(here, there, rtol=SAME_CORRIDOR, equal_nan=True) for here, there in pairs)
 
@@ -119,7 +116,7 @@ def _alike(one: Actuator, other: Actuator, tau_e: FloatArray, stiffness: FloatAr
 class WatchedSearch:
     """A combined search that looks at some steps of the motion, and keeps what it finds at each factor."""
 
-    def __init__(self, search: CombinedSearch, watched: Motion) -> None:
+    def __init__(self, search: CombinedSearch, watched: Passage) -> None:
         self._search, self.watched = search, watched
         self._found: dict[int, Combination | None] = {}
 
@@ -177,11 +174,10 @@ class WatchedSearch:
         Raises:
             ImpossibleError: some joint is refused whatever its stiffness.
         """
-        motion, search = slowed(self.watched, factor), self._search
-        commanded = {**motion.variables(), **elastic_torques(search.task.acceptance.robot, motion)}
-        loads = [Load(motion.time, command_of(index, commanded)) for index in range(len(search.choices))]
+        search, acceptance = self._search, self._search.task.acceptance
+        loads = self.watched.slowed(factor).loads(acceptance.robot)
         for choices, load in zip(search.choices, loads, strict=True):
-            if reason := path_reason(choices[""], load.time, load.command):
+            if reason := acceptance.path_reason(choices[""], load):
                 raise ImpossibleError(reason)
         found = [self._of_joint(choices, load) for choices, load in zip(search.choices, loads, strict=True)]
         return Combination(
@@ -211,7 +207,7 @@ class WatchedSearch:
 
     def _change(self, joint: Joint, load: Load) -> FloatArray:
         acceptance = self._search.task.acceptance
-        if not acceptance.refused_commands(joint, load.command).any():
+        if not acceptance.refused_steps(joint, load).any():
             return np.zeros(len(load.time))
         return self._search.form(acceptance, joint, load)
 

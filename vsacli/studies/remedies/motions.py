@@ -1,51 +1,142 @@
-"""Motions at some steps of a trajectory, slower or with another stiffness."""
+"""Steps of a task, passed more slowly or with another stiffness: of all joints, and of one with its load."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
-from vsacli.dynamics.inverse import usual_block
+from vsacli.dynamics.inverse import command_of, elastic_torques, usual_block
+from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.times import stretch
 from vsacli.trajectory.trajectory import Trajectory
 
 
-def slowed(motion: Motion, factor: float) -> Motion:
-    """A motion passed more slowly, at rest if the factor is infinite; their times are kept."""
-    return motion.mapped(motion.time, lambda array, order: array / factor**order)
+class Instants(NamedTuple):
+    """Where steps stand in the trajectory that is to be mended.
+
+    Attributes:
+        time: of that trajectory as it is, (samples,) in s.
+        factor: by which it is passed more slowly there, (samples,).
+    """
+
+    time: FloatArray
+    factor: FloatArray
+
+    def at(self, steps: IndexArray | slice) -> Instants:
+        """Some of them."""
+        return Instants(self.time[steps], self.factor[steps])
 
 
-def stiffened(motion: Motion, change: FloatArray) -> Motion:
-    """A motion with something added to the stiffness of each joint, (joints,) N m/rad (N/m)."""
-    arrays = motion.of_joints
-    return Motion.of(motion.time, {**arrays, STIFFNESS.key: arrays[STIFFNESS.key] + change}, motion.wrench)
+class Passage(NamedTuple):
+    """Some steps of a task, as they are or changed.
+
+    Attributes:
+        motion: with the times of the task as it is.
+        factor: by which it is passed more slowly, (samples,).
+    """
+
+    motion: Motion
+    factor: FloatArray
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, start: int, stop: int, factor: float = 1.0) -> Passage:
+        """The steps start..stop-1 of a task, or of one that was stretched by a factor."""
+        motion = trajectory.block(start, stop)
+        if factor != 1:
+            motion = motion.mapped(_unstretched(trajectory, motion.time, factor), lambda array, _: array)
+        return cls(motion, np.full(len(motion.time), factor))
+
+    @property
+    def instants(self) -> Instants:
+        """Where the steps stand in the task."""
+        return Instants(self.motion.time, self.factor)
+
+    def slowed(self, factor: float) -> Passage:
+        """The same passed more slowly, at rest if the factor is infinite."""
+        slower = self.motion.mapped(self.motion.time, lambda array, order: array / factor**order)
+        return Passage(slower, self.factor * factor)
+
+    def stiffened(self, change: FloatArray) -> Passage:
+        """With something added to the stiffness of each joint, (joints,) N m/rad (N/m)."""
+        motion, arrays = self.motion, self.motion.of_joints
+        arrays[STIFFNESS.key] = arrays[STIFFNESS.key] + change
+        return self._replace(motion=Motion.of(motion.time, arrays, motion.wrench))
+
+    def loads(self, robot: Robot) -> list[Load]:
+        """The load of each joint of a robot."""
+        motion = self.motion
+        commanded = {**motion.variables(), **elastic_torques(robot, motion)}
+        commands = (command_of(index, commanded) for index in range(len(robot.joints)))
+        return [Load(motion.time, command, self.instants) for command in commands]
+
+    def select(self, steps: IndexArray) -> Passage:
+        """Some of the steps, by index."""
+        motion = self.motion.mapped(self.motion.time[steps], lambda array, _: array[steps])
+        return Passage(motion, self.factor[steps])
 
 
-def evenly_chosen(trajectory: Trajectory, steps: int) -> Motion:
+def evenly_chosen(trajectory: Trajectory, steps: int) -> Passage:
     """At most so many steps of a trajectory, both ends included."""
     chosen = evenly(trajectory.samples, steps)
     samples = usual_block(trajectory.joints)
     return joined(
-        select(trajectory.block(start, start + samples), inside - start)
+        Passage.of(trajectory, start, start + samples).select(inside - start)
         for start in range(0, trajectory.samples, samples)
         if (inside := chosen[(start <= chosen) & (chosen < start + samples)]).size
     )
 
 
-def select(motion: Motion, steps: IndexArray) -> Motion:
-    """Some steps of a motion, by index."""
-    return motion.mapped(motion.time[steps], lambda array, _: array[steps])
-
-
-def joined(motions: Iterable[Motion]) -> Motion:
-    """The steps of several motions, one motion after the other."""
-    parts = list(motions)
-    variables = [part.variables() for part in parts]
+def joined(passages: Iterable[Passage]) -> Passage:
+    """The steps of several passages, one after the other."""
+    motions, factors = zip(*passages, strict=True)
+    variables = [motion.variables() for motion in motions]
     arrays = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
-    last = parts[-1].wrench
+    last = motions[-1].wrench
     wrench = last and Wrench(*(arrays[name] for name in WRENCH_NAMES), frame=last.frame)
-    return Motion.of(arrays["time"], arrays, wrench)
+    return Passage(Motion.of(arrays["time"], arrays, wrench), np.concatenate(factors))
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What one joint is asked to do, and its elastic torque.
+
+    Attributes:
+        time: ascending, (samples,) in s, of the task or of one that was stretched.
+        command: rows (samples,).
+        instants: where they stand in the task.
+    """
+
+    time: FloatArray
+    command: Command
+    instants: Instants
+
+    @classmethod
+    def over(cls, trajectory: Trajectory, factor: float, time: FloatArray, command: Command) -> Load:
+        """At times of a task that was stretched by a factor."""
+        unstretched = _unstretched(trajectory, time, factor)
+        return cls(time, command, Instants(unstretched, np.full(len(time), factor)))
+
+    def at(self, steps: IndexArray | slice) -> Load:
+        """The load at some of the times."""
+        rows = {name: row[steps] for name, row in self.command.arrays().items()}
+        return Load(self.time[steps], Command.of(rows), self.instants.at(steps))
+
+    def changed(self, stiffness: FloatArray | float, *rates: FloatArray) -> Load:
+        """The load with something added to the stiffness and, if given, to its rate and second derivative."""
+        commanded = dict(self.command.commanded)
+        for name, change in zip(STIFFNESS.names, (stiffness, *rates), strict=False):
+            commanded[name] = commanded[name] + change
+        return replace(self, command=self.command._replace(commanded=commanded))
+
+
+def _unstretched(trajectory: Trajectory, time: FloatArray, factor: float) -> FloatArray:
+    """Times of a stretched trajectory as they were before."""
+    return stretch(time, trajectory.start, 1 / factor)

@@ -8,8 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import evenly
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed
-from vsacli.studies.remedies.motions import evenly_chosen, joined, select, slowed
-from vsacli.trajectory.motion import Motion
+from vsacli.studies.remedies.motions import Passage, evenly_chosen, joined
 from vsacli.trajectory.trajectory import Trajectory
 
 FACTOR_DENOMINATOR = 10_000
@@ -42,10 +41,10 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
         ImpossibleError: with the reason.
     """
     steps = evenly_chosen(trajectory, WATCHED_STEPS)
-    at_rest = slowed(steps, math.inf)
+    at_rest = steps.slowed(math.inf)
     refused = np.flatnonzero(np.any(acceptance.refused(at_rest), axis=1))
-    few = np.union1d(evenly(len(steps.time), FIRST_STEPS), refused[evenly(len(refused), FIRST_STEPS)])
-    number = _scan_start(acceptance, select(steps, few))
+    few = np.union1d(evenly(len(steps.factor), FIRST_STEPS), refused[evenly(len(refused), FIRST_STEPS)])
+    number = _scan_start(acceptance, steps.select(few))
     if number is not None:
         candidates = SlowDownCandidates(acceptance, trajectory, steps)
         number = smallest_confirmed(candidates, number, LARGEST_FACTOR * FACTOR_DENOMINATOR)
@@ -57,7 +56,7 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     raise ImpossibleError(f"not even one by a factor {LARGEST_FACTOR} does")
 
 
-def _scan_start(acceptance: Acceptance, few: Motion) -> int | None:
+def _scan_start(acceptance: Acceptance, few: Passage) -> int | None:
     """A number up to which the scan would find one of a few steps refused; None if it always would.
 
     It tries many factors at once, which costs hardly more than one of them.
@@ -67,7 +66,7 @@ def _scan_start(acceptance: Acceptance, few: Motion) -> int | None:
         numbers.append(min(numbers[-1] + _stride(numbers[-1]), LARGEST_FACTOR * FACTOR_DENOMINATOR))
     for start in range(0, len(numbers), FACTORS_AT_ONCE):
         tried = numbers[start : start + FACTORS_AT_ONCE]
-        refused = acceptance.refused(joined(slowed(few, number / FACTOR_DENOMINATOR) for number in tried))
+        refused = acceptance.refused(joined(few.slowed(number / FACTOR_DENOMINATOR) for number in tried))
         accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
         if accepted.size:
             return numbers[max(start + int(accepted[0]) - 1, 0)]
@@ -77,7 +76,7 @@ def _scan_start(acceptance: Acceptance, few: Motion) -> int | None:
 class SlowDownCandidates:
     """Stretching by number / FACTOR_DENOMINATOR, judged at watched steps; see `Candidates`."""
 
-    def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: Motion) -> None:
+    def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: Passage) -> None:
         self._acceptance, self._trajectory, self._watched = acceptance, trajectory, watched
 
     def stride(self, number: int) -> int:
@@ -86,16 +85,16 @@ class SlowDownCandidates:
 
     def accepts(self, number: int) -> bool:
         """Whether every watched step is accepted."""
-        return not self._acceptance.refused(slowed(self._watched, number / FACTOR_DENOMINATOR)).any()
+        return not self._acceptance.refused(self._watched.slowed(number / FACTOR_DENOMINATOR)).any()
 
     def confirms(self, number: int) -> bool:
         """Whether every step is accepted; those of the first block with others are watched from now on."""
         factor = number / FACTOR_DENOMINATOR
-        for motion in self._acceptance.blocks(self._trajectory.stretched(factor)):
-            steps = np.flatnonzero(np.any(self._acceptance.refused(motion), axis=1))
+        for passage in self._acceptance.passages(self._trajectory.stretched(factor), factor):
+            steps = np.flatnonzero(np.any(self._acceptance.refused(passage), axis=1))
             if steps.size:
-                motion = select(motion, steps[evenly(len(steps), WATCHED_STEPS)])
-                self._watched = joined([self._watched, slowed(motion, 1 / factor)])
+                further = passage.select(steps[evenly(len(steps), WATCHED_STEPS)])
+                self._watched = joined([self._watched, further.slowed(1 / factor)])
                 return False
         return True
 

@@ -14,6 +14,7 @@ from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.combination import Combination, least_change
 from vsacli.studies.remedies.combined_search import CombinedSearch
+from vsacli.studies.remedies.recorded_limits import RecordedLimits
 from vsacli.studies.remedies.slow_down import smallest_slow_down
 from vsacli.studies.remedies.suggestions import NotPossible, Remedy, Suggestions
 from vsacli.studies.remedies.task import Task
@@ -50,7 +51,7 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
     """
     trajectory = fitted(robot, trajectory)
     check_near_singular(near_singular)
-    acceptance = Acceptance(robot, near_singular)
+    acceptance = Acceptance(robot, near_singular, RecordedLimits(trajectory))
     asked = Task(acceptance, trajectory)
     as_it_is = Remedy(0.0, robot, trajectory)
     if damped_joints(robot, trajectory):
@@ -63,7 +64,8 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
         none = NotPossible(reasons)
         return Suggestions(near_singular, none, none, none)
     for factor in STRICTER:
-        found = _Found.of(replace(asked, acceptance=Acceptance(robot, factor * near_singular)))
+        stricter = replace(acceptance, near_singular=factor * near_singular)
+        found = _Found.of(replace(asked, acceptance=stricter))
         chosen, failed = _worth_choosing(found.remedies, asked)
         if not failed:
             break

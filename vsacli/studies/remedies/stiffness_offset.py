@@ -10,7 +10,8 @@ import numpy as np
 from vsacli.base.arrays import IndexArray, evenly
 from vsacli.robot.joint import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed, stiffness_text
-from vsacli.studies.remedies.admissible_stiffness import Load, checked_range
+from vsacli.studies.remedies.admissible_stiffness import checked_range
+from vsacli.studies.remedies.motions import Load
 
 LARGEST_RATIO = 100
 """How many times stiffer or softer an offset may make a joint, where nothing else bounds it."""
@@ -52,7 +53,7 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     if found:
         return min(found, key=abs)
     nearest = min(max(low, 0.0), high)
-    reason = acceptance.reason(joint, load.time, load.changed(nearest).command)
+    reason = acceptance.reason(joint, load.changed(nearest))
     with_it = f"with {nearest:+.6g}" if nearest else "as it is"
     raise ImpossibleError(f"none keeps every limit of {joint.name}; {with_it}, {reason}")
 
@@ -131,7 +132,7 @@ class OffsetCandidates:
             tried = numbers[begin : begin + OFFSETS_AT_ONCE]
             load = self._load.at(np.tile(steps, len(tried)))
             values = np.repeat([self.value(number) for number in tried], len(steps))
-            refused = self._acceptance.refused_commands(self._joint, load.changed(values).command)
+            refused = self._acceptance.refused_steps(self._joint, load.changed(values))
             accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
             if accepted.size:
                 return begin + int(accepted[0])
@@ -152,5 +153,5 @@ class OffsetCandidates:
         return not refused.size
 
     def _refused(self, load: Load, number: int) -> IndexArray:
-        command = load.changed(self.value(number)).command
-        return np.flatnonzero(self._acceptance.refused_commands(self._joint, command))
+        changed = load.changed(self.value(number))
+        return np.flatnonzero(self._acceptance.refused_steps(self._joint, changed))

@@ -12,11 +12,11 @@ from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, stiffness_text
 from vsacli.studies.remedies.admissible_stiffness import (
-    Load,
     admissible_stiffness,
     checked_range,
     variable_stiffness_actuator,
 )
+from vsacli.studies.remedies.motions import Load
 from vsacli.studies.remedies.nearest_spline import DEGREE, Bounds, NoSplineError, nearest_spline
 
 MARGIN_FACTORS = (1, 2, 4, 8)
@@ -133,14 +133,11 @@ def _smoothing_time(joint: Joint, load: Load) -> float:
 
 
 def _accepted(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> bool:
-    return (
-        change is not None
-        and not acceptance.refused_commands(joint, load.changed(*change.rows).command).any()
-    )
+    return change is not None and not acceptance.refused_steps(joint, load.changed(*change.rows)).any()
 
 
 def _reason(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> str:
     if change is None:
         return f"what {joint.name} may have is too narrow, or changes too fast, for a smooth profile"
-    reason = acceptance.reason(joint, load.time, load.changed(*change.rows).command)
+    reason = acceptance.reason(joint, load.changed(*change.rows))
     return f"none that was tried keeps every limit of {joint.name}; with the nearest, {reason}"

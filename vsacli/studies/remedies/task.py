@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
@@ -15,9 +15,10 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.units import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.remedies.admissible_stiffness import Load, joint_loads
+from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness, with_raised_stiffness
 from vsacli.studies.remedies.combination import RELATIVE_CHANGE, Combination, Cost, constant_change
+from vsacli.studies.remedies.motions import Load
 from vsacli.studies.remedies.stiffness_offset import smallest_offset
 from vsacli.studies.remedies.stiffness_profile import Change, nearest_change
 from vsacli.studies.remedies.suggestions import (
@@ -56,7 +57,7 @@ class Task:
 
     def acceptance_with(self, found: Combination) -> Acceptance:
         """The rule for the robot with the preloads of a combination."""
-        return Acceptance(found.robot(self.acceptance.robot), self.acceptance.near_singular)
+        return replace(self.acceptance, robot=found.robot(self.acceptance.robot))
 
     def with_constants(self, found: Combination) -> Remedy:
         """The remedy of a combination whose changes of stiffness are constants."""
@@ -82,7 +83,8 @@ class Task:
         """
         slower, acceptance = self.trajectory.stretched(found.factor), self.acceptance_with(found)
         robot = acceptance.robot
-        changes = for_refused_joints(acceptance, slower, partial(_nearest_change, acceptance))
+        find = partial(_nearest_change, acceptance)
+        changes = for_refused_joints(acceptance, slower, find, found.factor)
         summaries = tuple(_summary(robot.joints[index], change) for index, (_, change) in changes.items())
         return Remedy(
             size=self._size(found.factor, [(load, change.rows[0]) for load, change in changes.values()]),
@@ -136,17 +138,27 @@ class Task:
 
 
 def for_refused_joints(
-    acceptance: Acceptance, trajectory: Trajectory, find: Callable[[Joint, Load], _Found]
+    acceptance: Acceptance,
+    trajectory: Trajectory,
+    find: Callable[[Joint, Load], _Found],
+    factor: float = 1.0,
 ) -> dict[int, tuple[Load, _Found]]:
     """Load, and what is found for it, of each joint with any step that is not accepted, by index.
+
+    Args:
+        acceptance: the rule, and the robot.
+        trajectory: a task, or one that was stretched.
+        find: what is looked for.
+        factor: of the stretching.
 
     Raises:
         ImpossibleError: with the reason of each joint for which nothing was found.
     """
-    refused = np.flatnonzero(acceptance.refused_joints(trajectory)).tolist()
+    refused = np.flatnonzero(acceptance.refused_joints(trajectory, factor)).tolist()
     found: dict[int, tuple[Load, _Found]] = {}
     reasons: list[str] = []
-    for index, load in zip(refused, joint_loads(acceptance.robot, trajectory, refused), strict=True):
+    loads = joint_loads(acceptance.robot, trajectory, refused, factor)
+    for index, load in zip(refused, loads, strict=True):
         try:
             found[index] = load, find(acceptance.robot.joints[index], load)
         except ImpossibleError as error:
