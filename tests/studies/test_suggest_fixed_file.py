@@ -73,7 +73,9 @@ def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
     assert sorted(tmp_path.iterdir()) == sorted(paths)
     again = load_trajectory(paths[0], robot)
     assert again.name == trajectory.name
-    assert all("beyond its via points" in warning for warning in again.warnings)
+    # what was recorded is fitted again
+    expected = ("beyond its via points", "spline") if trajectory.estimates else ("beyond its via points",)
+    assert all(any(each in warning for each in expected) for warning in again.warnings), again.warnings
     before, after = (each.block(0, each.samples) for each in (trajectory, again))
     assert after.variables().keys() == before.variables().keys()
     for name, array in after.variables().items():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 
@@ -25,7 +26,7 @@ def complaints(*given, q=None, noise=0.0, time=TIME, method=None):
     missing = [None] * (4 - len(given))
     record = samples_of_arrays(POSITION, time, q, *given, *missing)
     named = Samples(**{**vars(record), "labels": ("base", "elbow")})
-    return [w for w in SampledProfile.of(named, method).warnings if "follow" in w]
+    return [w for w in SampledProfile.of(named, FitChoice(method)).warnings if "follow" in w]
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES
+from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, FitChoice
 from vsacli.trajectory.recorded.arrays import checked_array, samples_of_arrays
 from vsacli.trajectory.recorded.problems import time_problems, value_problems
 from vsacli.trajectory.recorded.samples import SampledProfile
@@ -26,7 +26,7 @@ def record(signal, time, *columns):
 
 
 def profile(signal, time, *columns):
-    return SampledProfile.of(record(signal, time, *columns), INTERPOLATE)
+    return SampledProfile.of(record(signal, time, *columns), FitChoice(INTERPOLATE))
 
 
 def uneven(count, seed=0):
@@ -222,7 +222,7 @@ def test_no_record_breaks_a_fit(seed, count, size, scale, spread, decimals, meth
     values = size * np.round(rng.normal(size=(count, 2)), decimals)
     samples = record(POSITION, time, values, size * rng.normal(size=(count, 2)))
     if not [*time_problems(time), *value_problems(samples)]:
-        found = SampledProfile.of(samples, method)
+        found = SampledProfile.of(samples, FitChoice(method))
         with np.errstate(over="ignore", invalid="ignore"):  # 1e99 in 1e-29 s, to the fourth power
             assert found.samples(0, count, samples.time).shape == (5, 2, count)
         assert found.breakpoints[[0, -1]].tolist() == samples.time[[0, -1]].tolist()

@@ -4,7 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from samples.remedies import pendulum
 
+from vsacli import load_trajectory
+from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
@@ -81,3 +84,39 @@ def test_factor_one_changes_nothing():
     same = trajectory.stretched(1.0)
     np.testing.assert_array_equal(same.block(0, 101).time, trajectory.block(0, 101).time)
     assert math.isclose(same.duration, trajectory.duration, rel_tol=0)
+
+
+@pytest.mark.parametrize("rate", ["", "rate: 50\n"])
+@pytest.mark.parametrize("source", ["formula", "record"])
+def test_slow_down_of_a_file_stretches_all_of_it(tmp_path, source, rate):
+    robot = pendulum()
+    time = 3.0 + np.linspace(0.0, 2.0, 101)
+    rows = np.stack([time, 0.3 * np.sin(time) + 1e-4 * np.random.default_rng(3).standard_normal(101)], axis=1)
+    np.savetxt(tmp_path / "swing.csv", rows, delimiter=",", header="time,swing.q", comments="", fmt="%.17g")
+    declared = {
+        "formula": "duration: 2\nposition: {type: polynomial, degree: 7, start: 0, end: 1}\n",
+        "record": "position: {type: csv, file: swing.csv, bandwidth: 5}\n",
+    }
+    text = f"format: vsacli-trajectory/1\nname: swing\n{rate}{declared[source]}"
+    text += "stiffness: {type: polynomial, degree: 5, start: 900, end: 950}\n"
+    (tmp_path / "as-it-is.yaml").write_text(text)
+    (tmp_path / "slower.yaml").write_text(text + "slow_down: 1.7\n")
+    expected = load_trajectory(tmp_path / "as-it-is.yaml", robot).stretched(1.7)
+    found = load_trajectory(tmp_path / "slower.yaml", robot)
+    assert found.samples == expected.samples
+    assert found.warnings == load_trajectory(tmp_path / "as-it-is.yaml", robot).warnings
+    for name, array in expected.block(0, expected.samples).variables().items():
+        np.testing.assert_array_equal(found.block(0, found.samples).variables()[name], array)
+
+
+@pytest.mark.parametrize(
+    ("factor", "problem"),
+    [("0", "slow_down: must be positive"), ("1e9", "duration times rate gives 1e\\+12 steps")],
+)
+def test_impossible_slow_downs_are_refused_with_their_line(tmp_path, factor, problem):
+    (tmp_path / "slower.yaml").write_text(
+        "format: vsacli-trajectory/1\nname: swing\nduration: 1\nposition: {type: constant, value: 0}\n"
+        f"stiffness: {{type: constant, value: 900}}\nslow_down: {factor}\n"
+    )
+    with pytest.raises(InputError, match=rf"slower.yaml:\d: .*{problem}"):
+        load_trajectory(tmp_path / "slower.yaml", pendulum())

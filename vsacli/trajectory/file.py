@@ -60,6 +60,12 @@ class TrajectoryFile:
         check=POSITIVE,
         default=None,
     )
+    slow_down: float = number(
+        units.DIMENSIONLESS,
+        "factor by which everything is passed more slowly than declared and recorded here",
+        check=POSITIVE,
+        default=1.0,
+    )
 
     untaken: ClassVar[tuple[Signal, ...]] = ()
     """Signals of devices that no joint of the robot has."""
@@ -110,7 +116,7 @@ class TrajectoryFile:
             yield FieldProblem((), "missing key 'duration' (s)")
         else:
             try:
-                _uniform_times(self.lasts, self.rate)
+                _uniform_times(self.lasts * self.slow_down, self.rate)
             except InputError as error:
                 yield FieldProblem(("duration",), str(error))
             else:
@@ -175,14 +181,10 @@ def load_trajectory(
     cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
     document, source = read_document(path, cls, FORMAT, joints.types, joints.exempt, changes)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
-    times = _times(document, recordings, source.path)
+    declared = _times(document, recordings, source.path)
     if recordings:
-        _check_lasting(document, times, source.path, joints.names)
-    first, last = times.span
-    profiles: dict[str, Profile] = {
-        signal.key: formula.over((0.0, last - first)) for signal, formula in document.formulas.items()
-    }
-    profiles |= {each.signal.key: each for recording in recordings for each in recording.profiles}
+        _check_lasting(document, declared, source.path, joints.names)
+    times, profiles = _slowed(document.slow_down, declared, _profiles(document, declared, recordings))
     wrench = document.declared.get(WRENCH)
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
     facts = Facts(robot, tuple(numbers(document, joints.types)), times, motion)
@@ -194,10 +196,10 @@ def load_trajectory(
         name=document.name,
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
-            *_warnings(document, times, joints),
+            *_warnings(document, declared, joints),
             *implausible(facts, source),
         ],
-        notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, times)],
+        notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, declared)],
         sources=[source, *(recording.source for recording in recordings)],
     )
     return _with_devices(trajectory, robot)
@@ -240,6 +242,20 @@ def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str)
             raise InputError.one(f"rate: {error}", file) from None
     assert document.lasts is not None, "see TrajectoryFile"
     return _uniform_times(document.lasts, document.rate)
+
+
+def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recording]) -> dict[str, Profile]:
+    """By the keys of their signals, over times as declared."""
+    first, last = times.span
+    formulas = {signal.key: each.over((0.0, last - first)) for signal, each in document.formulas.items()}
+    return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}
+
+
+def _slowed(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[Times, dict[str, Profile]]:
+    """All of it passed more slowly."""
+    if factor == 1:
+        return times, profiles
+    return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}
 
 
 def _uniform_times(duration: float, rate: float | None) -> UniformTimes:

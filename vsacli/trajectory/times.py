@@ -138,7 +138,7 @@ class RecordedTimes:
 
     def stretched(self, factor: float) -> RecordedTimes:
         """As many steps, further apart."""
-        return RecordedTimes(stretch(self.time, self.time[0], factor))
+        return RecordedTimes(stretch(self.time, self.time[0], factor), self.notes)
 
 
 def uniform_times_over(span: tuple[float, float], rate: float) -> RecordedTimes:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import STIFFNESS
+from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.texts import as_name
 from vsacli.trajectory.curves import ClosedForm
-from vsacli.trajectory.fits import INTERPOLATE
+from vsacli.trajectory.fits import INTERPOLATE, FitChoice
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
 from vsacli.trajectory.times import RecordedTimes, Times
 from vsacli.trajectory.trajectory import Trajectory
+
+NOTHING: Mapping[int, FloatArray] = MappingProxyType({})
+"""No change of any component."""
 
 
 def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]) -> Trajectory:
@@ -40,14 +45,42 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
             steps, (3, steps), N m/rad (N/m) per s^k.
     """
     time = trajectory.times.block(0, trajectory.samples)
-    stiffness = trajectory.commanded[STIFFNESS.key]
-    rows = stiffness.samples(0, trajectory.samples, time - trajectory.start).copy()
-    for joint, change in changes.items():
-        rows[:, joint] += change
+    stiffness = _at_steps(STIFFNESS, trajectory.commanded[STIFFNESS.key], trajectory, changes)
+    return _fixed(_with_records_at_steps(trajectory), RecordedTimes(time), stiffness)
+
+
+def _with_records_at_steps(trajectory: Trajectory) -> Trajectory:
+    """The same, but what was recorded at other times than the steps is known at the steps alone.
+
+    All that a file records has the same times, and the stiffness has those of the steps.
+    """
+    resampled = {signal for signal, estimate in trajectory.estimates.items() if estimate.resampled}
+
+    def known(signal: Signal, profile: Profile) -> Profile:
+        return _at_steps(signal, profile, trajectory) if signal in resampled else profile
+
+    wrench = trajectory.wrench
+    return Trajectory(
+        trajectory.times,
+        known(POSITION, trajectory.position),
+        {key: known(COMMANDED[key], profile) for key, profile in trajectory.commanded.items()},
+        wrench=wrench and replace(wrench, profile=known(WRENCH, wrench.profile)),
+        name=trajectory.name,
+    )
+
+
+def _at_steps(
+    signal: Signal, profile: Profile, trajectory: Trajectory, changes: Mapping[int, FloatArray] = NOTHING
+) -> SampledProfile:
+    """A signal recorded at the steps with all its derivatives, and something added to some components."""
+    time = trajectory.times.block(0, trajectory.samples)
+    rows = profile.samples(0, trajectory.samples, time - trajectory.start).copy()
+    for component, change in changes.items():
+        rows[:, component] += change
     values, *derivatives = rows
-    labels = tuple(f"column {joint}" for joint in range(len(values)))
-    samples = Samples.recorded(STIFFNESS, time, values, tuple(derivatives), labels)
-    return _fixed(trajectory, RecordedTimes(time), SampledProfile.of(samples, INTERPOLATE))
+    labels = tuple(f"column {component}" for component in range(len(values)))
+    samples = Samples.recorded(signal, time, values, tuple(derivatives), labels)
+    return SampledProfile.of(samples, FitChoice(INTERPOLATE))
 
 
 def _fixed(trajectory: Trajectory, times: Times, stiffness: Profile) -> Trajectory:

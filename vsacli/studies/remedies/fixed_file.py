@@ -10,6 +10,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
@@ -21,6 +22,7 @@ from vsacli.studies.remedies.formulas import formula
 from vsacli.studies.remedies.suggestions import Remedy
 from vsacli.trajectory.file import FORMAT
 from vsacli.trajectory.profile import Profile
+from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -55,11 +57,11 @@ def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
             fails.
     """
     document, table, robot = fixed_paths(path)
-    trajectory, names = remedy.trajectory, remedy.robot.joint_names
-    formulas = _formulas(trajectory)
-    recorded = [signal for signal, declared in formulas.items() if declared is None]
+    trajectory, names = remedy.declared, remedy.robot.joint_names
+    declared = _declared(trajectory, table.name)
+    recorded = [signal for signal, keys in declared.items() if keys["type"] == "csv"]
     contents: dict[Path, Callable[[TextIO], object]] = {
-        document: lambda file: file.writelines(_document(trajectory, formulas, table.name))
+        document: lambda file: file.writelines(_document(trajectory, remedy.factor, declared))
     }
     if recorded:
         contents[table] = lambda file: _write_table(trajectory, recorded, names, file)
@@ -70,8 +72,8 @@ def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
             write(stream)
 
 
-def _formulas(trajectory: Trajectory) -> dict[Signal, dict[str, Any] | None]:
-    """How each signal is declared; None for those that are recorded, whose table has the times."""
+def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]]:
+    """The keys and values that declare each signal; those without a formula are recorded in the table."""
     profiles: dict[Signal, Profile] = {POSITION: trajectory.position}
     chosen = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
     profiles |= {COMMANDED[key]: trajectory.commanded[key] for key in chosen}
@@ -79,24 +81,42 @@ def _formulas(trajectory: Trajectory) -> dict[Signal, dict[str, Any] | None]:
         profiles[WRENCH] = trajectory.wrench.profile
     formulas = {signal: formula(profile) for signal, profile in profiles.items()}
     if None not in formulas.values() and not isinstance(trajectory.times, UniformTimes):
-        formulas[POSITION] = None
-    return formulas
+        formulas[POSITION] = None  # the table has the times
+    declared = {
+        signal: {"type": "csv", "file": table, **_choice(profiles[signal].estimate)} if keys is None else keys
+        for signal, keys in formulas.items()
+    }
+    if trajectory.wrench is not None:
+        declared[WRENCH]["frame"] = trajectory.wrench.frame
+    return declared
+
+
+def _choice(estimate: SampledProfile | None) -> dict[str, Any]:
+    """What was said of the fit of a record."""
+    if estimate is None:
+        return {}
+    chosen = estimate.choice
+    noise = None if chosen.noise is None else list(chosen.noise)
+    said = {"fit": chosen.method, "noise": noise, "bandwidth": chosen.bandwidth}
+    return {key: value for key, value in said.items() if value is not None}
 
 
 def _document(
-    trajectory: Trajectory, formulas: Mapping[Signal, dict[str, Any] | None], table: str
+    trajectory: Trajectory, factor: float, declared: Mapping[Signal, dict[str, Any]]
 ) -> Iterator[str]:
     """Lines of the trajectory file."""
     yield f"format: {FORMAT}\n"
     yield f"name: {for_yaml(trajectory.name)}\n"
-    if None not in formulas.values():
-        assert isinstance(trajectory.times, UniformTimes), "see _formulas"
+    if factor != 1:
+        yield f"slow_down: {factor!r}\n"
+    if isinstance(trajectory.times, UniformTimes) and not any(
+        keys["type"] == "csv" for keys in declared.values()
+    ):
         yield f"duration: {trajectory.times.duration!r}\nrate: {trajectory.times.rate!r}\n"
-    for signal, declared in formulas.items():
-        content = {"type": "csv", "file": table} if declared is None else declared
-        if signal is WRENCH and trajectory.wrench is not None:
-            content = {**content, "frame": trajectory.wrench.frame}
-        yield f"{signal.key}: {_in_one_line(content)}\n"
+    if any(estimate.resampled for estimate in trajectory.estimates.values()):
+        yield f"rate: {(trajectory.samples - 1) / trajectory.duration!r}\n"
+    for signal, keys in declared.items():
+        yield f"{signal.key}: {_in_one_line(keys)}\n"
 
 
 def _in_one_line(content: Any) -> str:
@@ -114,17 +134,29 @@ def _in_one_line(content: Any) -> str:
 def _write_table(
     trajectory: Trajectory, recorded: Sequence[Signal], joint_names: Sequence[str], stream: TextIO
 ) -> None:
-    names = [name for signal in recorded for name in signal.names]
+    """Records that were fitted, as they were; of other signals value and derivatives at the steps."""
+    records = {signal: each.record.columns for signal, each in trajectory.estimates.items()}
+    names = [name for signal in recorded for name in records.get(signal, signal.names)]
+    raw = {name: rows for columns in records.values() for name, rows in columns.items()}
     chosen = {name: trajectory.chosen(key) for key in trajectory.commanded for name in COMMANDED[key].names}
     headers = [np.array(_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *np.concatenate(headers).tolist()])
-    samples = usual_block(len(joint_names))
-    for start in range(0, trajectory.samples, samples):
-        motion = trajectory.block(start, start + samples)
-        variables = motion.variables()
-        columns = [motion.time[:, None], *(variables[name][:, chosen.get(name, ...)] for name in names)]
-        writer.writerows(np.concatenate(columns, axis=1).tolist())
+    stamps, samples = _stamps(trajectory), usual_block(len(joint_names))
+    for start in range(0, len(stamps), samples):
+        part = slice(start, start + samples)
+        computed = trajectory.block(start, start + samples).variables() if set(names) - set(raw) else {}
+        rows = (raw[name][:, part].T if name in raw else computed[name] for name in names)
+        columns = [each[:, chosen.get(name, ...)] for name, each in zip(names, rows, strict=True)]
+        writer.writerows(np.concatenate([stamps[part, None], *columns], axis=1).tolist())
+
+
+def _stamps(trajectory: Trajectory) -> FloatArray:
+    """The times of what is recorded: those of the steps, or of a record if these differ."""
+    for estimate in trajectory.estimates.values():
+        if estimate.resampled:
+            return estimate.record.start + estimate.record.time
+    return trajectory.times.block(0, trajectory.samples)
 
 
 def _columns(name: str, joint_names: Sequence[str]) -> list[str]:

@@ -140,12 +140,14 @@ class Remedy(Published):
         size: root of the sum of the squares of all relative changes: the factor of the slow-down less 1, and
             of each joint the root mean square of its change of stiffness over that of its stiffness.
         robot: with another preload, if that is among the changes.
-        trajectory: with the changes.
+        declared: the trajectory with the changes, but for the factor by which it is passed more slowly.
+        factor: this factor; formulas are stretched already, see `Task`.
     """
 
     size: float
     robot: Robot = field(repr=False, compare=False)
-    trajectory: Trajectory = field(repr=False, compare=False)
+    declared: Trajectory = field(repr=False, compare=False)
+    factor: float = field(default=1.0, repr=False, compare=False, kw_only=True)
     slow_down: SlowDown | None = None
     stiffness_offset: StiffnessOffset | None = None
     stiffness_profile: StiffnessProfile | None = None
@@ -153,6 +155,11 @@ class Remedy(Published):
 
     PARTS: ClassVar = ("slow_down", "preload", "stiffness_offset", "stiffness_profile")
     shape: ClassVar = {"size": "size", **{f"{part}?": part for part in PARTS}, "text": "sentence"}
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """What the robot is to do."""
+        return self.declared if self.factor == 1 else self.declared.stretched(self.factor)
 
     @property
     def longer(self) -> float:

@@ -11,8 +11,9 @@ from typing import TypeVar
 import numpy as np
 
 from vsacli.analysis.run import Run
+from vsacli.base import units
 from vsacli.base.arrays import FloatArray
-from vsacli.base.units import STIFFNESS
+from vsacli.base.signals import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads
@@ -62,14 +63,16 @@ class Task:
     def with_constants(self, found: Combination) -> Remedy:
         """The remedy of a combination whose changes of stiffness are constants."""
         offsets = tuple(
-            Offset(joint.name, found.constants.get(index, 0.0), STIFFNESS.unit(joint.type))
+            Offset(joint.name, found.constants.get(index, 0.0), units.STIFFNESS.unit(joint.type))
             for index, joint in enumerate(self.acceptance.robot.joints)
             if "stiffness" in joint.actuator.commanded
         )
+        stretched, factor = self._stretched(found.factor)
         return Remedy(
             size=found.size,
             robot=found.robot(self.acceptance.robot),
-            trajectory=with_raised_stiffness(self.trajectory.stretched(found.factor), found.constants),
+            declared=with_raised_stiffness(stretched, found.constants),
+            factor=factor,
             slow_down=self._slow_down(found),
             preload=self._preload(found),
             stiffness_offset=StiffnessOffset(offsets) if found.changes else None,
@@ -86,16 +89,28 @@ class Task:
         find = partial(_nearest_change, acceptance)
         changes = for_refused_joints(acceptance, slower, find, found.factor)
         summaries = tuple(_summary(robot.joints[index], change) for index, (_, change) in changes.items())
+        stretched, factor = self._stretched(found.factor)
+        scale = factor ** np.arange(STIFFNESS.orders)[:, None]
+        at_steps = {index: scale * change.rows[:, STEPS] for index, (_, change) in changes.items()}
         return Remedy(
             size=self._size(found.factor, [(load, change.rows[0]) for load, change in changes.values()]),
             robot=robot,
-            trajectory=with_changed_stiffness(
-                slower, {index: change.rows[:, STEPS] for index, (_, change) in changes.items()}
-            ),
+            declared=with_changed_stiffness(stretched, at_steps),
+            factor=factor,
             slow_down=self._slow_down(found),
             preload=self._preload(found),
             stiffness_profile=StiffnessProfile(summaries) if summaries else None,
         )
+
+    def _stretched(self, factor: float) -> tuple[Trajectory, float]:
+        """The trajectory passed more slowly by a factor, and by which factor it is still to be stretched.
+
+        A record is stretched after its fit only: that of slower samples could be another one, hum of mains at
+        other frequencies for example.
+        """
+        if self.trajectory.estimates:
+            return self.trajectory, factor
+        return self.trajectory.stretched(factor), 1.0
 
     def constants(self) -> Combination:
         """The smallest constant changes of stiffness that mend the task by themselves.
@@ -184,5 +199,5 @@ def _summary(joint: Joint, change: Change) -> JointChange:
         largest=float(change.rows[0, largest]),
         time=float(change.time[largest]),
         rms=change.rms,
-        unit=STIFFNESS.unit(joint.type),
+        unit=units.STIFFNESS.unit(joint.type),
     )

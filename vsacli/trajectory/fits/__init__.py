@@ -3,6 +3,7 @@
 from vsacli.trajectory.fits.fit import Fit
 from vsacli.trajectory.fits.given import mismatches
 from vsacli.trajectory.fits.selection import (
+    AS_IT_ASKS_FOR,
     INTERPOLATE,
     LEAST_SQUARES,
     METHODS,
@@ -12,6 +13,7 @@ from vsacli.trajectory.fits.selection import (
 )
 
 __all__ = [
+    "AS_IT_ASKS_FOR",
     "INTERPOLATE",
     "LEAST_SQUARES",
     "METHODS",

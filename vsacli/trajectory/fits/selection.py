@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,6 +42,13 @@ class FitChoice:
         """The noise, NaN where it is estimated."""
         return None if self.noise is None else np.array(self.noise, dtype=np.float64)
 
+    def stretched(self, factor: float) -> FitChoice:
+        """That of the same course, slower by a factor."""
+        return replace(self, bandwidth=None if self.bandwidth is None else self.bandwidth / factor)
+
+
+AS_IT_ASKS_FOR = FitChoice()
+"""Nothing is said: the noise of the samples decides."""
 
 INTERPOLATION_GAIN = {7: (1.0, 1.481, 4.628, 6.957, 37.415), 5: (1.0, 1.376, 4.798)}
 """By degree, for each derivative k: standard deviation at the samples, times step^k, of a spline through

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import Signal
-from vsacli.trajectory.fits import METHODS
+from vsacli.trajectory.fits import METHODS, FitChoice
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health
 from vsacli.trajectory.recorded.problems import time_problems, value_problems
@@ -39,7 +39,7 @@ def profiles_of_arrays(
     if problems:
         raise InputError(Problem("", 0, str(problem)) for problem in problems)
     warnings = tuple(map(str, health(times, records)))
-    profiles = {record.signal.key: SampledProfile.of(record, fit) for record in records}
+    profiles = {record.signal.key: SampledProfile.of(record, FitChoice(fit)) for record in records}
     return RecordedTimes(times, rounding_notes(times)), profiles, warnings
 
 

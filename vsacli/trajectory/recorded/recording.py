@@ -19,7 +19,7 @@ from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.robot.commanded_joints import CommandedJoints, takers
-from vsacli.trajectory.fits import FitChoice
+from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
 from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
@@ -100,7 +100,7 @@ def read_recording(
     if wanted is None:
         devices = (signal for signal in COMMANDED.values() if signal.device is not None)
         signals += tuple(each for each in devices if layout.quantities.get(each.key))
-        wanted = dict.fromkeys(signals, FitChoice())
+        wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR)
     time = _si(table, layout.time)
     records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
     turns = list(_unwrapped(records, joints)) if unwrap else []
@@ -116,19 +116,11 @@ def read_recording(
     notes = tuple(f"{file}: {clause}" for clause in (*turns, *_unused(layout, signals)))
     source, lines = table.source, table.lines
     del table  # as large as the records, which may be fitted now
-    profiles = tuple(_profile(each, wanted[each.signal], progress, resampled=resampled) for each in records)
-    return Recording(RecordedTimes(time, rounding_notes(time)), profiles, warnings, notes, source, lines)
-
-
-def _profile(record: Samples, chosen: FitChoice, progress: Progress, *, resampled: bool) -> SampledProfile:
-    return SampledProfile.of(
-        record,
-        chosen.method,
-        noise=chosen.deviations,
-        bandwidth=chosen.bandwidth,
-        resampled=resampled,
-        progress=progress,
+    profiles = tuple(
+        SampledProfile.of(each, wanted[each.signal], resampled=resampled, progress=progress)
+        for each in records
     )
+    return Recording(RecordedTimes(time, rounding_notes(time)), profiles, warnings, notes, source, lines)
 
 
 def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:

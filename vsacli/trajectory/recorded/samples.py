@@ -12,7 +12,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import Signal
-from vsacli.trajectory.fits import Fit, fit_samples, mismatches
+from vsacli.trajectory.fits import AS_IT_ASKS_FOR, Fit, FitChoice, fit_samples, mismatches
 from vsacli.trajectory.fits.bounds import Unresolved, unresolved, vibrations
 from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
@@ -76,6 +76,12 @@ class Samples:
         pairs = zip(self.signal.names[1:], self.derivatives, strict=True)
         return tuple(name for name, given in pairs if given is None)
 
+    @property
+    def columns(self) -> dict[str, FloatArray]:
+        """Values and given derivatives by their names, (components, samples)."""
+        pairs = zip(self.signal.names, (self.values, *self.derivatives), strict=True)
+        return {name: rows for name, rows in pairs if rows is not None}
+
     def warnings(self, fit: Fit, *, resampled: bool) -> Iterator[str]:
         """Which numbers at the steps are estimates, and which given derivatives do not follow."""
         value, *names = self.signal.names
@@ -104,12 +110,14 @@ class SampledProfile:
     Attributes:
         record: what was recorded.
         fit: of the values.
+        choice: what was said of the fit.
         resampled: whether the steps are not the recorded times; only the fit counts then.
         warnings: which numbers are estimates, and given derivatives that do not follow from the values.
     """
 
     record: Samples
     fit: Fit
+    choice: FitChoice = AS_IT_ASKS_FOR
     resampled: bool = False
     warnings: tuple[str, ...] = ()
 
@@ -117,10 +125,8 @@ class SampledProfile:
     def of(
         cls,
         record: Samples,
-        method: str | None = None,
+        choice: FitChoice = AS_IT_ASKS_FOR,
         *,
-        noise: FloatArray | None = None,
-        bandwidth: float | None = None,
         resampled: bool = False,
         progress: Progress = unseen,
     ) -> SampledProfile:
@@ -128,9 +134,7 @@ class SampledProfile:
 
         Args:
             record: the samples.
-            method: "lsq", "interpolate", "smooth", or None to decide by their noise; see `fit_samples`.
-            noise: standard deviation of the samples of each component, if it is known, likewise.
-            bandwidth: above which there is no motion, Hz, likewise.
+            choice: what is said of the fit; see `fit_samples`.
             resampled: whether the steps are not the recorded times.
             progress: opens a bar over the samples of all components.
         """
@@ -143,13 +147,13 @@ class SampledProfile:
                 record.values,
                 signal.spline_degree,
                 signal.orders - 1,
-                method,
-                noise=noise,
-                bandwidth=bandwidth,
+                choice.method,
+                noise=choice.deviations,
+                bandwidth=choice.bandwidth,
                 progress=progress,
             )
             warnings = tuple(record.warnings(fit, resampled=resampled))
-        return cls(record=record, fit=fit, resampled=resampled, warnings=warnings)
+        return cls(record=record, fit=fit, choice=choice, resampled=resampled, warnings=warnings)
 
     @property
     def signal(self) -> Signal:
@@ -254,4 +258,9 @@ class SampledProfile:
 
     def stretched(self, factor: float) -> SampledProfile:
         """The same profile, slower by a factor; the warnings are those about the record."""
-        return replace(self, record=self.record.stretched(factor), fit=self.fit.stretched(factor))
+        return replace(
+            self,
+            record=self.record.stretched(factor),
+            fit=self.fit.stretched(factor),
+            choice=self.choice.stretched(factor),
+        )

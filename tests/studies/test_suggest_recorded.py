@@ -1,0 +1,112 @@
+"""Suggestions for recorded motions: limits count as in a run, and the files keep the record."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samples.marks import slow
+from samples.remedies import pendulum, written
+
+from vsacli import Robot, Trajectory, inverse_dynamics, load_trajectory, suggest
+from vsacli.robot.joint import Limits
+from vsacli.studies.remedies import Remedy
+from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
+
+VARIABLES = {"max_torque": "tau_motor", "max_velocity": "dtheta", "position": "q", "velocity": "dq"}
+"""What limits bound."""
+
+NOISE = 2e-4
+"""Standard deviation of the samples, rad."""
+
+SEEDS, QUICK = 20, (2, 3)
+STEP = 1e-4
+"""The grid of factors."""
+
+
+def recorded_swing(seed: int) -> Trajectory:
+    """Two sines in white noise, 2 s at 200 Hz."""
+    rng, time = np.random.default_rng(seed), np.linspace(0.0, 2.0, 401)
+    rate = 2 * np.pi * rng.uniform(0.5, 0.9)
+    swing = 0.4 * np.sin(rate * time + rng.uniform(0, 6)) + 0.15 * np.sin(2 * rate * time)
+    q = swing + NOISE * rng.standard_normal(len(time))
+    return Trajectory.from_samples(time + 5.0, q[:, None], np.full((len(time), 1), 1500.0), name="swing")
+
+
+def limited(robot: Robot, trajectory: Trajectory, limit: str, deviations: float) -> Robot:
+    """With a limit that the motion exceeds by some standard deviations."""
+    result, name = inverse_dynamics(robot, trajectory), VARIABLES[limit]
+    sizes = np.abs(getattr(result, name))
+    worst = np.unravel_index(sizes.argmax(), sizes.shape)
+    bound = float(sizes[worst] - deviations * getattr(result, f"{name}_std")[worst])
+    (joint,) = robot.joints
+    if limit.startswith("max"):
+        motors = tuple(dataclasses.replace(motor, **{limit: bound}) for motor in joint.actuator.motor)
+        joint = dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, motor=motors))
+    else:
+        joint = dataclasses.replace(joint, limits=Limits(**{limit: (-bound, bound)}))
+    return dataclasses.replace(robot, joints=(joint,))
+
+
+def check_file(remedy: Remedy, path: Path) -> None:
+    """What is written is what was confirmed, with its uncertainty, and runs clean."""
+    again = load_trajectory(written(remedy, path)[0], remedy.robot)
+    before, after = (each.block(0, each.samples).variables() for each in (remedy.trajectory, again))
+    for name, array in before.items():
+        np.testing.assert_array_equal(after[name], array)
+    result = inverse_dynamics(remedy.robot, again)
+    assert result.report.verdict == "ok"
+    assert result.tau_motor_std.max() > 0
+
+
+@pytest.mark.parametrize("seed", [seed if seed in QUICK else slow(seed) for seed in range(SEEDS)])
+def test_what_a_run_calls_ok_needs_no_remedy_and_remedies_are_ok_in_a_run(tmp_path: Path, seed: int) -> None:
+    trajectory, limit = recorded_swing(seed), list(VARIABLES)[seed % len(VARIABLES)]
+    within = limited(pendulum(), trajectory, limit, 1.9)
+    assert inverse_dynamics(within, trajectory).report.verdict == "ok"
+    assert suggest(within, trajectory).slow_down is None
+    beyond = limited(pendulum(), trajectory, limit, 2.5)
+    assert inverse_dynamics(beyond, trajectory).report.verdict == "over_limit"
+    suggestions = suggest(beyond, trajectory)
+    assert bool(suggestions.remedies) == (limit != "position")
+    for number, remedy in enumerate(suggestions.remedies):
+        check_file(remedy, tmp_path / f"fixed-{number}.yaml")
+    for remedy in suggestions.remedies:
+        if remedy.kinds == {"slow_down"}:  # and not more than is needed
+            faster = trajectory.stretched(remedy.slow_down.factor - STEP)
+            assert inverse_dynamics(beyond, faster).report.verdict == "over_limit"
+
+
+def test_a_limit_within_the_noise_keeps_nothing_else_from_being_mended(tmp_path: Path) -> None:
+    trajectory = recorded_swing(1)
+    robot = limited(limited(pendulum(), trajectory, "position", 1.5), trajectory, "max_torque", 100.0)
+    remedies = suggest(robot, trajectory).remedies
+    assert {"slow_down"} in [remedy.kinds for remedy in remedies]
+    for number, remedy in enumerate(remedies):
+        check_file(remedy, tmp_path / f"fixed-{number}.yaml")
+
+
+@pytest.mark.parametrize("reshaped", [False, True])
+def test_records_with_steps_of_their_own_are_written_so_that_they_read_back(
+    tmp_path: Path, reshaped: bool
+) -> None:
+    robot, time = pendulum(), 5.0 + np.linspace(0.0, 2.0, 201)
+    q = 0.4 * np.sin(3 * time) + NOISE * np.random.default_rng(1).standard_normal(len(time))
+    table = np.stack([time, q], axis=1)
+    np.savetxt(tmp_path / "q.csv", table, delimiter=",", header="time,swing.q", comments="", fmt="%.17g")
+    (tmp_path / "swing.yaml").write_text(
+        "format: vsacli-trajectory/1\nname: swing\nrate: 150\n"
+        f"position: {{type: csv, file: q.csv, noise: {NOISE}, fit: smooth}}\n"
+        "stiffness: {type: constant, value: 1500}\n"
+    )
+    trajectory = load_trajectory(tmp_path / "swing.yaml", robot)
+    rows = np.linspace(0.0, 1.0, 3)[:, None] * np.ones(trajectory.samples)
+    fixed = with_changed_stiffness(trajectory, {0: rows}) if reshaped else trajectory
+    path, _ = written(Remedy(0.0, robot, fixed, factor=1.2), tmp_path / "fixed.yaml")
+    again, fixed = load_trajectory(path, robot), fixed.stretched(1.2)
+    assert bool(again.estimates) != reshaped
+    assert again.samples == fixed.samples == trajectory.samples
+    for name, array in fixed.block(0, fixed.samples).variables().items():
+        np.testing.assert_allclose(again.block(0, again.samples).variables()[name], array, rtol=1e-12)
