@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from samples.computed_signals import computed_signals
 from samples.marks import slow_but
-from samples.shipped import shipped_run
 
-from vsacli import inverse_dynamics
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
 from vsacli.studies.identification.motor_equations import motor_equations, motor_names
-from vsacli.studies.identification.signals import Filter, Signals
 from vsacli.studies.identification.unknowns import unknowns
 
 RUNS = {
@@ -26,16 +22,6 @@ RUNS = {
     **{name: name for name in ("awas_1r", "cam_1r", "shifted_cams_1r")},
 }
 """Trajectories by robot: every law and kind of actuator whose numbers stand in the file, and friction."""
-
-
-def computed_signals(robot: str, trajectory: str) -> tuple[Robot, Signals]:
-    """A motion with the torques that inverse dynamics gives, in place of a record."""
-    loaded, motion = shipped_run(robot, trajectory)
-    run = inverse_dynamics(loaded, motion)
-    names = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta", "tau_motor")
-    rate = (len(run.time) - 1) / float(run.time[-1])
-    arrays: list[FloatArray] = [getattr(run, name) for name in names]
-    return loaded, Signals(*arrays, rate=rate, filter=Filter.low_pass(rate / 20, rate))
 
 
 @pytest.mark.parametrize(

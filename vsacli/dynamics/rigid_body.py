@@ -168,11 +168,14 @@ def chain_of(robot: Robot, frame: str | None = None) -> Chain:
         robot: whose base and tool count, but neither its actuators nor its dampers.
         frame: of the wrench at the end effector, as in `Wrench`; None if there is none.
     """
-    bare: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
-    joints = tuple(replace(joint, **bare) for joint in robot.joints)
-    return _recorded(
-        Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints), frame
-    )
+    return _recorded(bare(robot), frame)
+
+
+def bare(robot: Robot) -> Robot:
+    """Its links and joints alone: equal for robots that differ in what drives them."""
+    nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
+    joints = tuple(replace(joint, **nothing) for joint in robot.joints)
+    return Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints)
 
 
 _ANY_DRIVE: Any = Rigid(motor=Motor(inertia=1.0))

@@ -50,6 +50,11 @@ class BaseParameters(NamedTuple):
         values: FloatArray = parameters @ self.shares.T
         return values
 
+    def names(self, names: Sequence[str]) -> list[str]:
+        """That of the parameter that each begins with; with a star if others are regrouped into it."""
+        alone = np.count_nonzero(self.shares, axis=1) == 1
+        return [f"{names[at]}{'' if one else '*'}" for at, one in zip(self.kept, alone, strict=True)]
+
     def words(self, place: int, names: Sequence[str]) -> str:
         """What one is the sum of, e.g. `shoulder.Izz + 0.09 elbow.m`."""
         first, factors = int(self.kept[place]), self.shares[place]

@@ -35,7 +35,7 @@ def motor_equations(
     """
     present = [each._replace(value=float(value)) for each, value in zip(unknowns, values, strict=True)]
     carrying = apart(seeded(robot, present).joints[index]).actuator
-    motion = _motion(signals, index, len(unknowns))
+    motion = joint_motion(signals, index, len(unknowns))
     with np.errstate(all="ignore"):  # numbers far off, from which the search comes back
         torques = predicted_torques(carrying, motion)
     slopes = tangent_of(torques, len(unknowns), np.shape(value_of(torques)))
@@ -73,7 +73,7 @@ def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
     return tuple(f"motor {number} of {joint.name}" for number, _ in enumerate(joint.actuator.motors, 1))
 
 
-def _motion(signals: Signals, index: int, directions: int) -> dict[str, Any]:
+def joint_motion(signals: Signals, index: int, directions: int) -> dict[str, Any]:
     """Motion of a joint and its motors, samples last, ready to carry derivatives by numbers of the robot."""
     return dict(_carrying(_arrays(signals, index), directions))
 
@@ -82,6 +82,8 @@ def _arrays(signals: Signals, index: int) -> dict[str, FloatArray]:
     q, theta = signals.q[:, index], signals.theta[:, index].T
     return {
         "q": q,
+        "dq": signals.dq[:, index],
+        "ddq": signals.ddq[:, index],
         "theta": theta,
         "phi": theta - q,
         "dtheta": signals.dtheta[:, index].T,

@@ -11,6 +11,7 @@ from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import ZERO, Scalar, SymmetricTensor, Vector, sub
 from vsacli.dynamics.elastic_torques import joint_state, link_constants
 from vsacli.dynamics.recursion import LinkConstants, TorqueDerivatives, recursion
+from vsacli.dynamics.rigid_body import bare
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot
@@ -102,6 +103,6 @@ def regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> F
     Returns:
         Y, (joints, 10 joints, samples), N m (N) per kg, kg m, kg m^2.
     """
-    kernel = Regressor(robot)
+    kernel = Regressor(bare(robot))
     rows = kernel.arguments.pack({"q": by_joint(q), "dq": by_joint(dq), "ddq": by_joint(ddq)})
     return kernel.results.arrays(TracedEngine().run(kernel, rows))["Y"]

@@ -1,0 +1,74 @@
+"""Equations of links: they hold on what inverse dynamics computes, and give back its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from samples.computed_signals import computed_signals
+from samples.marks import slow_but
+
+from vsacli.studies.identification.least_squares import least_squares
+from vsacli.studies.identification.link_equations import LinkUnknowns, link_equations
+from vsacli.studies.identification.unknowns import FRICTION, MOTORS, SPRINGS, unknowns
+
+RUNS = {
+    "coupled_1r": "coupled_1r",
+    "maccepa_1r": "maccepa_1r",
+    "mixed_3r": "mixed_3r",
+    "puma_560": "puma_560",
+    "qbmove_arm_manual": "qbmove_arm",
+    "rp_2": "rp_2",
+    "vsa_3r": "vsa_3r_excitation",
+}
+"""Trajectories by robot: rigid, elastic, antagonistic and serial drives, a slide, friction of links."""
+
+
+@pytest.mark.parametrize("robot", slow_but(("mixed_3r", "puma_560", "rp_2"), RUNS))
+def test_equations_of_links_hold_and_their_slopes_are_derivatives(robot: str) -> None:
+    loaded, signals = computed_signals(robot, RUNS[robot])
+    sought = LinkUnknowns.of(loaded, (MOTORS, FRICTION))
+    found = link_equations(loaded, sought, signals)
+    assert set(found.group) == {f"link of {joint.name}" for joint in loaded.joints}
+    assert found.predicted == pytest.approx(found.measured, abs=1e-12 * np.abs(found.measured).max())
+    for place, number in enumerate(sought.numbers, len(sought.base.kept)):
+        step = 0.1 * number.value or 1.0  # they are linear, so that it may be large
+        moved = tuple(each._replace(value=each.value + step * (each is number)) for each in sought.numbers)
+        other = link_equations(loaded, sought._replace(numbers=moved), signals)
+        slope = (other.predicted - found.predicted) / step
+        size = np.abs(found.predicted).max() / step
+        assert slope == pytest.approx(found.slopes[:, place], abs=1e-11 * size)  # rounding
+
+
+def test_a_periodic_excitation_tells_all_base_parameters_of_the_papers_arm() -> None:
+    robot, signals = computed_signals("vsa_3r", "vsa_3r_excitation")
+    sought = LinkUnknowns.of(robot, ())
+    elsewhere = sought._replace(present=sought.present + 0.1)
+    found = link_equations(robot, sought, signals)
+    equations = found._replace(predicted=found.slopes @ elsewhere.present)
+    fit = least_squares([equations], elsewhere.present)
+    assert not fit.inseparable
+    assert fit.values == pytest.approx(sought.present, abs=1e-9)  # condition 33
+
+
+def test_what_springs_carry_changes_with_their_numbers() -> None:
+    robot, signals = computed_signals("vsa_3r", "vsa_3r_excitation")
+    sought = LinkUnknowns.of(robot, ())
+    given = [each for index in range(3) for each in unknowns(robot, index, (SPRINGS,))]
+    slopes = link_equations(robot, sought, signals, given).of_given
+    assert slopes is not None
+    for place, each in enumerate(given):
+        step = 1e-3 * each.value
+        moved = (
+            link_equations(robot.replace(str(each), each.value + sign * step), sought, signals).measured
+            for sign in (1, -1)
+        )
+        ahead, behind = moved
+        assert (ahead - behind) / (2 * step) == pytest.approx(slopes[:, place], rel=1e-9, abs=1e-12)
+
+
+def test_a_motion_from_rest_to_rest_leaves_combinations() -> None:
+    robot, signals = computed_signals("vsa_3r", "rest_to_rest")
+    sought = LinkUnknowns.of(robot, ())
+    fit = least_squares([link_equations(robot, sought, signals)], sought.present)
+    words = [each.words(sought.names) for each in fit.inseparable]
+    assert any("elbow.Iyz" in each and "elbow.Izz*" in each for each in words)
