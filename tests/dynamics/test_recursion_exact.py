@@ -19,7 +19,8 @@ from oracles.rational import random_chain, random_contact
 
 from vsacli.compute.vector import SymmetricTensor, Vector
 from vsacli.dynamics import recursion as recursion_module
-from vsacli.dynamics.recursion import JointState, LinkConstants, TipLoad, recursion
+from vsacli.dynamics.chain import JointState, LinkConstants, TipLoad
+from vsacli.dynamics.recursion import recursion
 
 type_chains = pytest.mark.parametrize("types", ["R", "P", "RR", "RP", "PR", "PP", "RPR", "RRP"])
 contacts = pytest.mark.parametrize(

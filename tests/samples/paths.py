@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from vsacli.dynamics.chain import JointState
 from vsacli.dynamics.elastic_torques import link_constants, tip_load
-from vsacli.dynamics.recursion import JointState, recursion
+from vsacli.dynamics.recursion import recursion
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot

@@ -23,7 +23,7 @@ from vsacli.dynamics.elastic_torques import joint_state, link_constants, link_to
 from vsacli.dynamics.recursion import recursion
 from vsacli.robot.kinematics import base_gravity
 from vsacli.studies.sensitivities.drive_derivatives import drive_derivatives
-from vsacli.studies.sensitivities.link_derivatives import batches, torque_derivatives
+from vsacli.studies.sensitivities.link_derivatives import torque_slopes
 from vsacli.studies.sensitivities.parameters import parameters
 from vsacli.studies.sensitivities.sensitivity_run import SensitivityRun
 
@@ -55,8 +55,9 @@ def test_torques_of_links_by_every_number(name):
     robot = robot.replace("joints.*.damping", 0.2)
     motion, chosen = samples_of(trajectory, 12), parameters(robot)
     scale = np.abs(torques(robot, motion)).max(axis=(0, 2))[:, None]
-    for places in batches(chosen):
-        found = torque_derivatives(robot, motion, [chosen[place] for place in places])
+    seen = []
+    for places, found in torque_slopes(robot, motion, chosen):
+        seen += places
         for at, place in enumerate(places):
             each = chosen[place]
             size = max(abs(each.value), 0.1)
@@ -70,6 +71,7 @@ def test_torques_of_links_by_every_number(name):
                 exact = np.zeros_like(expected[joint]) if of_joint is None else of_joint[at]
                 assert np.abs(exact - expected[joint]).max(initial=0) * size < 1e-10 * scale.max(), str(each)
                 assert (np.abs(exact - expected[joint]) * size < 1e-10 * scale).all(), str(each)
+    assert sorted(seen) == list(range(len(chosen)))
 
 
 def test_inertial_numbers_by_complex_steps():
@@ -81,7 +83,8 @@ def test_inertial_numbers_by_complex_steps():
     ]
     links = [link_constants(joint) for joint in robot.joints]
     chosen = [each for each in parameters(robot, ["joints.*.link.*"]) if each.joint == 3]
-    found = torque_derivatives(robot, motion, chosen)
+    ((places, found),) = torque_slopes(robot, motion, chosen)
+    assert places == list(range(len(chosen)))
     for at in range(10):
         values = [links[3].mass, *links[3].com, *links[3].inertia]
         values = [complex(value, 1e-30 * (number == at)) for number, value in enumerate(values)]

@@ -1,14 +1,15 @@
 """Dual numbers: arrays that carry their derivatives along, so that the text of a computation differentiates.
 
 Forward mode of automatic differentiation (Griewank & Walther, Evaluating Derivatives, 2nd ed., chapter 3):
-each function of NumPy's that a kernel uses is applied to the values, and its derivative to the tangents. What
-does not depend on a parameter stays an ordinary array and costs nothing more. Derivatives are exact to
-rounding. Choices (`np.where`, comparisons, `np.maximum`) are made by the values.
+each function of NumPy's that a kernel uses is applied to the values, and its derivative to the tangents. A
+number keeps the tangents alone of those parameters that it depends on, so that one run carries all of them
+and costs what each of them changes. Derivatives are exact to rounding. Choices (`np.where`, comparisons,
+`np.maximum`) are made by the values.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,19 +17,28 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.control_flow import cell_of, cell_on
+from vsacli.compute.vector import Scalar, add, exact, mul, sub, trigonometric, trigonometric_of
+
+Tangents = Mapping[int, Any]
+"""Derivatives by direction, arrays that spread to the shape of the value; in other directions it is zero."""
 
 
 class Dual(NDArrayOperatorsMixin):
     """Values and their derivatives in some directions, by the protocols of NumPy (NEP 13 and 18).
 
     Attributes:
-        value: the values, of any shape.
-        tangent: their derivatives, (directions, *shape of the values).
+        value: the values, of any shape; exact constants of `compute.vector` fold.
+        tangents: their derivatives by direction.
     """
 
-    def __init__(self, value: Any, tangent: FloatArray) -> None:
-        self.value = np.asarray(value, dtype=float)
-        self.tangent = tangent
+    def __init__(self, value: Any, tangents: Tangents) -> None:
+        self.value = value
+        self.tangents = tangents
+
+    @classmethod
+    def of(cls, value: Any, derivatives: FloatArray) -> Dual:
+        """From the derivatives in all directions, (directions, *shape of the values)."""
+        return cls(value, {direction: row for direction, row in enumerate(derivatives) if row.any()})
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or options:
@@ -41,7 +51,7 @@ class Dual(NDArrayOperatorsMixin):
         if ufunc not in SLOPES:
             raise NotImplementedError(f"numpy.{ufunc.__name__} carries no derivatives along")
         result = ufunc(*values)
-        return Dual(result, _chained(SLOPES[ufunc](result, *values), inputs, result.ndim))
+        return Dual(result, _chained(SLOPES[ufunc](result, *values), inputs))
 
     def __array_function__(
         self, function: Callable[..., Any], _types: Any, arguments: tuple[Any, ...], options: dict[str, Any]
@@ -67,53 +77,51 @@ class Dual(NDArrayOperatorsMixin):
         return _product_of(self, other)
 
     def __neg__(self) -> Dual:
-        return Dual(-self.value, -self.tangent)
+        return Dual(-self.value, _scaled(self.tangents, -1))
 
     def __getitem__(self, index: Any) -> Dual:
-        places = index if isinstance(index, tuple) else (index,)
-        return Dual(self.value[index], self.tangent[(slice(None), *places)])
+        return self._arranged(lambda array: array[index])
 
     def __len__(self) -> int:
         return len(self.value)
 
     def __bool__(self) -> bool:
         """Whether it is more than nothing: a zero that a parameter may change is not left out."""
-        return bool(self.value) or bool(np.any(self.tangent))
+        return bool(self.value) or any(np.any(tangent) for tangent in self.tangents.values())
 
     @property
     def shape(self) -> tuple[int, ...]:
         """Of the values."""
-        return self.value.shape
+        return np.shape(self.value)
 
     @property
     def ndim(self) -> int:
         """Of the values."""
-        return self.value.ndim
+        return np.ndim(self.value)
 
     @property
     def size(self) -> int:
         """Of the values."""
-        return self.value.size
+        return np.size(self.value)
 
     @property
     def T(self) -> Dual:  # noqa: N802  (NumPy's name)
         """As of an array."""
-        return Dual(self.value.T, np.moveaxis(self.tangent.T, -1, 0))
+        return self._arranged(np.transpose)
 
     def sum(self, axis: int) -> Dual:
         """As of an array."""
-        return _sum(self, axis)
+        return self._arranged(lambda array: np.sum(array, axis=axis))
+
+    def _arranged(self, function: Callable[[FloatArray], FloatArray]) -> Dual:
+        """What entries become that are chosen, moved or added up."""
+        tangents = {at: function(_spread(each, self.shape)) for at, each in self.tangents.items()}
+        return Dual(function(self.value), tangents)
 
 
-def seeds(values: Sequence[Any], directions: int, first: int = 0) -> list[Dual]:
+def seeds(values: Sequence[Any], first: int = 0) -> list[Dual]:
     """Values as dual numbers, each array with a direction of its own, from the direction `first` on."""
-    return [_seed(np.asarray(value, dtype=float), directions, first + at) for at, value in enumerate(values)]
-
-
-def _seed(value: FloatArray, directions: int, direction: int) -> Dual:
-    tangent = np.zeros((directions, *value.shape))
-    tangent[direction] = 1.0
-    return Dual(value, tangent)
+    return [Dual(value, {first + at: 1}) for at, value in enumerate(values)]
 
 
 def value_of(array: Any) -> Any:
@@ -123,65 +131,88 @@ def value_of(array: Any) -> Any:
 
 def tangent_of(array: Any, directions: int, shape: tuple[int, ...]) -> FloatArray:
     """The derivatives of an array, (directions, *shape); zero if it is an ordinary one."""
-    if not isinstance(array, Dual):
-        return np.zeros((directions, *shape))
-    return np.broadcast_to(_spread(array.tangent, len(shape)), (directions, *shape))
+    derivatives = np.zeros((directions, *shape))
+    for direction, tangent in tangents_of(array).items():
+        derivatives[direction] = tangent
+    return derivatives
 
 
-def _spread(tangent: FloatArray, dimensions: int) -> FloatArray:
-    """A tangent that can be broadcast with values of more dimensions."""
-    missing = dimensions - (tangent.ndim - 1)
-    if not missing:
-        return tangent
-    return tangent.reshape(tangent.shape[0], *[1] * missing, *tangent.shape[1:])
+def tangents_of(array: Any) -> Tangents:
+    """The derivatives of an array by direction; none if it is an ordinary one."""
+    return array.tangents if isinstance(array, Dual) else {}
+
+
+def _spread(tangent: Any, shape: tuple[int, ...]) -> FloatArray:
+    return tangent if np.shape(tangent) == shape else np.broadcast_to(tangent, shape)
 
 
 def _sum_of(first: Any, second: Any) -> Dual:
     """A sum; what has no tangent adds nothing to it."""
-    if not isinstance(first, Dual):
-        first, second = second, first
     if not isinstance(second, Dual):
-        value = first.value + second
-        return Dual(value, _spread(first.tangent, value.ndim))
-    value = first.value + second.value
-    return Dual(value, _spread(first.tangent, value.ndim) + _spread(second.tangent, value.ndim))
+        return Dual(add(first.value, second), first.tangents)
+    if not isinstance(first, Dual):
+        return Dual(add(first, second.value), second.tangents)
+    return Dual(add(first.value, second.value), _total(first.tangents, second.tangents))
 
 
 def _difference_of(first: Any, second: Any) -> Dual:
     """A difference."""
     if not isinstance(second, Dual):
-        value = first.value - second
-        return Dual(value, _spread(first.tangent, value.ndim))
-    value = value_of(first) - second.value
-    tangent = _spread(second.tangent, np.ndim(value))
-    if not isinstance(first, Dual):
-        return Dual(value, -tangent)
-    return Dual(value, _spread(first.tangent, value.ndim) - tangent)
+        return Dual(sub(first.value, second), first.tangents)
+    tangents = dict(tangents_of(first))
+    for direction, tangent in second.tangents.items():
+        tangents[direction] = tangents[direction] - tangent if direction in tangents else -tangent
+    return Dual(sub(value_of(first), second.value), tangents)
 
 
 def _product_of(first: Any, second: Any) -> Dual:
     """A product, by Leibniz's rule."""
-    if not isinstance(first, Dual):
-        first, second = second, first
     if not isinstance(second, Dual):
-        value = first.value * second
-        return Dual(value, _spread(first.tangent, value.ndim) * second)
-    value = first.value * second.value
-    tangent = _spread(first.tangent, value.ndim) * second.value
-    return Dual(value, tangent + _spread(second.tangent, value.ndim) * first.value)
+        return Dual(mul(first.value, second), _scaled(first.tangents, second))
+    if not isinstance(first, Dual):
+        return Dual(mul(first, second.value), _scaled(second.tangents, first))
+    a, b = first.value, second.value
+    return Dual(mul(a, b), _total(_scaled(first.tangents, b), _scaled(second.tangents, a)))
 
 
-def _chained(slopes: Sequence[Callable[[], Any]], inputs: Sequence[Any], dimensions: int) -> FloatArray:
-    """The chain rule: the sum of slope times tangent over the inputs that have one."""
-    terms: list[FloatArray] = [
-        slope() * _spread(each.tangent, dimensions)
-        for slope, each in zip(slopes, inputs, strict=True)
-        if isinstance(each, Dual)
-    ]
-    total = terms[0]
-    for term in terms[1:]:
-        total = total + term
+def _total(first: Tangents, second: Tangents) -> Tangents:
+    if not (first and second):
+        return first or second
+    total = dict(first)
+    for direction, tangent in second.items():
+        total[direction] = total[direction] + tangent if direction in total else tangent
     return total
+
+
+def _scaled(tangents: Tangents, factor: Scalar) -> Tangents:
+    """By an array, or by a constant that folds."""
+    if type(factor) is not int:
+        return {direction: tangent * factor for direction, tangent in tangents.items()}
+    if factor == 1:
+        return tangents
+    return {direction: mul(factor, tangent) for direction, tangent in tangents.items()} if factor else {}
+
+
+def _chained(slopes: Sequence[Callable[[], Any]], inputs: Sequence[Any]) -> Tangents:
+    """The chain rule: the sum of slope times tangent over the inputs that have one."""
+    total: Tangents = {}
+    for slope, each in zip(slopes, inputs, strict=True):
+        if isinstance(each, Dual):
+            total = _total(total, _scaled(each.tangents, slope()))
+    return total
+
+
+@exact.register
+def _(number: Dual) -> Dual:
+    """The value folds, whatever its derivatives."""
+    return Dual(exact(number.value), number.tangents)
+
+
+@trigonometric_of.register
+def _(angle: Dual, name: str) -> Dual:
+    cos, sin = (trigonometric(function, angle.value) for function in ("cos", "sin"))
+    value, slope = (cos, -sin) if name == "cos" else (sin, cos)
+    return Dual(value, _scaled(angle.tangents, slope))
 
 
 @cell_on.register
@@ -245,11 +276,7 @@ ALIKE = frozenset({np.zeros_like, np.ones_like, np.empty_like, np.shape, np.ndim
 
 def _where(condition: Any, a: Any, b: Any) -> Dual:
     value = np.where(condition, value_of(a), value_of(b))
-    tangents = (
-        _spread(each.tangent, value.ndim) if isinstance(each, Dual) else np.zeros((1, *[1] * value.ndim))
-        for each in (a, b)
-    )
-    return Dual(value, np.where(condition, *tangents))
+    return Dual(value, {at: np.where(condition, *each) for at, each in _by_direction((a, b))})
 
 
 def _clip(values: Any, low: Any, high: Any) -> Any:
@@ -260,26 +287,31 @@ def _joined(function: Callable[..., Any]) -> Callable[..., Dual]:
     """Stacking or concatenating, for which all parts must have tangents."""
 
     def joined(arrays: Sequence[Any], axis: int = 0) -> Dual:
-        directions = next(len(each.tangent) for each in arrays if isinstance(each, Dual))
         value = function([value_of(each) for each in arrays], axis=axis)
-        tangents = [tangent_of(each, directions, np.shape(value_of(each))) for each in arrays]
-        return Dual(value, function(tangents, axis=axis if axis < 0 else axis + 1))
+        shapes = [np.shape(value_of(each)) for each in arrays]
+        tangents = {
+            at: function([_spread(*each) for each in zip(parts, shapes, strict=True)], axis=axis)
+            for at, parts in _by_direction(arrays)
+        }
+        return Dual(value, tangents)
 
     return joined
 
 
+def _by_direction(arrays: Sequence[Any]) -> Iterator[tuple[int, list[Any]]]:
+    """Each direction in which one of several arrays has a tangent, with those of all of them."""
+    tangents = [tangents_of(each) for each in arrays]
+    for direction in dict.fromkeys(at for each in tangents for at in each):
+        yield direction, [each.get(direction, 0.0) for each in tangents]
+
+
 def _broadcast_to(array: Dual, shape: tuple[int, ...]) -> Dual:
-    value = np.broadcast_to(array.value, shape)
-    return Dual(value, tangent_of(array, len(array.tangent), shape))
+    return Dual(np.broadcast_to(array.value, shape), array.tangents)
 
 
 def _full_like(array: Any, fill: Any) -> Any:
     shape = np.shape(value_of(array))
     return _broadcast_to(fill, shape) if isinstance(fill, Dual) else np.full(shape, fill)
-
-
-def _sum(array: Dual, axis: int) -> Dual:
-    return Dual(np.sum(array.value, axis=axis), np.sum(array.tangent, axis=axis if axis < 0 else axis + 1))
 
 
 ARRANGED: Mapping[Callable[..., Any], Callable[..., Any]] = {
@@ -289,6 +321,6 @@ ARRANGED: Mapping[Callable[..., Any], Callable[..., Any]] = {
     np.concatenate: _joined(np.concatenate),
     np.broadcast_to: _broadcast_to,
     np.full_like: _full_like,
-    np.sum: _sum,
+    np.sum: Dual.sum,
 }
 """Functions that arrange or choose entries."""

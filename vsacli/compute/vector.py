@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import sys
+from functools import singledispatch
 from numbers import Rational
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ Scalar = Any
 """Anything with + - * among its kind and with Python integers."""
 
 
+@singledispatch
 def exact(number: Scalar) -> Scalar:
     """The number, as a Python integer if it is one of the constants that fold; other scalars as they are."""
     plain = isinstance(number, float | int | complex | Rational)
@@ -26,8 +28,17 @@ def exact(number: Scalar) -> Scalar:
 
 def trigonometric(name: str, angle: Scalar) -> Scalar:
     """`cos` or `sin` of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
-    if not isinstance(angle, float | int):
-        return getattr(np, name)(angle)
+    return trigonometric_of(angle, name)
+
+
+@singledispatch
+def trigonometric_of(angle: Scalar, name: str) -> Scalar:
+    """`trigonometric` of any scalars but these."""
+    return getattr(np, name)(angle)
+
+
+@trigonometric_of.register
+def _(angle: float | int, name: str) -> Scalar:
     number: float = getattr(math, name)(angle)
     return 0 if abs(number) <= sys.float_info.epsilon * max(1.0, abs(angle)) else exact(number)
 
@@ -88,16 +99,20 @@ class Vector(NamedTuple):
         return add(add(mul(self.x, other.x), mul(self.y, other.y)), mul(self.z, other.z))
 
 
-ZERO = Vector(0, 0, 0)
+ZERO, ONES = Vector(0, 0, 0), Vector(1, 1, 1)
 
 
-def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product a x b."""
+def cross(a: Vector, b: Vector, along: Vector = ONES) -> Vector:
+    """Vector product a x b; of it only what an inner product with `along` needs, if that is given."""
     return Vector(
-        sub(mul(a.y, b.z), mul(a.z, b.y)),
-        sub(mul(a.z, b.x), mul(a.x, b.z)),
-        sub(mul(a.x, b.y), mul(a.y, b.x)),
+        0 if _vanishes(along.x) else sub(mul(a.y, b.z), mul(a.z, b.y)),
+        0 if _vanishes(along.y) else sub(mul(a.z, b.x), mul(a.x, b.z)),
+        0 if _vanishes(along.z) else sub(mul(a.x, b.y), mul(a.y, b.x)),
     )
+
+
+def _vanishes(a: Scalar) -> bool:
+    return type(a) is int and a == 0
 
 
 class SymmetricTensor(NamedTuple):

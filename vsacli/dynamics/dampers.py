@@ -16,7 +16,7 @@ from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.vector import Scalar, add, mul
-from vsacli.dynamics.recursion import TorqueDerivatives
+from vsacli.dynamics.chain import TorqueDerivatives
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 

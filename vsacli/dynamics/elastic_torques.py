@@ -23,9 +23,10 @@ from vsacli.compute.vector import (
     exact,
     trigonometric,
 )
+from vsacli.dynamics.chain import Chain, JointState, LinkConstants, TipLoad, TorqueDerivatives
 from vsacli.dynamics.dampers import damper_torque
 from vsacli.dynamics.joint_friction import joint_friction
-from vsacli.dynamics.recursion import JointState, LinkConstants, TipLoad, TorqueDerivatives, recursion
+from vsacli.dynamics.recursion import recursion
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot, check_robot
@@ -103,6 +104,11 @@ class LinkTorques(RowKernel):
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(60)."""
+        torques = recursion(*self.chain(rows))
+        return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
+
+    def chain(self, rows: Sequence[Scalar]) -> Chain:
+        """What the recursion takes, from rows as of `arguments`."""
         given, joints = self.arguments.unpack(rows), self.robot.joints
         none = [0] * len(joints)
         dampings = zip(*(given.get(name, none) for name in DAMPING.names), strict=True)
@@ -114,8 +120,7 @@ class LinkTorques(RowKernel):
         ]
         wrench = [given[name] for name in WRENCH_NAMES if name in given]
         tip = None if self.frame is None else tip_load(self.robot, self.frame, wrench)
-        torques = recursion(list(map(link_constants, joints)), states, base_gravity(self.robot), tip)
-        return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
+        return Chain(list(map(link_constants, joints)), states, base_gravity(self.robot), tip)
 
 
 class ElasticTorques(NamedTuple):

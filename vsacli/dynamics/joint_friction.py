@@ -6,7 +6,7 @@ import numpy as np
 
 from vsacli.actuators.friction import Friction
 from vsacli.compute.vector import Scalar, exact, mul, sub
-from vsacli.dynamics.recursion import TorqueDerivatives
+from vsacli.dynamics.chain import TorqueDerivatives
 
 
 def joint_friction(

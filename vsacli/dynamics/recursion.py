@@ -12,66 +12,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from vsacli.compute.vector import ZERO, Rotation, Scalar, SymmetricTensor, Vector, add, cross, mul
+from vsacli.dynamics.chain import JointState, LinkConstants, TipLoad, TorqueDerivatives
 
 Z0 = Vector(0, 0, 1)
-
-
-class LinkConstants(NamedTuple):
-    """What the recursion needs of a joint and its link; scalars of any kind.
-
-    Attributes:
-        revolute: kind of the joint.
-        a: length of the Denavit-Hartenberg row.
-        cos_alpha: cosine of its twist.
-        sin_alpha: sine of its twist.
-        mass: mass of the augmented link.
-        com: its centre of mass, in the link frame.
-        inertia: its tensor about the centre of mass, link axes.
-        damping: viscous damping D of the joint.
-    """
-
-    revolute: bool
-    a: Scalar
-    cos_alpha: Scalar
-    sin_alpha: Scalar
-    mass: Scalar
-    com: Vector
-    inertia: SymmetricTensor
-    damping: Scalar
-
-
-class TorqueDerivatives(NamedTuple):
-    """Torque (force) of a joint, and its first and second time derivative."""
-
-    tau: Scalar
-    dtau: Scalar
-    ddtau: Scalar
-
-
-class JointState(NamedTuple):
-    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque that damper and friction take."""
-
-    cos: Scalar
-    sin: Scalar
-    d: Scalar
-    rates: tuple[Scalar, Scalar, Scalar, Scalar]
-    resistance: TorqueDerivatives = TorqueDerivatives(0, 0, 0)
-
-
-class TipLoad(NamedTuple):
-    """What the end effector exerts on the environment, at a point fixed to the last link.
-
-    Attributes:
-        force: its components and their first and second derivatives.
-        moment: likewise, about that point.
-        point: from the origin of frame N, in frame N.
-        in_base: whether the components are along the axes of frame 0, else of frame N.
-    """
-
-    force: Sequence[Vector]
-    moment: Sequence[Vector]
-    point: Vector
-    in_base: bool
 
 
 class _Angular(NamedTuple):
@@ -83,7 +26,7 @@ class _Angular(NamedTuple):
     varsigma: Vector
 
 
-class _Frame(NamedTuple):
+class Frame(NamedTuple):
     """Motion of a link frame: angular, and acceleration, jerk and snap of its origin."""
 
     angular: _Angular
@@ -113,12 +56,12 @@ class _Slide(NamedTuple):
 _NO_SLIDE = _Slide(ZERO, ZERO, ZERO, ZERO)
 
 
-class _Body(NamedTuple):
+class Body(NamedTuple):
     """What the backward pass needs of link k."""
 
     rotation: Rotation
     z: Vector
-    frame: _Frame
+    frame: Frame
     p: tuple[Vector, Vector, Vector]
     c: tuple[Vector, Vector, Vector]
     force: tuple[Vector, Vector, Vector]
@@ -155,23 +98,39 @@ def recursion(
     Returns:
         tau_e, tau_e', tau_e'' of each joint, base to tip; N m (N at a prismatic joint) per s^k.
     """
-    frame = _Frame(_Angular(ZERO, ZERO, ZERO, ZERO), a=ZERO - gravity, j=ZERO, s=ZERO)
+    return backward(links, states, forward(links, states, base_frame(gravity)), tip)
+
+
+def base_frame(gravity: Vector) -> Frame:
+    """Frame 0, which rises against gravity, so that all bodies bear it."""
+    return Frame(_Angular(ZERO, ZERO, ZERO, ZERO), a=ZERO - gravity, j=ZERO, s=ZERO)
+
+
+def forward(links: Sequence[LinkConstants], states: Sequence[JointState], previous: Frame) -> list[Body]:
+    """Run (36)-(51) over the rest of a chain, beyond a frame whose motion is known."""
     bodies = []
     for link, state in zip(links, states, strict=True):
-        body = _forward(link, state, frame)
-        frame = body.frame
+        body = _forward(link, state, previous)
+        previous = body.frame
         bodies.append(body)
+    return bodies
 
+
+def backward(
+    links: Sequence[LinkConstants], states: Sequence[JointState], bodies: Sequence[Body], tip: TipLoad | None
+) -> list[TorqueDerivatives]:
+    """Run (52)-(60) over a whole chain; arguments and result as of `recursion`."""
     torques = []
-    reaction = _NO_REACTION if tip is None else _tip_reaction(tip, bodies)
+    beyond = _NO_REACTION if tip is None else _tip_reaction(tip, bodies)
     for link, state, body in zip(reversed(links), reversed(states), reversed(bodies), strict=True):
-        reaction = _backward(body, reaction)
+        reaction = _backward(body, beyond)
         torques.append(_project(link, state, body, reaction))
-        reaction = _in_previous_frame(body.rotation, reaction)
+        if len(torques) < len(links):
+            beyond = _in_previous_frame(body.rotation, reaction)
     return torques[::-1]
 
 
-def _forward(link: LinkConstants, state: JointState, previous: _Frame) -> _Body:
+def _forward(link: LinkConstants, state: JointState, previous: Frame) -> Body:
     turning, sliding = (state.rates, (0, 0, 0, 0)) if link.revolute else ((0, 0, 0, 0), state.rates)
     rotation = Rotation(state.cos, state.sin, link.cos_alpha, link.sin_alpha)
     z = Vector(0, link.sin_alpha, link.cos_alpha)
@@ -180,7 +139,7 @@ def _forward(link: LinkConstants, state: JointState, previous: _Frame) -> _Body:
     angular = _angular_motion(rotation, turning, previous.angular)
     v_p = _fixed_point(angular, p)
     slide = _slide(angular, sliding, z) if not link.revolute else _NO_SLIDE
-    frame = _Frame(
+    frame = Frame(
         angular,
         a=rotation.undo(previous.a) + v_p.second + slide.a,  # (40)
         j=rotation.undo(previous.j) + v_p.third + slide.j,  # (42)
@@ -188,7 +147,7 @@ def _forward(link: LinkConstants, state: JointState, previous: _Frame) -> _Body:
     )
     v_c = _fixed_point(angular, link.com)
     a_c, j_c, s_c = frame.a + v_c.second, frame.j + v_c.third, frame.s + v_c.fourth  # (41) (43) (45)
-    return _Body(
+    return Body(
         rotation=rotation,
         z=z,
         frame=frame,
@@ -249,7 +208,7 @@ def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector,
     return moment, dmoment, ddmoment
 
 
-def _tip_reaction(tip: TipLoad, bodies: Sequence[_Body]) -> _Reaction:
+def _tip_reaction(tip: TipLoad, bodies: Sequence[Body]) -> _Reaction:
     """f+, n+ of the last link and their derivatives, about the origin of frame N."""
     angular = bodies[-1].frame.angular
     if tip.in_base:
@@ -281,7 +240,7 @@ def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vec
     return u, du + w_u, ddu + cross(w, du) * 2 + cross(g, u) + cross(w, w_u)
 
 
-def _backward(body: _Body, tip: _Reaction) -> _Reaction:
+def _backward(body: Body, tip: _Reaction) -> _Reaction:
     (c, dc, ddc), (p, dp, ddp) = body.c, body.p
     force, dforce, ddforce = body.force
     moment, dmoment, ddmoment = body.moment
@@ -300,15 +259,15 @@ def _backward(body: _Body, tip: _Reaction) -> _Reaction:
     return _Reaction((f, df, ddf), (n, dn, ddn))
 
 
-def _project(link: LinkConstants, state: JointState, body: _Body, reaction: _Reaction) -> TorqueDerivatives:
-    w, g = body.frame.angular.omega, body.frame.angular.gamma
+def _project(link: LinkConstants, state: JointState, body: Body, reaction: _Reaction) -> TorqueDerivatives:
+    w, g, z = body.frame.angular.omega, body.frame.angular.gamma, body.z
     x, dx, ddx = reaction.n if link.revolute else reaction.f
     x_w = cross(x, w)
     q1, q2, q3, _ = state.rates
-    tau = add(x.dot(body.z), mul(link.damping, q1))  # (58)
-    dtau = add((dx + x_w).dot(body.z), mul(link.damping, q2))  # (59)
-    ddx_turned = ddx + cross(dx, w) * 2 + cross(x, g) + cross(x_w, w)
-    ddtau = add(ddx_turned.dot(body.z), mul(link.damping, q3))  # (60)
+    tau = add(x.dot(z), mul(link.damping, q1))  # (58)
+    dtau = add((dx + x_w).dot(z), mul(link.damping, q2))  # (59)
+    ddx_turned = ddx + cross(dx, w, along=z) * 2 + cross(x, g, along=z) + cross(x_w, w, along=z)
+    ddtau = add(ddx_turned.dot(z), mul(link.damping, q3))  # (60)
     return TorqueDerivatives(*map(add, (tau, dtau, ddtau), state.resistance))
 
 

@@ -21,8 +21,9 @@ from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
 from vsacli.compute.tracing import Symbol, Tape, TracedArray
 from vsacli.compute.tracing.python_code import StateFunction
 from vsacli.compute.vector import ZERO, Scalar, Vector
+from vsacli.dynamics.chain import TipLoad, TorqueDerivatives
 from vsacli.dynamics.elastic_torques import joint_state, link_constants, tip_load
-from vsacli.dynamics.recursion import TipLoad, TorqueDerivatives, recursion
+from vsacli.dynamics.recursion import recursion
 from vsacli.robot.joint import Limits
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot

@@ -112,7 +112,7 @@ def _carried(
     own = [each if each.joint == index else None for each in given]
     chosen = [each for each in own if each is not None]
     carrying = apart(seeded(robot, chosen).joints[index]).actuator
-    torque = carrying.carried(joint_motion(signals, index, len(chosen))).tau_e
+    torque = carrying.carried(joint_motion(signals, index)).tau_e
     slopes = np.zeros((len(given), len(signals.time)))
     slopes[[each is not None for each in own]] = tangent_of(torque, len(chosen), signals.time.shape)
     return value_of(torque), slopes
@@ -123,7 +123,7 @@ def _resistance(
 ) -> tuple[FloatArray, FloatArray]:
     """What damping and friction of a joint and its rigid drive take, (samples,), and slopes by numbers."""
     joint = apart(seeded(robot, numbers).joints[index])
-    motion = joint_motion(signals, index, len(numbers))
+    motion = joint_motion(signals, index)
     dq = motion["dq"]
     torque: Any = joint.damping * dq + joint_friction(joint.friction, (dq, 0, 0, 0)).tau
     if not joint.actuator.sprung:

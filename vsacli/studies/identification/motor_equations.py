@@ -5,7 +5,7 @@ They are (73)-(74) with what was recorded, and free of the links.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ def motor_equations(
     """
     present = [each._replace(value=float(value)) for each, value in zip(unknowns, values, strict=True)]
     carrying = apart(seeded(robot, present).joints[index]).actuator
-    motion = joint_motion(signals, index, len(unknowns))
+    motion = joint_motion(signals, index)
     with np.errstate(all="ignore"):  # numbers far off, from which the search comes back
         torques = predicted_torques(carrying, motion)
     slopes = tangent_of(torques, len(unknowns), np.shape(value_of(torques)))
@@ -73,9 +73,12 @@ def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
     return tuple(f"motor {number} of {joint.name}" for number, _ in enumerate(joint.actuator.motors, 1))
 
 
-def joint_motion(signals: Signals, index: int, directions: int) -> dict[str, Any]:
-    """Motion of a joint and its motors, samples last, ready to carry derivatives by numbers of the robot."""
-    return dict(_carrying(_arrays(signals, index), directions))
+def joint_motion(signals: Signals, index: int) -> dict[str, Any]:
+    """Motion of a joint and its motors, samples last, as duals that no number of the robot changes.
+
+    Functions of NumPy then take numbers of the robot that are duals.
+    """
+    return {name: Dual(values, {}) for name, values in _arrays(signals, index).items()}
 
 
 def _arrays(signals: Signals, index: int) -> dict[str, FloatArray]:
@@ -89,9 +92,3 @@ def _arrays(signals: Signals, index: int) -> dict[str, FloatArray]:
         "dtheta": signals.dtheta[:, index].T,
         "ddtheta": signals.ddtheta[:, index].T,
     }
-
-
-def _carrying(arrays: dict[str, FloatArray], directions: int) -> Iterator[tuple[str, Dual]]:
-    """As duals that no number of the robot changes: functions of NumPy then take numbers that are duals."""
-    for name, values in arrays.items():
-        yield name, Dual(values, np.zeros((directions, *values.shape)))

@@ -9,8 +9,9 @@ from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.compute.engine.engines import TracedEngine
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import ZERO, Scalar, SymmetricTensor, Vector, sub
+from vsacli.dynamics.chain import LinkConstants, TorqueDerivatives
 from vsacli.dynamics.elastic_torques import joint_state, link_constants
-from vsacli.dynamics.recursion import LinkConstants, TorqueDerivatives, recursion
+from vsacli.dynamics.recursion import recursion
 from vsacli.dynamics.rigid_body import bare
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity

@@ -52,9 +52,9 @@ def drive_derivatives(
     """
     numbers, motors = len(chosen), 2
     directions = numbers + len(TORQUES) + motors
-    carrying = apart(seeded(robot, chosen, further=len(TORQUES) + motors).joints[index])
+    carrying = apart(seeded(robot, chosen).joints[index])
     torques: dict[str, Any] = dict(
-        zip(TORQUES, seeds([getattr(command, name) for name in TORQUES], directions, numbers), strict=True)
+        zip(TORQUES, seeds([getattr(command, name) for name in TORQUES], numbers), strict=True)
     )
     implicit = ImplicitSolution(robot.joints[index].actuator, carrying.actuator, directions)
     object.__setattr__(carrying.actuator, "solve", implicit.solve)  # in place of a search, which has no slope

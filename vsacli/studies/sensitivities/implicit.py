@@ -50,9 +50,9 @@ class ImplicitSolution:
         """As `Actuator.solve`, with derivatives."""
         found = self._actuator.solve(tau_e.value, stiffness, q)
         slopes = self._slopes(found.deflections[: self._actuator.motor_count], q)
-        torque, of_stiffness = tau_e.tangent - slopes.of_torque, slopes.of_stiffness
+        torque, of_stiffness = self._all(tau_e) - slopes.of_torque, slopes.of_stiffness
         if self._actuator.motor_count == 1:
-            alone: Any = Dual(found.phi_1, torque / slopes.torque[0])
+            alone: Any = Dual.of(found.phi_1, torque / slopes.torque[0])
             return found._replace(phi_1=alone)
         (torque_1, torque_2), (stiffness_1, stiffness_2) = slopes.torque, slopes.stiffness
         determinant = torque_1 * stiffness_2 - torque_2 * stiffness_1
@@ -62,14 +62,17 @@ class ImplicitSolution:
         derived: dict[str, Any] = {
             "lower": self._end(tau_e, found.lower, found.lower_critical, found.slack_below, q),
             "upper": self._end(tau_e, found.upper, found.upper_critical, np.zeros_like(found.slack_below), q),
-            "phi_1": Dual(found.phi_1, dphi_1),
-            "phi_2": Dual(found.phi_2, dphi_2),
+            "phi_1": Dual.of(found.phi_1, dphi_1),
+            "phi_2": Dual.of(found.phi_2, dphi_2),
         }
         return found._replace(**derived)
 
+    def _all(self, tau_e: Dual) -> FloatArray:
+        return tangent_of(tau_e, self._directions, tau_e.shape)
+
     def _slopes(self, phi: FloatArray, q: FloatArray) -> _Slopes:
         last = self._directions - len(phi)
-        deflections: Any = np.stack(seeds(phi, self._directions, last))  # type: ignore[arg-type]
+        deflections: Any = np.stack(seeds(phi, last))  # type: ignore[arg-type]
         theta = self._carrying.motor_positions(deflections, q)
         carried = self._carrying.carried({"phi": deflections, "theta": theta, "q": q})
         torque, stiffness = (
@@ -81,12 +84,14 @@ class ImplicitSolution:
 
     def _end(
         self, tau_e: Dual, end: FloatArray, critical: BoolArray, slack: BoolArray, q: FloatArray
-    ) -> Dual:
+    ) -> Dual | FloatArray:
         """An end of the corridor: critical, or where a side goes slack, or at the end of a range.
 
         Where nothing bounds the corridor it does not change.
         """
         bounded = np.isfinite(end) & (end > 0)
+        if not bounded.any():
+            return end
         phi = self._actuator.solve(tau_e.value, np.where(bounded, end, np.nan), q).deflections
         slopes = self._slopes(phi, q)
         pinned, by_pinned = self._pinned(phi)
@@ -96,14 +101,14 @@ class ImplicitSolution:
         larger = np.abs(slopes.torque[0]) >= np.abs(slopes.torque[1])
         first_free = np.where(critical, larger, pinned == 1)
         multiplier = np.where(first_free, multipliers[0], multipliers[1])
-        tangent = slopes.of_stiffness + multiplier * (tau_e.tangent - slopes.of_torque)
+        tangent = slopes.of_stiffness + multiplier * (self._all(tau_e) - slopes.of_torque)
         fixed = np.where(first_free, 1, 0)
         at_end = (
             np.take_along_axis(slopes.stiffness, fixed[None], 0)[0]
             - multiplier * (np.take_along_axis(slopes.torque, fixed[None], 0)[0])
         )
         tangent = tangent + np.where(critical, 0.0, at_end * by_pinned)
-        return Dual(end, np.where(bounded, tangent, 0.0))
+        return Dual.of(end, np.where(bounded, tangent, 0.0))
 
     def _pinned(self, phi: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Which phi is at an end of its range, and what that end changes by the directions."""

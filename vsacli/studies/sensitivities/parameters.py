@@ -90,12 +90,12 @@ def _parameter(robot: Robot, path: NumberPath, quantity: Quantity, value: float)
     return Parameter(path, quantity, value, entry.number, robot.joints[entry.number].type)
 
 
-def seeded(robot: Robot, chosen: Sequence[Parameter], further: int = 0) -> Robot:
-    """A robot that carries the derivatives by some of its numbers, a direction each, and by `further` others.
+def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
+    """A robot that carries the derivatives by some of its numbers, a direction each.
 
     It is none to be checked or written: records on the way to those numbers are made without their checks.
     """
-    duals = seeds([parameter.value for parameter in chosen], len(chosen) + further)
+    duals = seeds([parameter.value for parameter in chosen])
     places = [(parameter.path, dual) for parameter, dual in zip(chosen, duals, strict=True)]
     carrying: Robot = _with_numbers(robot, places)
     return carrying

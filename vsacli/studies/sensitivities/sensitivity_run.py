@@ -14,7 +14,7 @@ from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import command_of, compute_block, fitted
 from vsacli.robot.model import Robot
 from vsacli.studies.sensitivities.drive_derivatives import MARGIN, OF_MOTORS, drive_derivatives
-from vsacli.studies.sensitivities.link_derivatives import batches, torque_derivatives
+from vsacli.studies.sensitivities.link_derivatives import torque_slopes
 from vsacli.studies.sensitivities.parameters import Parameter, parameters
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -22,8 +22,38 @@ from vsacli.trajectory.trajectory import Trajectory
 BLOCK_SAMPLES = 4096
 """Steps at a time. 7R, 4000 steps: with 1024 it took half as long again; each block costs the interpreter."""
 
+ACTUATOR = "actuator"
+"""The part of a joint whose numbers leave the torque that its links demand as it is."""
+
 Slopes = Mapping[str, FloatArray]
 """Derivatives of a joint by variable: (numbers, 2, samples) of its motors, else (numbers, samples)."""
+
+
+class Chained(Slopes):
+    """Derivatives by numbers that tau_e depends on, by the chain rule when one is asked for.
+
+    Args:
+        of_torques: of tau_e, tau_e', tau_e'' by the numbers, (numbers, 3, samples).
+        by_torques: of each variable by the three, (3, [2,] samples).
+    """
+
+    def __init__(self, of_torques: FloatArray, by_torques: Slopes) -> None:
+        self._of_torques, self._by_torques = of_torques, by_torques
+
+    def __getitem__(self, name: str) -> FloatArray:
+        by_torques = self._by_torques[name]
+        spread = self._of_torques if by_torques.ndim == 2 else self._of_torques[:, :, None]
+        total: FloatArray = spread[:, 0] * by_torques[0]
+        for order in range(1, len(by_torques)):
+            if by_torques[order].any():
+                total += spread[:, order] * by_torques[order]
+        return total
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_torques)
+
+    def __len__(self) -> int:
+        return len(self._by_torques)
 
 
 class Group(NamedTuple):
@@ -111,27 +141,16 @@ class SensitivityRun:
             derived = drive_derivatives(self.robot, index, command, [self.parameters[at] for at in own])
             by_torques.append(derived.by_torques)
             groups.append(Group(own, [derived.by_numbers if joint == index else None for joint in joints]))
-        for places in batches(self.parameters):
-            of_torques = torque_derivatives(self.robot, motion, [self.parameters[at] for at in places])
-            groups.append(Group(places, list(map(_chained, of_torques, by_torques))))
+        of_links = [place for place, each in enumerate(self.parameters) if each.part != ACTUATOR]
+        chosen = [self.parameters[at] for at in of_links]
+        for places, of_torques in torque_slopes(self.robot, motion, chosen):
+            of_joints = [
+                None if each is None else Chained(each, slopes)
+                for each, slopes in zip(of_torques, by_torques, strict=True)
+            ]
+            groups.append(Group([of_links[at] for at in places], of_joints))
         return Derivatives(block, len(self.parameters), groups)
 
 
 def _drives(parameter: Parameter, joint: int) -> bool:
-    return parameter.joint == joint and parameter.part == "actuator"
-
-
-def _chained(of_torques: FloatArray | None, by_torques: Slopes) -> Slopes | None:
-    """Derivatives by numbers that the torques (numbers, 3, samples) depend on, from those by the torques."""
-    if of_torques is None:
-        return None
-    return {name: _sum(of_torques, slopes) for name, slopes in by_torques.items()}
-
-
-def _sum(of_torques: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Over tau_e, tau_e', tau_e'': (numbers, 3, samples) times (3, [2,] samples)."""
-    spread = of_torques if slopes.ndim == 2 else of_torques[:, :, None]
-    total: FloatArray = spread[:, 0] * slopes[0]
-    for order in range(1, len(slopes)):
-        total += spread[:, order] * slopes[order]
-    return total
+    return parameter.joint == joint and parameter.part == ACTUATOR

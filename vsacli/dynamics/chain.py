@@ -1,0 +1,82 @@
+"""What the recursion takes of a chain of links that moves, and what it gives; scalars of any kind."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from vsacli.compute.vector import Scalar, SymmetricTensor, Vector
+
+
+class LinkConstants(NamedTuple):
+    """What the recursion needs of a joint and its link; scalars of any kind.
+
+    Attributes:
+        revolute: kind of the joint.
+        a: length of the Denavit-Hartenberg row.
+        cos_alpha: cosine of its twist.
+        sin_alpha: sine of its twist.
+        mass: mass of the augmented link.
+        com: its centre of mass, in the link frame.
+        inertia: its tensor about the centre of mass, link axes.
+        damping: viscous damping D of the joint.
+    """
+
+    revolute: bool
+    a: Scalar
+    cos_alpha: Scalar
+    sin_alpha: Scalar
+    mass: Scalar
+    com: Vector
+    inertia: SymmetricTensor
+    damping: Scalar
+
+
+class TorqueDerivatives(NamedTuple):
+    """Torque (force) of a joint, and its first and second time derivative."""
+
+    tau: Scalar
+    dtau: Scalar
+    ddtau: Scalar
+
+
+class JointState(NamedTuple):
+    """Cos and sin of a joint's angle, offset d, q' to q'''', and the torque that damper and friction take."""
+
+    cos: Scalar
+    sin: Scalar
+    d: Scalar
+    rates: tuple[Scalar, Scalar, Scalar, Scalar]
+    resistance: TorqueDerivatives = TorqueDerivatives(0, 0, 0)
+
+
+class TipLoad(NamedTuple):
+    """What the end effector exerts on the environment, at a point fixed to the last link.
+
+    Attributes:
+        force: its components and their first and second derivatives.
+        moment: likewise, about that point.
+        point: from the origin of frame N, in frame N.
+        in_base: whether the components are along the axes of frame 0, else of frame N.
+    """
+
+    force: Sequence[Vector]
+    moment: Sequence[Vector]
+    point: Vector
+    in_base: bool
+
+
+class Chain(NamedTuple):
+    """A whole chain, base to tip.
+
+    Attributes:
+        links: constants of each joint and link.
+        states: pose and motion of each joint.
+        gravity: gravity acceleration in frame 0, m/s^2.
+        tip: what the end effector exerts on the environment, if anything; N and N m per s^k.
+    """
+
+    links: Sequence[LinkConstants]
+    states: Sequence[JointState]
+    gravity: Vector
+    tip: TipLoad | None = None
