@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -358,3 +359,33 @@ def test_a_run_without_a_single_feasible_step_says_so(tmp_path: Path) -> None:
     result = inverse_dynamics(own, load_trajectory(trajectory, own))
     assert (result.flags == Flag.INFEASIBLE).all()
     assert np.isnan(result.tau_motor).all()
+
+
+@pytest.mark.parametrize(
+    ("energy", "warning"),
+    [
+        ("k*(r*theta_2)^2*phi^2*log(theta_2-6)", r"no finite number at phi = .*, theta_2 = 5\.\d+; narrow"),
+        ("k*(r*theta_2)^2*phi^2 + sqrt(theta_2-7.5)", r"no finite number at phi = .*, theta_2 = 7\.\d+; n"),
+        (
+            "k*(r*theta_2)^2*phi^2/(theta_2-6)",
+            r"no finite number at phi = 0, theta_2 = 6, where",
+        ),
+    ],
+)
+def test_gaps_and_poles_of_the_energy_are_told_with_their_place(tmp_path, energy, warning):
+    (tmp_path / "own.yaml").write_text(ROBOT.format(energy))
+    (told,) = load_robot(tmp_path / "own.yaml").joints[0].actuator.warnings
+    assert re.search(warning, told), told
+
+
+@pytest.mark.parametrize("potential", [AWAS, MACCEPA, TWO_SPRINGS])
+def test_energies_that_hold_have_no_warning(potential):
+    assert potential.warnings == ()
+
+
+def test_constants_are_not_called_unused_where_the_energy_lacks_something(tmp_path):
+    (tmp_path / "own.yaml").write_text(ROBOT.format("k*sin(phi)^2"))
+    with pytest.raises(InputError) as raised:
+        load_robot(tmp_path / "own.yaml")
+    (problem,) = raised.value.problems
+    assert problem.message.endswith("energy: does not depend on theta_2")

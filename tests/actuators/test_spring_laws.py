@@ -238,6 +238,17 @@ def test_misfit_of_a_table_is_told():
     assert law.warnings == (f"the curve through spring.csv misses a measured torque by up to {amount}",)
 
 
+def test_misfit_that_is_rounding_is_not_told_and_a_kink_is_with_its_place():
+    deflection = np.linspace(-0.5, 0.5, 41)
+    assert measured(deflection, 100 * deflection).warnings == ()
+    size = np.abs(deflection)
+    (warning,) = measured(
+        deflection, np.sign(deflection) * np.where(size < 0.25, 100 * size, 25 + 400 * (size - 0.25))
+    ).warnings
+    assert "(1.1 % of its range), at the deflection " in warning
+    assert ": near a kink or an outlier" in warning
+
+
 def test_table_that_pushes_and_pulls_is_stiff_at_rest():
     deflection = np.linspace(-0.5, 0.5, 41)
     law = measured(deflection, 80 * deflection**3)

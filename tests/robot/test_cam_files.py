@@ -112,6 +112,10 @@ PROFILES = {
     ),
     "too large": (rows(row_8="-0.1,1e40"), "10: the lift must be at most 1e+30 in size, not 1e+40"),
     "too few": ("deflection,lift\n-1,1\n0,0\n1,1\n", "expected at least 6 rows, found 3"),
+    "kink": (
+        "deflection,lift\n" + "\n".join(f"{phi:.12g},{0.03 * abs(phi):.12g}" for phi in DEFLECTIONS) + "\n",
+        ": a smooth profile misses the lift 0.0045 by 6.5 % of its range, more than 3 %: there is a kink",
+    ),
     "another quantity": (rows().replace("lift", "torque"), "1: expected the header deflection,lift, found"),
 }
 
@@ -140,6 +144,14 @@ def test_the_profile_is_among_the_inputs_and_its_misfit_is_told(
         attributes = [dict(group.attrs) for group in result["inputs"].values() if "path" in group.attrs]
     kept = next(each for each in attributes if str(each["path"]).endswith("cam.csv"))
     assert hashlib.sha256(table.encode()).hexdigest() in map(str, kept.values())
+
+
+def test_misfits_are_told_unless_they_are_rounding_and_with_their_place_if_they_matter():
+    assert cam(DEFLECTIONS, 0.01 + 0.03 * DEFLECTIONS**2).warnings == ()
+    lift = 0.01 + 0.03 * DEFLECTIONS**2
+    lift[16] += 2e-4  # 2.7 % of the range of 0.0075, of which the curve follows a part
+    (warning,) = cam(DEFLECTIONS, lift).warnings
+    assert "% of its range), at the deflection 0.25: near a kink or an outlier" in warning
 
 
 def cam(phi: FloatArray, lift: FloatArray) -> Cam:

@@ -36,11 +36,9 @@ def recorded_swing(seed: int) -> Trajectory:
 
 
 def limited(robot: Robot, trajectory: Trajectory, limit: str, deviations: float) -> Robot:
-    """With a limit that the motion exceeds by some standard deviations."""
+    """With a limit that the motion exceeds by some standard deviations, and nowhere by more of them."""
     result, name = inverse_dynamics(robot, trajectory), VARIABLES[limit]
-    sizes = np.abs(getattr(result, name))
-    worst = np.unravel_index(sizes.argmax(), sizes.shape)
-    bound = float(sizes[worst] - deviations * getattr(result, f"{name}_std")[worst])
+    bound = float(np.max(np.abs(getattr(result, name)) - deviations * getattr(result, f"{name}_std")))
     (joint,) = robot.joints
     if limit.startswith("max"):
         motors = tuple(dataclasses.replace(motor, **{limit: bound}) for motor in joint.actuator.motor)

@@ -34,14 +34,12 @@ class SplineCurve:
         origins: sizes of deflection from which the polynomials count, (pieces,); zero next to zero, so that
             nothing cancels there.
         coefficients: of the potential, from the constant on, (powers, pieces).
-        residual: the largest misfit of what was measured.
     """
 
     domain: tuple[float, float]
     pieces: tuple[int, int]
     origins: FloatArray
     coefficients: FloatArray
-    residual: float
 
     def __call__(self, phi: FloatArray, first: int, last: int) -> tuple[FloatArray, ...]:
         """Derivatives of the potential from one order, 0 or 1, to another, 4 at most."""
@@ -106,7 +104,6 @@ def spline_curve(knots: FloatArray, weights: FloatArray, degree: int, integrate:
         pieces=(origins.size - above, above),
         origins=origins,
         coefficients=coefficients,
-        residual=math.nan,
     )
 
 

@@ -8,7 +8,6 @@ The coefficients and sigma(0) come from non-negative least squares.
 
 from __future__ import annotations
 
-import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,8 +40,7 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> SplineCurve:
     sizes = np.maximum(np.abs(columns).max(axis=0), LEAST_SHAPE_SIZE)
     least = REST_STIFFNESS_SHARE * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
     excess, *weights = nnls(columns / sizes, torque - least * deflection)[0] / sizes
-    curve = _curve(knots, np.array(weights), least + excess)
-    return dataclasses.replace(curve, residual=float(np.abs(curve(deflection, 1, 1)[0] - torque).max()))
+    return _curve(knots, np.array(weights), least + excess)
 
 
 def _curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> SplineCurve:

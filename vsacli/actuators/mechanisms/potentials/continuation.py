@@ -63,6 +63,12 @@ class Branch:
             self.start = curves.spot(np.array([phi]), np.array([theta_2]), np.zeros(1))
             self.orientation = float(np.sign(self.start.sine[0]))
 
+    @property
+    def stiffest(self) -> Spot:
+        """Where the stiffness is largest under the torque of the start, arrays (1,)."""
+        with np.errstate(all="ignore"):
+            return self._followed(self.start.tau_e, np.zeros(1)).high
+
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """The reachable stiffness, and phi and theta_2 for the one in it; see `Mechanism.solve`."""
         with np.errstate(all="ignore"):  # trial steps may lead anywhere, and are refused there

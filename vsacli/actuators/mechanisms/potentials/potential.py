@@ -39,6 +39,12 @@ from vsacli.documents.fields import (
 
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
+GRID = 32
+"""Places along each range at which the energy is looked at."""
+
+UNBOUNDED = 1e9
+"""Of the stiffness at the start, beyond which a stiffness is that of a pole."""
+
 LEAST_START_SINE = 1e-6
 """Sine of the angle between the gradients of torque and stiffness at the start, relative to the ranges, below
 which A is taken for singular."""
@@ -88,9 +94,16 @@ class Potential(Mechanism):
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
-        """A spring on an arm whose length motor 2 sets."""
+        """A spring on an arm whose length motor 2 sets; on a slide a spring that motor 2 makes stiffer."""
+        if joint_type == "prismatic":
+            return {
+                "energy": "k/2 * (theta_2/l)^2 * phi^2",
+                "constants": {"k": 6400, "l": 0.08},
+                "start": {"theta_1": 0, "theta_2": 0.08},
+                "range": {"phi": [-0.05, 0.05], "theta_2": [0.05, 0.12]},
+            }
         return {
-            "energy": f"k/2 * (r*theta_2)^2 * {'sin(phi)^2' if joint_type == 'revolute' else 'phi^2'}",
+            "energy": "k/2 * (r*theta_2)^2 * sin(phi)^2",
             "constants": {"k": 100000, "r": 0.01},
             "start": {"theta_1": 0, "theta_2": 8},
             "range": {"phi": [-0.7, 0.7], "theta_2": [5, 12]},
@@ -105,6 +118,33 @@ class Potential(Mechanism):
     def setting_range(self) -> tuple[float, float]:
         """That of theta_2."""
         return self.range.theta_2
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Where the energy does not hold although it is said to."""
+        return (*self._gaps(), *self._poles())
+
+    def _gaps(self) -> Iterator[str]:
+        """The place nearest to the start, of a grid over the ranges, where the energy is no number."""
+        shares = (np.arange(GRID) + 0.5) / GRID
+        ends, start = (self.range.phi, self.range.theta_2), (self.start.theta_1, self.start.theta_2)
+        axes = [low + (high - low) * shares for low, high in ends]
+        far = [(axis - at) / (high - low) for axis, at, (low, high) in zip(axes, start, ends, strict=True)]
+        grid = np.stack(np.meshgrid(*axes, [0.0], indexing="ij"), axis=-1)
+        with np.errstate(all="ignore"):
+            lost = ~self._potential.derivatives(grid, ACCELERATIONS).finite[..., 0]
+        if lost.any():
+            distance = np.where(lost, np.hypot(far[0][:, None], far[1]), np.inf)
+            phi, s = np.unravel_index(distance.argmin(), distance.shape)
+            what = "the energy or one of its first four derivatives is no finite number"
+            yield f"{what} {_place(axes[0][phi], axes[1][s])}; narrow the range to where it holds"
+
+    def _poles(self) -> Iterator[str]:
+        """Where the stiffness grows beyond all bounds on its way from the start."""
+        stiffest = self._branch.stiffest
+        if stiffest.stiffness[0] > UNBOUNDED * self._branch.start.stiffness[0]:
+            place = _place(stiffest.phi[0], stiffest.s[0])
+            yield f"the energy is no finite number {place}, where the stiffness grows beyond all bounds"
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """On the branch of the start."""
@@ -140,11 +180,12 @@ class Potential(Mechanism):
         except ExpressionError as error:
             yield FieldProblem(("energy",), str(error))
             return
-        for name in (name for name in constants if name not in names):
-            yield FieldProblem(("constants", name), "does not occur in the energy")
-        for needed in (("theta_2",), ("theta_1", "phi"), ("q", "phi")):
-            if names.isdisjoint(needed):
-                yield FieldProblem(("energy",), f"does not depend on {needed[0]}")
+        needed = (("theta_2",), ("theta_1", "phi"), ("q", "phi"))
+        lacking = [words[0] for words in needed if names.isdisjoint(words)]
+        yield from (FieldProblem(("energy",), f"does not depend on {word}") for word in lacking)
+        if not lacking:  # else what is lacking may be what the constants are for
+            unused = (name for name in constants if name not in names)
+            yield from (FieldProblem(("constants", name), "does not occur in the energy") for name in unused)
 
     def _range_problems(self) -> Iterator[FieldProblem]:
         at_start = {"phi": self.start.theta_1, "theta_2": self.start.theta_2}
@@ -172,6 +213,7 @@ class Potential(Mechanism):
             reason = "the matrix A is singular here: motors that keep the torque cannot change the stiffness"
         elif not self._is_followed:
             reason = "the stiffness cannot be followed from here to its least and its largest value"
+            reason = " and ".join([reason, *self.warnings])
         else:
             return
         yield FieldProblem(("start",), f"{reason}; choose another state")
@@ -181,6 +223,10 @@ class Potential(Mechanism):
         start = self._branch.start
         solution = self.solve(start.tau_e, start.stiffness, np.zeros(1))
         return bool((solution.lower < solution.upper)[0])
+
+
+def _place(phi: float, theta_2: float) -> str:
+    return f"at phi = {phi:.4g}, theta_2 = {theta_2:.4g}"
 
 
 def _why_no_word(name: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.laws.table import SHAPE_TOLERANCE, misfit_text, wrong_rows
+from vsacli.actuators.laws.table import SHAPE_TOLERANCE, misfit_warnings, worst_misfit, wrong_rows
 from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift
 from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import PreloadedCam
 from vsacli.actuators.mechanisms.preloaded_cams.profile import Profile, fit_profile
@@ -18,6 +18,9 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.documents.fields import TableFile, value
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
+
+LARGEST_MISFIT = 0.03
+"""Share of the range of the lift by which a curve may miss a point; beyond, it is that of another cam."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class Cam(PreloadedCam):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        problems = list(_problems(self.profile))
+        problems = list(_problems(self.profile)) or list(self._misfits())
         if problems:
             raise InputError(problems)
 
@@ -47,10 +50,21 @@ class Cam(PreloadedCam):
     def _fitted(self) -> Profile:
         return fit_profile(*self.profile.values.T)
 
+    def _misfits(self) -> Iterator[Problem]:
+        """The point that the fitted curve misses most, if it is that of another cam."""
+        row, share = worst_misfit(self.profile, self._fitted.misfit)
+        if share > LARGEST_MISFIT:
+            missed = f"misses the lift {self.profile.values[row, 1]:.4g} by {100 * share:.2g} % of its range"
+            message = (
+                f"a smooth profile {missed}, more than {100 * LARGEST_MISFIT:g} %: there is a kink or"
+                " an outlier nearby, or rows are too few"
+            )
+            yield Problem(self.profile.source.path, self.profile.line_of(row), message)
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """How well the curve fits."""
-        return (misfit_text(self.profile, self._fitted.curve.residual),)
+        return misfit_warnings(self.profile, self._fitted.misfit)
 
     @property
     def sources(self) -> tuple[Source, ...]:

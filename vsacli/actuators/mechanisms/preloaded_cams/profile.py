@@ -8,7 +8,6 @@ every wiggle of measured points, therefore g has as few pieces as these call for
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -46,11 +45,13 @@ class Profile(NamedTuple):
 
     Attributes:
         rest: deflection of the minimum, rad (m).
-        curve: lift over the deflection from there; its residual is the largest misfit.
+        curve: lift over the deflection from there, but for a constant.
+        misfit: of the points, (rows,).
     """
 
     rest: float
     curve: SplineCurve
+    misfit: FloatArray
 
 
 def fit_profile(deflection: FloatArray, lift: FloatArray) -> Profile:
@@ -63,7 +64,8 @@ def fit_profile(deflection: FloatArray, lift: FloatArray) -> Profile:
         near = lowest + _rest(deflection - lowest, lift, min(FIRST_PIECES, most))
         pieces = _pieces(deflection - near, lift, most)
         rest = near + _rest(deflection - near, lift, pieces)
-    return Profile(rest, _fit(deflection - rest, lift, pieces).curve)
+    fit = _fit(deflection - rest, lift, pieces)
+    return Profile(rest, fit.curve, fit.misfit)
 
 
 def _pieces(phi: FloatArray, lift: FloatArray, most: int) -> int:
@@ -76,6 +78,7 @@ class _Fit(NamedTuple):
     """A curve, and the Bayesian information criterion that weighs its misfit against its pieces."""
 
     curve: SplineCurve
+    misfit: FloatArray
     criterion: float
 
 
@@ -93,7 +96,7 @@ def _fit(phi: FloatArray, lift: FloatArray, pieces: int) -> _Fit:
     misfit -= (misfit.min() + misfit.max()) / 2
     size = np.sum(misfit**2) / len(lift) + (ROUNDING_SHARE * np.ptp(lift)) ** 2
     criterion = len(lift) * math.log(size) + PIECE_PENALTY * count * math.log(len(lift))
-    return _Fit(dataclasses.replace(curve, residual=float(np.abs(misfit).max())), criterion)
+    return _Fit(curve, misfit, criterion)
 
 
 def _lift(spline: PPoly) -> PPoly:
