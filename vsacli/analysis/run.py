@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.analysis.between import Between, Minima
+from vsacli.analysis.friction_passages import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
@@ -93,6 +94,7 @@ class Run:
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
         self._energy = RunEnergy(robot)
+        self._passages = FrictionPassages(robot)
         self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
         self._between = Between(robot, trajectory, near_singular, self._compute, self._judged)
         self._spring_residual = 0.0
@@ -139,6 +141,7 @@ class Run:
             self._between.add(minima)
             for index, summary in enumerate(self._summaries):
                 summary.add_between(minima.of_joint(index))
+        self._passages.add(block)
         self._spring_residual = float(np.maximum(self._spring_residual, spring_residual(self.robot, block)))
         for summary in self._summaries:
             summary.add(block)
@@ -167,7 +170,12 @@ class Run:
             duration=self.trajectory.duration,
             complete=complete,
             warnings=(*self.robot.warnings, *self.trajectory.warnings),
-            notes=(*self.trajectory.notes, *self._between.notes, *self._internal_stops()),
+            notes=(
+                *self.trajectory.notes,
+                *self._between.notes,
+                *self._internal_stops(),
+                *self._passages.notes(self.trajectory, self._compute),
+            ),
             self_check=self._self_check(),
             joints=tuple(
                 summary.report(*of_joint, complete=complete)
