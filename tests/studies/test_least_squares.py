@@ -170,13 +170,48 @@ def test_several_combinations_and_an_unknown_of_no_effect() -> None:
     assert len(fit.inseparable) == 2
 
 
-def test_numbers_that_were_given_add_their_uncertainty() -> None:
+def test_numbers_that_were_found_before_add_their_uncertainty() -> None:
     """What is measured is a gain of known error times a signal: all unknowns are off by the same share."""
     slopes = columns(400)
     measured = slopes @ TRUTH
-    given = record(measured, slopes, np.zeros(4))._replace(of_given=measured[:, None])
-    fit = least_squares([given], np.zeros(4), given_covariance=np.array([[0.01**2]]))
+    given = record(measured, slopes, np.zeros(4))._replace(errors=0.01 * measured[:, None])
+    fit = least_squares([given], np.zeros(4))
     assert fit.standard_errors == pytest.approx(0.01 * np.abs(TRUTH), rel=1e-6)
+
+
+def noisy_columns(random: np.random.Generator, true: FloatArray, noise: float) -> Equations:
+    """Equations whose columns are known by a measurement, with a second draw of its noise."""
+    first, second = noise * random.normal(size=(2, *true.shape))
+    measured, present = true @ TRUTH + 0.1 * white(random, len(true)), np.zeros(4)
+    found = record(measured, true + first, present)
+    return found._replace(noise=(0 * measured, second))
+
+
+def test_noise_in_the_columns_counts_as_an_error() -> None:
+    """It makes unknowns too small, by more than the residuals alone would say."""
+    true = columns(600) / np.linalg.norm(columns(600), axis=0)
+    random, present = np.random.default_rng(10), np.zeros(4)
+    records = [noisy_columns(random, true, 0.15 / np.sqrt(600)) for _ in range(60)]
+    found = [least_squares([each], present) for each in records]
+    blind = [least_squares([each._replace(noise=None)], present) for each in records]
+    off, blindly = (
+        np.abs([(fit.values - TRUTH) / fit.standard_errors for fit in some]) for some in (found, blind)
+    )
+    assert np.mean(blindly[:, 3] < 2) < 0.9
+    assert np.all(np.mean(off < 2, axis=0) > 0.9)
+
+
+def test_what_noise_in_the_columns_hides_cannot_be_told() -> None:
+    """Two columns differ by less than they are known to: least squares tells both, and both wrong."""
+    true = columns(600) / np.linalg.norm(columns(600), axis=0)
+    true[:, 3] = true[:, 0] + 0.02 * true[:, 3]
+    equations = noisy_columns(np.random.default_rng(11), true, 0.05 / np.sqrt(600))
+    blind, fit = (least_squares([each], np.zeros(4)) for each in (equations._replace(noise=None), equations))
+    assert not blind.inseparable
+    assert abs(blind.values[3] - TRUTH[3]) > 4 * blind.standard_errors[3]
+    (told,) = fit.inseparable
+    assert {at for at, _ in told.terms} == {0, 3}
+    assert told.value == pytest.approx(TRUTH[0] + TRUTH[3], rel=0.02)
 
 
 def test_too_few_equations_are_refused() -> None:

@@ -8,7 +8,7 @@ from samples.computed_signals import computed_signals
 from samples.marks import slow_but
 
 from vsacli.studies.identification.least_squares import least_squares
-from vsacli.studies.identification.link_equations import LinkUnknowns, link_equations
+from vsacli.studies.identification.link_equations import Given, LinkUnknowns, link_equations
 from vsacli.studies.identification.unknowns import FRICTION, MOTORS, SPRINGS, unknowns
 
 RUNS = {
@@ -54,7 +54,8 @@ def test_what_springs_carry_changes_with_their_numbers() -> None:
     robot, signals = computed_signals("vsa_3r", "vsa_3r_excitation")
     sought = LinkUnknowns.of(robot, ())
     given = [each for index in range(3) for each in unknowns(robot, index, (SPRINGS,))]
-    slopes = link_equations(robot, sought, signals, given).of_given
+    errors = np.diag(np.arange(1.0, len(given) + 1))
+    slopes = link_equations(robot, sought, signals, Given(tuple(given), errors)).errors
     assert slopes is not None
     for place, each in enumerate(given):
         step = 1e-3 * each.value
@@ -63,7 +64,9 @@ def test_what_springs_carry_changes_with_their_numbers() -> None:
             for sign in (1, -1)
         )
         ahead, behind = moved
-        assert (ahead - behind) / (2 * step) == pytest.approx(slopes[:, place], rel=1e-9, abs=1e-12)
+        assert (ahead - behind) / (2 * step) == pytest.approx(
+            slopes[:, place] / (place + 1), rel=1e-9, abs=1e-12
+        )
 
 
 def test_a_motion_from_rest_to_rest_leaves_combinations() -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import AnyArray, FloatArray, IndexArray
+from vsacli.studies.identification.signals import Signals, disturbed
 
 
 class Equations(NamedTuple):
@@ -20,8 +21,10 @@ class Equations(NamedTuple):
         group: names of the noise in each row, (rows,): rows of one name have noise of one size.
         sample: number of each row's sample on the even grid of the record, (rows,); a group has one row of a
             sample. Rows of one sample, whatever their groups, may have noise in common.
-        of_given: derivatives of `measured` by numbers that were found before, (rows, numbers); None if
-            it does not depend on any.
+        errors: what independent errors of numbers that were found before change of `measured`, each by one
+            standard error, (rows, errors); None if it does not depend on any.
+        noise: what noise of the positions, once more, changes of `measured` less `predicted`, (rows,), and of
+            `slopes`, (rows, unknowns); None if it is not known. See `with_noise`.
     """
 
     measured: FloatArray
@@ -29,7 +32,23 @@ class Equations(NamedTuple):
     slopes: FloatArray
     group: AnyArray
     sample: IndexArray
-    of_given: FloatArray | None = None
+    errors: FloatArray | None = None
+    noise: tuple[FloatArray, FloatArray] | None = None
+
+
+def with_noise(equations: Callable[[Signals], Equations], signals: Signals) -> Equations:
+    """Equations of a record, with what noise like that of its positions changes of them.
+
+    Args:
+        equations: those of a record.
+        signals: the record; of one whose noise is not known, nothing is added.
+    """
+    found = equations(signals)
+    if signals.noise is None:
+        return found
+    again = equations(disturbed(signals))
+    residuals = (each.measured - each.predicted for each in (again, found))
+    return found._replace(noise=(next(residuals) - next(residuals), again.slopes - found.slopes))
 
 
 class System(NamedTuple):
@@ -43,7 +62,9 @@ class System(NamedTuple):
         group: of each row, index in `groups`, (rows,).
         record: of each row, (rows,).
         sample: of each row in its record, (rows,).
-        of_given: derivatives of what is measured, (rows, numbers).
+        errors: of what is measured, (rows, errors).
+        residual_noise: what noise of positions changes of the residual, (rows,).
+        slope_noise: and of the slopes, (rows, unknowns).
     """
 
     measured: FloatArray
@@ -53,7 +74,9 @@ class System(NamedTuple):
     group: IndexArray
     record: IndexArray
     sample: IndexArray
-    of_given: FloatArray
+    errors: FloatArray
+    residual_noise: FloatArray
+    slope_noise: FloatArray
 
     @classmethod
     def of(cls, records: Sequence[Equations]) -> System:
@@ -63,10 +86,11 @@ class System(NamedTuple):
         )
         names, index = np.unique(group, return_inverse=True)
         rows = [len(each.measured) for each in records]
-        given = [
-            np.zeros((count, 0)) if each.of_given is None else each.of_given
-            for count, each in zip(rows, records, strict=True)
+        errors = [
+            np.zeros((len(each.measured), 0)) if each.errors is None else each.errors for each in records
         ]
+        noise = [each.noise or (0 * each.measured, 0 * each.slopes) for each in records]
+        residual_noise, slope_noise = map(np.concatenate, zip(*noise, strict=True))
         return cls(
             measured=measured,
             residual=measured - predicted,
@@ -75,7 +99,9 @@ class System(NamedTuple):
             group=index,
             record=np.repeat(np.arange(len(records)), rows),
             sample=sample,
-            of_given=np.concatenate(given),
+            errors=np.concatenate(errors),
+            residual_noise=residual_noise,
+            slope_noise=slope_noise,
         )
 
     def by_group(self, of_rows: FloatArray) -> FloatArray:

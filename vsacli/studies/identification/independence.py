@@ -17,6 +17,10 @@ from vsacli.base.arrays import FloatArray, IndexArray
 NOTHING = 1e-13
 """Norm of a column, over that of the largest, up to which it holds nothing but rounding."""
 
+ABOVE_NOISE = 4.0
+"""Size of what a column adds, over that of its noise, from which on it is told: below, more than a sixteenth
+of its square is noise, and its unknown comes out too small by as much."""
+
 CERTAIN = 10.0
 """A share of a column in another one that is less than this many times the tolerance is taken for zero: it is
 as uncertain as the dependence itself, some times more by the condition of the independent columns."""
@@ -46,22 +50,27 @@ class Independence(NamedTuple):
     condition: float
 
 
-def independence(columns: FloatArray, tolerance: float) -> Independence:
+def independence(columns: FloatArray, tolerance: float, noise: FloatArray | None = None) -> Independence:
     """Split the columns of a matrix, of any units.
 
     Args:
         columns: (rows, columns).
         tolerance: distance of a column from its best combination of those kept, over its norm, from which on
             it is independent.
+        noise: what of the columns is noise, alike; what is left of an independent column must be more.
     """
-    from scipy.linalg import qr, solve_triangular
+    from scipy.linalg import solve_triangular
 
     scale = np.linalg.norm(columns, axis=0)
     there = np.flatnonzero(scale > NOTHING * scale.max(initial=0.0))
-    q, r, order = qr(columns[:, there] / scale[there], mode="economic", pivoting=True)
-    rank = int(np.count_nonzero(np.abs(np.diagonal(r)) > tolerance))
-    kept, dropped = there[order[:rank]], there[order[rank:]]
-    shares = solve_triangular(r[:rank, :rank], r[:rank, rank:])
+    scaled = columns[:, there] / scale[there]
+    of_noise = np.zeros_like(scaled) if noise is None else noise[:, there] / scale[there]
+    triangle, of_noise = (np.asarray(np.linalg.qr(each, mode="r")) for each in (scaled, of_noise))
+    order = _pivoted(triangle, of_noise, tolerance)
+    kept, dropped = there[order], np.setdiff1d(there, there[order])
+    q, r = np.linalg.qr(scaled[:, order])
+    others = np.setdiff1d(np.arange(len(there)), order)
+    shares = solve_triangular(r, q.T @ scaled[:, others])
     shares[np.abs(shares) < CERTAIN * tolerance] = 0.0
     return Independence(
         kept=kept,
@@ -69,10 +78,33 @@ def independence(columns: FloatArray, tolerance: float) -> Independence:
         nothing=np.setdiff1d(np.arange(len(scale)), there),
         shares=shares * scale[dropped] / scale[kept][:, None],
         scale=scale,
-        q=q[:, :rank],
-        r=r[:rank, :rank],
-        condition=float(np.linalg.cond(r)) if there.size else 1.0,
+        q=q,
+        r=r,
+        condition=float(np.linalg.cond(triangle)) if there.size else 1.0,
     )
+
+
+def _pivoted(triangle: FloatArray, noise: FloatArray, tolerance: float) -> list[int]:
+    """Places of the independent columns of unit norm: the one that adds most to those before it is next.
+
+    Args:
+        triangle: the columns, turned to be few rows.
+        noise: of them, turned likewise: combinations of columns have those of their noise.
+        tolerance: as of `independence`.
+    """
+    left, noise = triangle.copy(), noise.copy()
+    waiting, kept = list(range(left.shape[1])), []
+    while waiting:
+        size = np.linalg.norm(left[:, waiting], axis=0)
+        first_of_largest = int(np.argmax(np.round(size, 9)))
+        best = waiting.pop(first_of_largest)
+        size_of_best = float(np.max(size))
+        if size_of_best > max(tolerance, ABOVE_NOISE * float(np.linalg.norm(noise[:, best]))):
+            share = left[:, best] @ left[:, waiting] / size_of_best**2
+            left[:, waiting] -= np.outer(left[:, best], share)
+            noise[:, waiting] -= np.outer(noise[:, best], share)
+            kept.append(best)
+    return kept
 
 
 def first_independent(columns: FloatArray, tolerance: float) -> IndexArray:

@@ -97,7 +97,6 @@ def least_squares(
     records: Sequence[Equations],
     present: FloatArray,
     tolerance: float = SEPARABLE,
-    given_covariance: FloatArray | None = None,
 ) -> Fit:
     """Solve linear equations; rows of each group count by its noise, which is estimated from what is left.
 
@@ -107,13 +106,12 @@ def least_squares(
         records: equations of each record.
         present: numbers at which they predict, (unknowns,).
         tolerance: share of a column that no combination of the others may explain.
-        given_covariance: of the numbers that `Equations.of_given` is about, (numbers, numbers).
 
     Raises:
         InputError: there are no more equations than unknowns.
     """
     system = System.of(records)
-    return fit_of(system, present, solved(system, tolerance), present, given_covariance)
+    return fit_of(system, present, solved(system, tolerance), present)
 
 
 def solved(system: System, tolerance: float = SEPARABLE) -> Step:
@@ -141,7 +139,7 @@ def _weighted(system: System, noise: FloatArray, tolerance: float) -> Step:
     from scipy.linalg import solve_triangular
 
     weight = 1 / noise[system.group]
-    split = independence(system.slopes * weight[:, None], tolerance)
+    split = independence(system.slopes * weight[:, None], tolerance, system.slope_noise * weight[:, None])
     target = split.q.T @ (system.residual * weight)
     change = np.zeros(system.slopes.shape[1])
     change[split.kept] = solve_triangular(split.r, target) / split.scale[split.kept]
@@ -164,7 +162,6 @@ def fit_of(
     present: FloatArray,
     step: Step,
     before: FloatArray,
-    given_covariance: FloatArray | None = None,
 ) -> Fit:
     """What a solution says, with its standard errors.
 
@@ -173,11 +170,10 @@ def fit_of(
         present: those, (unknowns,).
         step: the solution.
         before: what unknowns that cannot be told remain, (unknowns,).
-        given_covariance: as of `least_squares`.
     """
     split, left = step.split, system.residual - system.slopes @ step.change
-    covariance = _covariance(system, step, left, given_covariance)
     solution = present + step.change
+    covariance = _covariance(system, step, left)
     errors = np.sqrt(np.diagonal(covariance))
     combinations = tuple(_combinations(split, solution, errors))
     told = np.zeros(len(present), dtype=bool)
@@ -195,17 +191,21 @@ def fit_of(
     )
 
 
-def _covariance(
-    system: System, step: Step, left: FloatArray, given_covariance: FloatArray | None
-) -> FloatArray:
-    """Of the changed unknowns, (unknowns, unknowns): of the noise, and of what was given."""
+def _covariance(system: System, step: Step, left: FloatArray) -> FloatArray:
+    """Of the changed unknowns, (unknowns, unknowns): of the noise, of numbers found before, and of bias.
+
+    Noise in the columns makes unknowns too small (W. A. Fuller, Measurement Error Models, 1987, section 1.1).
+    How much is known roughly, and counts as an error.
+    """
     from scipy.linalg import solve_triangular
 
-    split = step.split
+    split, weight = step.split, step.weight[:, None]
     of_scores = score_covariance(system, split.q, left * step.weight)
-    if given_covariance is not None:
-        of_numbers = split.q.T @ (system.of_given * step.weight[:, None])
-        of_scores = of_scores + of_numbers @ given_covariance @ of_numbers.T
+    of_errors = split.q.T @ (system.errors * weight)
+    of_slopes = system.slope_noise[:, split.kept] / split.scale[split.kept] * weight
+    of_residual = system.residual_noise - system.slope_noise @ step.change
+    bias = solve_triangular(split.r, of_slopes.T @ (of_residual * step.weight), trans="T")
+    of_scores = of_scores + of_errors @ of_errors.T + np.outer(bias, bias)
     half = solve_triangular(split.r, of_scores)
     inner = solve_triangular(split.r, half.T) / np.outer(split.scale[split.kept], split.scale[split.kept])
     covariance = np.zeros((system.slopes.shape[1],) * 2)

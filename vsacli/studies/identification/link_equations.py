@@ -70,8 +70,23 @@ def _numbers(robot: Robot, fit: Sequence[str]) -> Iterator[Parameter]:
             yield from unknowns(robot, index, fit)
 
 
+class Given(NamedTuple):
+    """Numbers that were found before.
+
+    Attributes:
+        numbers: of the robot.
+        errors: what independent errors change of them, (numbers, errors), each by one standard error.
+    """
+
+    numbers: tuple[Parameter, ...]
+    errors: FloatArray
+
+
+NOTHING_GIVEN = Given((), np.zeros((0, 0)))
+
+
 def link_equations(
-    robot: Robot, sought: LinkUnknowns, signals: Signals, given: Sequence[Parameter] = ()
+    robot: Robot, sought: LinkUnknowns, signals: Signals, given: Given = NOTHING_GIVEN
 ) -> Equations:
     """The equations of all links whose torque is known: by springs and motors, or by a rigid drive.
 
@@ -84,7 +99,7 @@ def link_equations(
     columns = regressor(robot, signals.q, signals.dq, signals.ddq)[:, sought.base.kept]
     found = []
     for index, joint in enumerate(robot.joints):
-        torque, of_given = _carried(robot, index, signals, given)
+        torque, of_given = _carried(robot, index, signals, given.numbers)
         resistance, slopes = _resistance(robot, index, signals, sought.numbers)
         if np.isfinite(torque).all():
             taken = sought.present[: len(sought.base.kept)] @ columns[index] + resistance
@@ -98,7 +113,7 @@ def link_equations(
         slopes=together[:, 2:last],
         group=np.repeat([name for name, _ in found], [len(rows) for _, rows in found]),
         sample=np.concatenate([np.arange(len(rows)) for _, rows in found]),
-        of_given=together[:, last:],
+        errors=together[:, last:] @ given.errors,
     )
 
 

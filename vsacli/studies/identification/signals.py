@@ -84,6 +84,8 @@ class Signals(NamedTuple):
         tau_motor: torques as measured, unfiltered, (samples, joints, 2), NaN likewise.
         rate: samples a second.
         filter: which every column of an equation passes, the measured torque as well.
+        noise: standard deviation of the noise of q and both theta before filtering, as far as it is white,
+            (joints, 3), NaN likewise; None if it is not known.
     """
 
     time: FloatArray
@@ -96,6 +98,7 @@ class Signals(NamedTuple):
     tau_motor: FloatArray
     rate: float
     filter: Filter
+    noise: FloatArray | None = None
 
 
 def conditioned(
@@ -111,23 +114,48 @@ def conditioned(
         bandwidth: of the equations, Hz, less than a quarter of the rate.
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    positions = np.concatenate((q[..., None], theta), axis=-1)
-    smooth = Filter.low_pass(WIDER * bandwidth, rate).smoothed(positions, ends="odd")
-    low_pass = Filter.low_pass(bandwidth, rate)
+    positions, low_pass = np.concatenate((q[..., None], theta), axis=-1), Filter.low_pass(bandwidth, rate)
+    motion = _motion(time, positions, low_pass, rate)
     inside = slice(low_pass.reach, len(time) - low_pass.reach)
-    smooth, rates, accelerations = (each[inside] for each in (smooth, *_derivatives(time, smooth)))
+    noise = np.sqrt(
+        np.mean((positions[inside] - motion[0]) ** 2, axis=0) / (1 - 2 * WIDER * bandwidth / rate)
+    )
     return Signals(
         time=time[inside],
-        q=smooth[..., 0],
-        dq=rates[..., 0],
-        ddq=accelerations[..., 0],
-        theta=smooth[..., 1:],
-        dtheta=rates[..., 1:],
-        ddtheta=accelerations[..., 1:],
+        q=motion[0][..., 0],
+        dq=motion[1][..., 0],
+        ddq=motion[2][..., 0],
+        theta=motion[0][..., 1:],
+        dtheta=motion[1][..., 1:],
+        ddtheta=motion[2][..., 1:],
         tau_motor=tau_motor[inside],
         rate=rate,
         filter=low_pass,
+        noise=noise,
     )
+
+
+def disturbed(signals: Signals) -> Signals:
+    """The same with noise of positions once more, as large as that of the record was, the same each time."""
+    assert signals.noise is not None, "of a record"
+    samples = len(signals.time) + 2 * signals.filter.reach
+    drawn = np.random.default_rng(0).normal(size=(samples, *signals.noise.shape)) * signals.noise
+    noise = _motion(np.arange(samples) / signals.rate, drawn, signals.filter, signals.rate)
+    return signals._replace(
+        q=signals.q + noise[0][..., 0],
+        dq=signals.dq + noise[1][..., 0],
+        ddq=signals.ddq + noise[2][..., 0],
+        theta=signals.theta + noise[0][..., 1:],
+        dtheta=signals.dtheta + noise[1][..., 1:],
+        ddtheta=signals.ddtheta + noise[2][..., 1:],
+    )
+
+
+def _motion(time: FloatArray, positions: FloatArray, low_pass: Filter, rate: float) -> tuple[FloatArray, ...]:
+    """Positions and their first two derivatives, filtered, without the ends where that rings."""
+    smooth = Filter.low_pass(WIDER * low_pass.bandwidth, rate).smoothed(positions, ends="odd")
+    inside = slice(low_pass.reach, len(time) - low_pass.reach)
+    return tuple(each[inside] for each in (smooth, *_derivatives(time, smooth)))
 
 
 def _derivatives(time: FloatArray, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
