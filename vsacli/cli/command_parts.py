@@ -25,13 +25,18 @@ if TYPE_CHECKING:
     from vsacli.trajectory.trajectory import Trajectory
 
 
-def _split(_context: click.Context, _parameter: click.Parameter, text: str | None) -> tuple[str, ...] | None:
-    if text is None:
-        return None
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
-    if not names:
-        raise click.BadParameter("expected names separated by commas, e.g. tau_motor,flags")
-    return names
+def words_of(example: str) -> Callable[..., tuple[str, ...] | None]:
+    """A callback for words separated by commas, such as the example."""
+
+    def words(_context: click.Context, _parameter: click.Parameter, text: str | None) -> Any:
+        if text is None:
+            return None
+        names = tuple(name.strip() for name in text.split(",") if name.strip())
+        if not names:
+            raise click.BadParameter(f"expected names separated by commas, e.g. {example}")
+        return names
+
+    return words
 
 
 def hdf5_name(_context: click.Context, _parameter: click.Parameter, name: str | None) -> str | None:
@@ -46,7 +51,7 @@ def variables_option(default: str) -> Callable[[Any], Any]:
     return click.option(
         "--variables",
         metavar="NAMES",
-        callback=_split,
+        callback=words_of("tau_motor,flags"),
         help=f"Only these variables, e.g. tau_motor,flags; by default {default}.",
     )
 

@@ -29,6 +29,7 @@ _SECTIONS = {
         "simulate": "vsacli.cli.simulate:simulate",
         "codegen": "vsacli.cli.codegen:codegen",
         "sensitivity": "vsacli.cli.sensitivity:sensitivity",
+        "identify": "vsacli.cli.identify:identify",
     },
     "Results": {
         "plot": "vsacli.cli.plot:plot",

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Iterator, Mapping
-from typing import TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import yaml
 
@@ -13,12 +16,13 @@ from vsacli.base.texts import for_yaml
 _Words: TypeAlias = tuple[str, ...]
 
 
-def edited(text: str, values: Mapping[str, str]) -> str:
-    """The text with texts at some paths replaced, or put in where there is none.
+def edited(text: str, values: Mapping[str, Any]) -> str:
+    """The text with other values at some paths, or put in where there is none.
 
     Args:
         text: a YAML document that can be read.
-        values: new texts by path, e.g. `joints.0.actuator.preload`; entries of lists by index.
+        values: new texts, numbers, or mappings of these by path, e.g. `joints.0.actuator.preload`; entries of
+            lists by index.
 
     Raises:
         InputError: a path leads nowhere, or through an alias, so that its anchor would change as well.
@@ -28,6 +32,22 @@ def edited(text: str, values: Mapping[str, str]) -> str:
     for start, end, replacement in sorted(edits, reverse=True):
         text = text[:start] + replacement + text[end:]
     return text
+
+
+def moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, str]]:
+    """Path and value of every file that a document in a folder names, as seen from another folder."""
+    if os.path.samefile(origin, folder):
+        return
+    for path, file in texts_at(text, "file"):
+        yield path, os.path.relpath(origin / file, folder)
+
+
+def node_at(root: yaml.Node, path: str) -> yaml.Node:
+    """What stands at a path that leads somewhere."""
+    node = root
+    for word in path.split("."):
+        node = dict(_entries(node))[word]
+    return node
 
 
 def texts_at(text: str, key: str) -> Iterator[tuple[str, str]]:
@@ -56,7 +76,7 @@ def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
         yield from ((str(index), entry) for index, entry in enumerate(node.value))
 
 
-def _edit(root: yaml.Node, words: _Words, value: str) -> tuple[int, int, str]:
+def _edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
     """From where to where the text becomes what."""
     *way, key = words
     node = root
@@ -67,12 +87,12 @@ def _edit(root: yaml.Node, words: _Words, value: str) -> tuple[int, int, str]:
         if not node.start_mark.index <= found.start_mark.index < node.end_mark.index:
             raise InputError.one(f"{'.'.join(words)}: {word!r} is an alias, which others share")
         node = found
-    if not isinstance(node, yaml.MappingNode):
-        raise InputError.one(f"{'.'.join(words)}: there is no {key!r}")
     here = dict(_entries(node)).get(key)
     if here is not None:
-        return here.start_mark.index, here.end_mark.index, _quoted(value)
-    return _insertion(node, f"{key}: {_quoted(value)}")
+        return here.start_mark.index, here.end_mark.index, _written(value)
+    if not isinstance(node, yaml.MappingNode):
+        raise InputError.one(f"{'.'.join(words)}: there is no {key!r}")
+    return _insertion(node, f"{key}: {_written(value)}")
 
 
 def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
@@ -82,6 +102,11 @@ def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
     return start, start, f"{entry}, " if node.flow_style else f"{entry}\n{' ' * first.column}"
 
 
-def _quoted(value: str) -> str:
-    """A text as YAML may hold it: words plain, others in quotes."""
-    return value if value.isidentifier() else for_yaml(value)
+def _written(value: Any) -> str:
+    """A value on one line: words plain, other texts in quotes."""
+    match value:
+        case Mapping():
+            return "{" + ", ".join(f"{key}: {_written(each)}" for key, each in value.items()) + "}"
+        case str():
+            return value if value.isidentifier() else for_yaml(value)
+    return json.dumps(value)

@@ -33,6 +33,8 @@ MAX_KINDS = 10
 """Kinds of problems that are told."""
 MAX_ALIKE = 1000
 """Problems of one kind after which reading is given up."""
+NOTHING = ("", "nan")
+"""What stands in a cell for no number, where that is admitted."""
 NOT_UTF8 = "\ufffd"
 """What bytes that are not UTF-8 are read as."""
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
@@ -51,7 +53,7 @@ class Table:
 
     Attributes:
         columns: names from the header line.
-        values: (rows, columns), all finite, at least one row.
+        values: (rows, columns), all finite, at least one row; NaN in empty cells if these are admitted.
         source: the file.
         header_line: line of the header in the file, from 1.
     """
@@ -103,7 +105,7 @@ class _Header(NamedTuple):
     columns: tuple[str, ...]
 
 
-def read_table(path: str | os.PathLike[str]) -> Table:
+def read_table(path: str | os.PathLike[str], *, empty_cells: bool = False) -> Table:
     """Read a CSV file, in about the time and memory that `numpy.loadtxt` takes.
 
     The first line names the columns; a tab, semicolon or comma in it is the separator. From `#` to the end of
@@ -111,6 +113,7 @@ def read_table(path: str | os.PathLike[str]) -> Table:
 
     Args:
         path: the file; UTF-8, a byte order mark is accepted.
+        empty_cells: whether cells may be empty, or hold `nan`, where a column has no sample.
 
     Raises:
         InputError: with file and line of what is no such table.
@@ -121,7 +124,7 @@ def read_table(path: str | os.PathLike[str]) -> Table:
         with open(place_of(name), "rb") as content:
             header = _read_header(content, name)
             digest, text = _survey(content, name)
-        values = _read_rows(header, name)
+        values = _read_rows(header, name, empty_cells)
         source = Source(name, digest, None if text is None else decode_utf8(text, name))
         return Table(header.columns, values, source, header.line)
     except OSError as error:
@@ -181,35 +184,52 @@ def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
     return digest.hexdigest(), text if len(text) <= MAX_DOCUMENT_BYTES else None
 
 
-def _read_rows(header: _Header, name: str) -> FloatArray:
+def _read_rows(header: _Header, name: str, empty_cells: bool) -> FloatArray:
     """NumPy's C reader; only if it fails, or has met anything unusual, each line is looked at."""
-    reason: object = "its rows are not those of a table"
+    values, reason = _loaded(os.path.abspath(place_of(name)), header, header.line)
+    if empty_cells and not values.size:
+        with open(place_of(name), encoding="utf-8-sig", errors="replace") as file:
+            values, reason = _loaded(_filled(file, header), header, 0)
+    odd = np.isinf(values) if empty_cells else ~np.isfinite(values)
+    if values.shape[1] == len(header.columns) and not odd.any():
+        return values
+    raise InputError(
+        _row_problems(header, name, empty_cells) or [Problem(name, 0, f"cannot be read: {reason}")]
+    )
+
+
+def _loaded(source: str | Iterable[str], header: _Header, skipped: int) -> tuple[FloatArray, object]:
+    """The rows, and why there are none."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)  # NumPy's way to say that there are no rows
         try:
             values = np.loadtxt(
-                os.path.abspath(place_of(name)),
+                source,
                 delimiter=header.separator,
                 comments=COMMENT,
                 encoding="latin-1",  # comments may be anything; numbers are ASCII
-                skiprows=header.line,
+                skiprows=skipped,
                 ndmin=2,
             )
         except (ValueError, UserWarning) as error:
-            values, reason = np.empty((0, 0)), error
-    if values.shape[1] == len(header.columns) and np.isfinite(values).all():
-        return values
-    raise InputError(_row_problems(header, name) or [Problem(name, 0, f"cannot be read: {reason}")])
+            return np.empty((0, 0)), error
+    return values, "its rows are not those of a table"
 
 
-def _row_problems(header: _Header, name: str) -> list[Problem]:
+def _filled(file: Iterable[str], header: _Header) -> Iterator[str]:
+    """Rows whose empty cells say that there is no number."""
+    for _, line in _rows(file, header.line):
+        yield header.separator.join(cell if cell.strip() else "nan" for cell in line.split(header.separator))
+
+
+def _row_problems(header: _Header, name: str, empty_cells: bool) -> list[Problem]:
     """The first problem of each kind, saying how many there are like it."""
     alike: dict[str, list[Problem]] = {}
     empty = True
     with open(place_of(name), encoding="utf-8-sig", errors="replace") as file:
         for number, line in _rows(file, header.line):
             empty = False
-            for kind, message in _cell_problems(line, header):
+            for kind, message in _cell_problems(line, header, empty_cells):
                 alike.setdefault(kind, []).append(Problem(name, number, message))
             if len(alike) > MAX_KINDS or any(len(found) >= MAX_ALIKE for found in alike.values()):
                 break
@@ -237,7 +257,7 @@ def _rows(file: Iterable[str], header_line: int) -> Iterator[tuple[int, str]]:
             yield number, content
 
 
-def _cell_problems(line: str, header: _Header) -> Iterator[tuple[str, str]]:
+def _cell_problems(line: str, header: _Header, empty_cells: bool) -> Iterator[tuple[str, str]]:
     """Kind and sentence of what is wrong with a row."""
     cells, columns = line.split(header.separator), header.columns
     if len(cells) != len(columns):
@@ -246,7 +266,7 @@ def _cell_problems(line: str, header: _Header) -> Iterator[tuple[str, str]]:
         yield "count", f"expected {len(columns)} values as in the header, found {len(cells)}{hint}"
         return
     for column, cell in zip(columns, cells, strict=True):
-        if not _is_number(cell):
+        if not _is_number(cell) and not (empty_cells and cell.strip().lower() in NOTHING):
             hint = (
                 "; decimal commas are not understood, write a point" if _DECIMAL_COMMA.fullmatch(cell) else ""
             )

@@ -1,18 +1,21 @@
-"""Questions beyond a run: what would make a motion possible, and how far a measured one is from it."""
+"""Questions beyond a run: what would make it possible, what matters in it, what was measured of it."""
 
 from typing import TYPE_CHECKING
 
 from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from vsacli.studies.identification import Identification, identify
     from vsacli.studies.measured import Comparison, compare
     from vsacli.studies.remedies import suggest
     from vsacli.studies.sensitivities import Sensitivity, sensitivity
 
 __all__ = [
     "Comparison",
+    "Identification",
     "Sensitivity",
     "compare",
+    "identify",
     "sensitivity",
     "suggest",
 ]

@@ -41,6 +41,21 @@ def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, .
     )
 
 
+def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
+    """A robot whose motors behind springs have friction of zero where they had none, so that it can be found.
+
+    Args:
+        robot: the robot.
+        joints: indices of those that it is about.
+    """
+    paths = [str(each) for each in parameters(robot) if each.joint in joints and group_of(each)]
+    sprung = [joint.name for joint in robot.joints if joint.actuator.sprung]
+    inertias = [path for path in paths if path.endswith(".inertia") and path.split(".")[1] in sprung]
+    frictions = [path.replace(".inertia", f".{FRICTION}") for path in inertias]
+    lacking = [each for each in frictions if not any(path.startswith(f"{each}.") for path in paths)]
+    return robot.replace({each: {"coulomb": 0.0} for each in lacking})
+
+
 def group_of(parameter: Parameter) -> str | None:
     """What a number of a joint belongs to, a word of `GROUPS`; None if it is not to be found."""
     place = parameter.path[2:]

@@ -16,7 +16,7 @@ from vsacli.results.store.simulation import open_stored
 from vsacli.studies.measured.agreement import Agreement, straight_line
 from vsacli.studies.measured.alignment import Alignment, Pairing, align, lag_of
 from vsacli.studies.measured.comparison_report import SHOWN_LAG, Comparison
-from vsacli.studies.measured.measured_columns import Measured, Recording, recording_of
+from vsacli.studies.measured.measured_columns import Measured, Recording, known_columns, recording_of
 from vsacli.studies.measured.slips import slips
 
 POSITIONS = ("q", "theta")
@@ -51,7 +51,8 @@ def compare(
     if not isinstance(result, StoredResult):
         with open_stored(result) as stored:
             return compare(stored, recording, begins_at)
-    recorded = recording_of(result, read_table(recording))
+    variables = [result.declared[name] for name in result.variables]
+    recorded = recording_of(known_columns(result, variables), read_table(recording), "the result")
     computed = [_interpolated(result, signal) for signal in recorded.signals]
     duration = float(result.time[-1] - result.time[0])
     pairings = [

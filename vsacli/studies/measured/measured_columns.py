@@ -1,29 +1,51 @@
-"""Which column of a recording is which variable of a result, in the units of the result."""
+"""Which column of a recording is which variable of a result or a robot, in the units of these."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.documents.table import Table, split_heading
-from vsacli.results.store.reader import StoredResult
 
 TIME = "time"
+
+
+class Jointed(Protocol):
+    """What a recording may be of: a result, or a robot."""
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        ...
+
+    @property
+    def joint_types(self) -> tuple[str, ...]:
+        """Their types."""
+        ...
+
+    @property
+    def gear_ratio(self) -> FloatArray:
+        """Of the motors, (joints, 2); NaN where it is not known."""
+        ...
+
+    def existing(self, variable: Variable) -> BoolArray:
+        """Which columns of a variable of joints there are, (joints, 1 or 2)."""
+        ...
 
 
 class Place(NamedTuple):
     """Where a column belongs.
 
     Attributes:
-        variable: of the result.
+        variable: its name.
         joint: its index.
         motor: 1 or 2, None if the variable is none of motors.
         unit: of numbers without a unit of their own.
@@ -53,12 +75,12 @@ class Measured:
 
 
 class Recording(NamedTuple):
-    """What was recorded of the variables of a result.
+    """What was recorded of some variables.
 
     Attributes:
         time: (samples,), s, from the first sample on.
         signals: in the order of the variables, then of the joints.
-        others: names of the columns that are none of the result's.
+        others: names of the columns that are none of these variables.
     """
 
     time: FloatArray
@@ -66,20 +88,23 @@ class Recording(NamedTuple):
     others: tuple[str, ...]
 
 
-def recording_of(result: StoredResult, table: Table) -> Recording:
-    """The columns of a table that are variables of a result.
+def recording_of(places: Mapping[str, Place], table: Table, owner: str) -> Recording:
+    """The columns of a table that have a place.
 
     Args:
-        result: an open result or simulation.
+        places: by the names that columns may have, see `known_columns`.
+        owner: whose variables they are, for sentences.
         table: with a column `time`, and columns named as `vsacli export` names them, or by the number of the
             joint, `q1` for the first; a unit in brackets may follow any name.
 
     Raises:
         InputError: there is no such column, a unit is one of something else, or the times do not ascend.
     """
-    places, headings = known_columns(result), [split_heading(column) for column in table.columns]
+    headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
-    problems = [Problem(table.source.path, table.header_line, text) for text in _unusable(names, places)]
+    problems = [
+        Problem(table.source.path, table.header_line, text) for text in _unusable(names, places, owner)
+    ]
     factors: dict[int, float] = {}
     for index, (name, unit) in enumerate(headings):
         if name == TIME or name in places:
@@ -100,35 +125,35 @@ def recording_of(result: StoredResult, table: Table) -> Recording:
     return Recording(_elapsed(table, factors[names.index(TIME)]), tuple(signals), others)
 
 
-def known_columns(result: StoredResult) -> dict[str, Place]:
-    """Every name that a column of a result's variables may have."""
+def known_columns(jointed: Jointed, variables: Iterable[Variable]) -> dict[str, Place]:
+    """Every name that a column of some variables may have, those of joints."""
     return {
         name: place
-        for variable in (result.declared[name] for name in result.variables)
+        for variable in variables
         if "joint" in variable.dims and variable.name != "flags"
-        for name, place in _names(result, variable)
+        for name, place in _names(jointed, variable)
     }
 
 
-def _names(result: StoredResult, variable: Variable) -> Iterator[tuple[str, Place]]:
+def _names(jointed: Jointed, variable: Variable) -> Iterator[tuple[str, Place]]:
     """Names of the columns of a variable, of those joints and motors that have it."""
     of_motors = "motor" in variable.dims
-    for joint, there in enumerate(result.existing(variable)):
-        unit = variable.quantity.unit(result.joint_types[joint])
+    for joint, there in enumerate(jointed.existing(variable)):
+        unit = variable.quantity.unit(jointed.joint_types[joint])
         for number in (motor for motor, exists in zip(MOTORS, there, strict=False) if exists):
             motor = number if of_motors else None
             ending = f"_{number}" if of_motors else ""
             place = Place(variable.name, joint, motor, unit)
-            yield f"{result.joint_names[joint]}.{variable.name}{ending}", place
+            yield f"{jointed.joint_names[joint]}.{variable.name}{ending}", place
             yield f"{variable.name}{joint + 1}{ending}", place
-            ratio = float(result.gear_ratio[joint, number - 1])
+            ratio = float(jointed.gear_ratio[joint, number - 1])
             if variable.geared and np.isfinite(ratio):  # a shaft turns, whatever the joint does
                 on_shaft = variable.quantity.unit("revolute")
                 shaft = place._replace(unit=on_shaft, gear=ratio**-variable.geared)
-                yield f"{result.joint_names[joint]}.{variable.name}_shaft{ending}", shaft
+                yield f"{jointed.joint_names[joint]}.{variable.name}_shaft{ending}", shaft
 
 
-def _unusable(names: list[str], places: dict[str, Place]) -> Iterator[str]:
+def _unusable(names: list[str], places: Mapping[str, Place], owner: str) -> Iterator[str]:
     if TIME not in names:
         yield f"there is no column {TIME!r}"
     found = [name for name in names if name in places]
@@ -136,7 +161,7 @@ def _unusable(names: list[str], places: dict[str, Place]) -> Iterator[str]:
         strangers = [name for name in names if name != TIME]
         hint = next((hint for name in strangers if (hint := did_you_mean(name, places))), "")
         examples = ", ".join(list(places)[:3])
-        yield f"no column is a variable of the result, such as {examples}{hint}"
+        yield f"no column is a variable of {owner}, such as {examples}{hint}"
     for name in sorted({name for name in names if names.count(name) > 1 and name in places}):
         yield f"column {name!r} appears {names.count(name)} times"
     twice = {place: name for name in found if (place := places[name]._replace(unit="", gear=1.0))}
@@ -156,7 +181,7 @@ def _elapsed(table: Table, factor: float) -> FloatArray:
     stamps = table.values[:, names.index(TIME)]
     if len(stamps) < 2:
         raise InputError.one("a recording needs two rows at least", table.source.path)
-    back = np.flatnonzero(np.diff(stamps) <= 0)
+    back = np.flatnonzero(~(np.diff(stamps) > 0))
     if back.size:
         line = table.line_of(int(back[0]) + 1)
         raise InputError.one("the times must ascend from row to row", table.source.path, line)

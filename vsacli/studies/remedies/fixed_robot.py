@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
 from pathlib import Path
 
 from vsacli.base.errors import InputError
-from vsacli.documents.edited import edited, texts_at
+from vsacli.documents.edited import edited, moved_files
 from vsacli.studies.remedies.combination import preload_path
 from vsacli.studies.remedies.suggestions import Remedy
 
@@ -29,14 +27,6 @@ def robot_text(remedy: Remedy, folder: Path) -> str:
         for joint, preload in remedy.preload.preloads.items()
     }
     try:
-        return edited(source.text, values | dict(_moved_files(source.text, Path(source.path).parent, folder)))
+        return edited(source.text, values | dict(moved_files(source.text, Path(source.path).parent, folder)))
     except InputError as error:
         raise InputError.one(f"{remedy.preload.sentence} there by hand: {error}", source.path) from None
-
-
-def _moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, str]]:
-    """The files that the text names, as seen from a folder that is another one."""
-    if os.path.samefile(origin, folder):
-        return
-    for path, file in texts_at(text, "file"):
-        yield path, os.path.relpath(origin / file, folder)

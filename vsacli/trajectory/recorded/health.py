@@ -36,7 +36,8 @@ def health(
     for record in records:
         for component in np.flatnonzero(record.given).tolist():
             unit = _unit(record.signal.quantities[0], component, types)
-            for first, sentence in _of_column(stamps, record, component, unit):
+            values, angle = record.values[component], record.signal is POSITION
+            for first, sentence in column_faults(stamps, record.time, values, unit, angle=angle):
                 yield SampleProblem(record.signal.names[0], sentence, component, first)
 
 
@@ -57,9 +58,18 @@ def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterato
                 yield SampleProblem(name, f"goes to {largest:.4g} m; are these mm? {_write('mm')}", index)
 
 
-def _of_column(stamps: FloatArray, record: Samples, component: int, unit: str) -> Iterator[tuple[int, str]]:
-    """Of each kind of fault the first sample, and a sentence."""
-    time, values = record.time, record.values[component]
+def column_faults(
+    stamps: FloatArray, time: FloatArray, values: FloatArray, unit: str = "", *, angle: bool = False
+) -> Iterator[tuple[int, str]]:
+    """Of each kind of fault of a column, (samples,), the first sample, and a sentence without a subject.
+
+    Args:
+        stamps: as recorded, s.
+        time: from the first sample on, s.
+        values: the column, more than four samples.
+        unit: of its values, with a blank before it.
+        angle: whether it may be an angle that was wrapped.
+    """
     if np.ptp(values) == 0:
         return
     grain = Grain.of(time, values)
@@ -89,7 +99,7 @@ def _of_column(stamps: FloatArray, record: Samples, component: int, unit: str) -
             f"is cut off at {at} {_occasions(cut, stamps)}, for {_lasting(cut, stamps)}"
             " while the motion goes on: the sensor or the log file has no larger range; record again",
         )
-    if record.signal is POSITION and (wrapped := wraps(values)):
+    if angle and (wrapped := wraps(values)):
         yield (
             wrapped.at,
             f"jumps by 2 pi {_occasions(wrapped, stamps)}: an angle that was wrapped? Set unwrap: true under"

@@ -1,0 +1,244 @@
+"""What an identification says, as text and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.json_records import Published, named
+from vsacli.base.tables import aligned
+from vsacli.robot.model import Robot
+
+OK, UNTOLD, MISFIT, DOUBTFUL = "ok", "untold", "misfit", "doubtful"
+"""Verdicts, the worst last: all numbers are told; some are not; the equations leave more than noise; a record
+looks wrong."""
+
+CHANGED = 2.0
+"""Standard errors by which a number differs from that of the file."""
+
+
+@dataclass(frozen=True)
+class Number(Published):
+    """A number of a robot as found.
+
+    Attributes:
+        path: to it, from the robot.
+        unit: of all values.
+        before: by the robot file.
+        value: what is found, or kept.
+        standard_error: of that; NaN if it was not told.
+        note: why it was not told, or is at a bound; empty otherwise.
+    """
+
+    path: str
+    unit: str
+    before: float
+    value: float
+    standard_error: float
+    note: str = ""
+
+    shape: ClassVar = {
+        **named("path", "unit", "before", "value", "standard_error", "changed"),
+        "note?": "note",
+    }
+
+    @property
+    def told(self) -> bool:
+        """Whether it was found."""
+        return math.isfinite(self.standard_error)
+
+    @property
+    def changed(self) -> bool:
+        """Whether it differs from that of the file by more than it may be off."""
+        return self.told and abs(self.value - self.before) > CHANGED * self.standard_error
+
+
+@dataclass(frozen=True)
+class Residual(Published):
+    """What the equations of a motor, or a link, leave; root mean squares, after the filter.
+
+    Attributes:
+        group: which it is.
+        unit: of all values.
+        torque: what was measured.
+        residual: that less what is predicted.
+        noise: of the measured torque, from where no motion is; NaN if it is not known.
+        held_out: the residual where the fit did not see it; NaN if nothing was held out.
+    """
+
+    group: str
+    unit: str
+    torque: float
+    residual: float
+    noise: float
+    held_out: float
+
+
+@dataclass(frozen=True)
+class SystemReport(Published):
+    """What was found of the numbers of a joint's motors and springs, or of the links.
+
+    Attributes:
+        title: whose they are.
+        numbers: all that were looked for.
+        condition: of the columns of the equations.
+        combinations: what can be told of numbers that cannot be told apart, sentences.
+        residuals: of each motor, or link.
+        converged: whether the search came to an end.
+    """
+
+    title: str
+    numbers: tuple[Number, ...]
+    condition: float
+    combinations: tuple[str, ...]
+    residuals: tuple[Residual, ...]
+    converged: bool = True
+
+
+@dataclass(frozen=True)
+class RecordReport(Published):
+    """How a record was used.
+
+    Attributes:
+        path: of it.
+        duration: of what was used, s.
+        rate: samples a second.
+        bandwidth: of the filter, Hz.
+        delay: by which torques were later than positions, s; NaN if it could not be told.
+        delay_error: its standard error.
+        corrected: whether it was taken out.
+        doubts: what looks wrong, sentences.
+        unused: columns that were not needed.
+    """
+
+    path: str
+    duration: float
+    rate: float
+    bandwidth: float
+    delay: float
+    delay_error: float
+    corrected: bool
+    doubts: tuple[str, ...]
+    unused: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Torques:
+    """Measured and predicted torques of a record for a figure, (rows,).
+
+    Attributes:
+        record: path of it.
+        group: motor or link.
+        unit: of the torques.
+        time, measured, predicted: rows of the equations.
+    """
+
+    record: str
+    group: str
+    unit: str
+    time: FloatArray = field(repr=False)
+    measured: FloatArray = field(repr=False)
+    predicted: FloatArray = field(repr=False)
+
+    @property
+    def residual(self) -> float:
+        """Root mean square of their difference."""
+        return float(np.sqrt(np.mean((self.measured - self.predicted) ** 2)))
+
+
+@dataclass(frozen=True)
+class Identification(Published):
+    """Numbers of a robot from records of its motion.
+
+    Attributes:
+        robot: its name.
+        verdict: `ok`, or the worst of `untold`, `misfit` and `doubtful`.
+        records: how each was used.
+        systems: what was found, joint by joint.
+        notes: what else is to be known, sentences.
+        fitted: the robot with the numbers found.
+        torques: measured and predicted, for figures; not in JSON.
+    """
+
+    robot: str
+    verdict: str
+    records: tuple[RecordReport, ...]
+    systems: tuple[SystemReport, ...]
+    notes: tuple[str, ...]
+    fitted: Robot = field(repr=False)
+    torques: tuple[Torques, ...] = field(repr=False, default=())
+
+    format: ClassVar[str] = "vsacli-identification/1"
+    shape: ClassVar = {"format": "format", **named("robot", "verdict", "records", "systems", "notes")}
+
+    @property
+    def numbers(self) -> tuple[Number, ...]:
+        """Of all systems."""
+        return tuple(number for system in self.systems for number in system.numbers)
+
+    def __str__(self) -> str:
+        count = f"{len(self.records)} record" + ("s" if len(self.records) > 1 else "")
+        title = f"{self.robot} from {count}: {self.verdict.upper()}"
+        return "\n".join(
+            [
+                title,
+                *(_used(each) for each in self.records),
+                *(line.rstrip() for line in aligned(list(self._numbers()))),
+                *aligned(list(self._residuals())),
+                *self._sentences(),
+            ]
+        )
+
+    def _numbers(self) -> Iterator[tuple[str, ...]]:
+        yield "number", "file", "found", "+-", "unit", ""
+        for each in self.numbers:
+            said = each.note or ("changed" if each.changed else "as in the file")
+            yield (
+                each.path,
+                f"{each.before:.6g}",
+                significant(each.value, each.standard_error),
+                f"{each.standard_error:.2g}" if each.told else "-",
+                each.unit,
+                said,
+            )
+
+    def _residuals(self) -> Iterator[tuple[str, ...]]:
+        yield "rms, filtered", "torque", "residual", "noise", "held out", "condition"
+        for system in self.systems:
+            for each in system.residuals:
+                figures = (each.torque, each.residual, each.noise, each.held_out)
+                yield (
+                    each.group,
+                    *(f"{value:.3g} {each.unit}" if math.isfinite(value) else "-" for value in figures),
+                    f"{system.condition:.3g}",
+                )
+
+    def _sentences(self) -> Iterator[str]:
+        for system in self.systems:
+            yield from (f"{system.title}: {sentence}" for sentence in system.combinations)
+        for record in self.records:
+            yield from (f"{record.path}: {doubt}" for doubt in record.doubts)
+        yield from self.notes
+
+
+def _used(record: RecordReport) -> str:
+    used = f"{record.duration:.4g} s at {record.rate:.4g} Hz, filtered to {record.bandwidth:.3g} Hz"
+    line = f"{record.path}: {used}"
+    if not math.isfinite(record.delay):
+        return f"{line}; whether torques lag behind positions cannot be told"
+    late = f"{1e3 * record.delay:+.2g} +- {1e3 * record.delay_error:.1g} ms behind positions"
+    return f"{line}; torques are {late}{', which is taken out' if record.corrected else ''}"
+
+
+def significant(value: float, error: float) -> str:
+    """A value with as many digits as its standard error leaves meaning, two of that."""
+    if not (math.isfinite(error) and error > 0):
+        return f"{value:.6g}"
+    decimals = 1 - math.floor(math.log10(error))
+    rounded = round(value, decimals)
+    return f"{rounded:.{max(decimals, 0)}f}"

@@ -1,0 +1,67 @@
+"""The system of equations of one joint's motors, with what its numbers may be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.robot.model import Robot
+from vsacli.studies.identification.equations import Equations
+from vsacli.studies.identification.motor_equations import motor_equations
+from vsacli.studies.identification.signals import Signals
+from vsacli.studies.identification.unknowns import unknowns
+from vsacli.studies.sensitivities.parameters import Parameter
+
+
+class MotorSystem:
+    """Equations of the motors of a joint with springs; see `SystemOfEquations`.
+
+    Args:
+        robot: the robot, as its file has it.
+        index: of the joint.
+        sought: numbers of its actuator that are to be found.
+    """
+
+    def __init__(self, robot: Robot, index: int, sought: Sequence[Parameter]) -> None:
+        self._robot, self._index, self._sought = robot, index, tuple(sought)
+        self.title = robot.joints[index].name
+        self.names = tuple(map(str, sought))
+        self.units = tuple(each.unit for each in sought)
+        self.before = np.array([each.value for each in sought])
+
+    def equations(self, values: FloatArray, signals: Signals) -> Equations:
+        """Those of a record at some values of the numbers, (numbers,)."""
+        return motor_equations(self._robot, self._index, self._sought, values, signals)
+
+    def admissible(self, number: int, value: float) -> float | None:
+        """The value itself if the robot file may hold it, else zero if it may hold that; None if neither."""
+        for each in (value, 0.0):
+            try:
+                self._robot.replace(self.names[number], each)
+            except InputError:
+                continue
+            return each
+        return None
+
+    def without(self, fixed: dict[int, float]) -> MotorSystem:
+        """The same with some numbers at given values, which are no longer looked for."""
+        robot = self._robot.replace({self.names[number]: value for number, value in fixed.items()})
+        return MotorSystem(robot, self._index, [e for n, e in enumerate(self._sought) if n not in fixed])
+
+
+def motor_systems(robot: Robot, joints: Sequence[int], fit: Sequence[str]) -> Iterator[MotorSystem]:
+    """Of the joints with springs, those of which anything is to be found.
+
+    Args:
+        robot: the robot.
+        joints: indices of those that were recorded.
+        fit: words and patterns, see `unknowns`.
+    """
+    for index in joints:
+        actuator = robot.joints[index].actuator
+        sought = unknowns(robot, index, fit) if actuator.sprung else ()
+        if sought:
+            yield MotorSystem(robot, index, sought)

@@ -1,0 +1,122 @@
+"""Columns of a record that say what joints and motors do, each with stamps of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import SIDES
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.simulation_variables import SIMULATION_VARIABLES, measured
+from vsacli.base.variables import VARIABLES, Variable
+from vsacli.documents.table import read_table, split_heading
+from vsacli.robot.model import Robot
+from vsacli.studies.measured.measured_columns import Measured, known_columns, recording_of
+from vsacli.trajectory.recorded.even_stamps import elapsed_times
+
+POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
+
+READINGS = (POSITION, MOTOR, TORQUE)
+"""What is needed of a joint. What sensors of a simulation read, `q_measured` and so on, goes before."""
+
+FEWEST_SAMPLES = 200
+"""Numbers of a column that are worth a fit: some seconds at 50 Hz."""
+
+
+Where: TypeAlias = tuple[str, int, int | None]
+"""Variable, index of the joint, and number of the motor or None."""
+
+
+class Column(NamedTuple):
+    """A recorded column.
+
+    Attributes:
+        name: in the file.
+        place: what it is.
+        time: of its samples, (samples,), s from the first row of the file on.
+        values: (samples,), SI units, joint side of the gear.
+        has_unit: whether a unit follows its name.
+    """
+
+    name: str
+    place: Where
+    time: FloatArray
+    values: FloatArray
+    has_unit: bool
+
+
+class _RobotColumns(NamedTuple):
+    """What columns there are of a robot; see `Jointed`."""
+
+    robot: Robot
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return self.robot.joint_names
+
+    @property
+    def joint_types(self) -> tuple[str, ...]:
+        return self.robot.joint_types
+
+    @property
+    def gear_ratio(self) -> FloatArray:
+        """Of the motors, (joints, 2); NaN where the file gives none."""
+        sides = [side for actuator in self.robot.actuators for side in actuator.sides]
+        ratios = [side.gear_ratio if side and side.gear_ratio else math.nan for side in sides]
+        return np.array(ratios).reshape(-1, SIDES)
+
+    def existing(self, variable: Variable) -> BoolArray:
+        """Which columns of a variable of joints there are."""
+        return np.array([joint.has(variable) for joint in self.robot.joints])
+
+
+def recorded_columns(robot: Robot, path: str | Path) -> tuple[list[Column], tuple[str, ...]]:
+    """The columns that are needed, and the names of the others.
+
+    Raises:
+        InputError: there is none, a unit is one of something else, times do not ascend, or a column has
+            hardly any number.
+    """
+    table = read_table(path, empty_cells=True)
+    wanted = [VARIABLES[name] for name in (*READINGS, CURRENT)]
+    wanted += [SIMULATION_VARIABLES[measured(name)] for name in READINGS]
+    recording = recording_of(known_columns(_RobotColumns(robot), wanted), table, "the robot")
+    united = {name for name, unit in map(split_heading, table.columns) if unit is not None}
+    stamps, columns = elapsed_times(recording.time), []
+    for place, signal in _preferred(recording.signals).items():
+        there = np.isfinite(signal.values)
+        values = signal.values[there] * _torque_of_current(robot, signal)
+        columns.append(Column(signal.column, place, stamps[there], values, signal.column in united))
+    few = [column for column in columns if len(column.time) < FEWEST_SAMPLES]
+    problems = [
+        f"column {each.name!r} has {len(each.time)} numbers, {FEWEST_SAMPLES} are needed" for each in few
+    ]
+    if problems:
+        raise InputError(Problem(str(path), table.header_line, problem) for problem in problems)
+    used = {column.name for column in columns}
+    others = [signal.column for signal in recording.signals if signal.column not in used]
+    return columns, (*others, *recording.others)
+
+
+def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:
+    """For each place the column that counts: what sensors read if it is there, torques before currents."""
+    ranks = {CURRENT: (TORQUE, 0)} | {name: (name, 1) for name in READINGS}
+    ranks |= {measured(name): (name, 2) for name in READINGS}
+    best: dict[Where, Measured] = {}
+    for signal in sorted(signals, key=lambda signal: ranks[signal.place.variable][1]):
+        variable, joint, motor, *_ = signal.place
+        best[ranks[variable][0], joint, motor] = signal
+    return best
+
+
+def _torque_of_current(robot: Robot, signal: Measured) -> float:
+    """What the numbers of a column are multiplied by to be torques, if they are currents."""
+    variable, joint, motor, *_ = signal.place
+    if variable != CURRENT or motor is None:
+        return 1.0
+    return robot.joints[joint].actuator.motors[motor - 1].torque_constant or 1.0
