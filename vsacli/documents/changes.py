@@ -9,7 +9,7 @@ from typing import Any, TypeAlias, TypeVar
 
 from vsacli.base.errors import InputError
 from vsacli.documents import tree
-from vsacli.documents.source import Problems
+from vsacli.documents.source import Problems, Source
 from vsacli.documents.yaml_tree import parse_yaml
 
 Changes: TypeAlias = Mapping[str, Any]
@@ -74,19 +74,19 @@ def check_path_of_change(path: str) -> None:
 
 def changed(
     document: _Document,
+    source: Source,
     changes: Changes,
-    members: Mapping[str, str],
-    exempt: Mapping[str, Mapping[str, str]],
-    file: str,
-) -> _Document:
-    """A document with changes.
+    members: Mapping[str, str] | None = None,
+    exempt: Mapping[str, Mapping[str, str]] | None = None,
+) -> tuple[_Document, Source]:
+    """A document with changes, and its file, which remembers them.
 
     Args:
         document: a record of declared fields.
+        source: the file that it was read from.
         changes: the changes.
         members: as of `read_document`.
         exempt: likewise.
-        file: its path.
 
     Raises:
         ChangeError: the first that cannot be made.
@@ -96,7 +96,7 @@ def changed(
     for path, value in changes.items():
         check_path_of_change(path)
         try:
-            document = replace(document, path, value, members, exempt, file)
+            document = replace(document, path, value, members, exempt, source.path)
         except InputError as error:
             raise ChangeError(error.problems) from None
-    return document
+    return document, source._replace(changes=json.dumps(changes)) if changes else source

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from contextlib import suppress
-from types import MappingProxyType
 from typing import TypeVar
 
 from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
-from vsacli.documents.changes import Changes, changed
 from vsacli.documents.kinds.nested import read_record
 from vsacli.documents.source import Problems, Source, read_source
 from vsacli.documents.tree import Scope
@@ -27,7 +24,6 @@ def read_document(
     format_name: str,
     members: Mapping[str, str] | None = None,
     exempt: Mapping[str, Mapping[str, str]] | None = None,
-    changes: Changes = MappingProxyType({}),
 ) -> tuple[_Document, Source]:
     """Read a YAML file into a record.
 
@@ -37,11 +33,9 @@ def read_document(
         format_name: what its key `format` has to say.
         members: name and unit variant of every joint, where the document has PerJoint values.
         exempt: for a purpose of PerJoint values the joints that have none, each with a clause about it.
-        changes: made to what is read; the file must be whole without them.
 
     Raises:
         InputError: with every problem of the file, each with its line.
-        ChangeError: a change cannot be made.
     """
     source, text = read_source(path)
     problems = Problems(source.path)
@@ -51,9 +45,6 @@ def read_document(
     _check_format(root, format_name, problems)
     record = read_record(cls, root, "", Scope(problems, members or {}, exempt or {}), beside=("format",))
     problems.check()
-    if changes:
-        record = changed(record, changes, members or {}, exempt or {}, source.path)
-        source = source._replace(changes=json.dumps(changes))
     return record, source
 
 

@@ -6,11 +6,13 @@ import dataclasses
 import os
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 from vsacli.base.errors import InputError, check_path
-from vsacli.documents.changes import Changes
+from vsacli.documents.changes import Changes, changed
 from vsacli.documents.fields import choice, declared
 from vsacli.documents.reading import read_document
+from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
 
 FORMAT = "vsacli-robot/1"
@@ -49,10 +51,35 @@ def load_robot(path: str | os.PathLike[str], changes: Changes = MappingProxyType
         TypeError: path is none.
     """
     check_path(path, "load_robot(path)")
-    document, source = read_document(path, RobotFile, FORMAT, changes=changes)
-    try:
-        robot = document.robot()
-    except InputError as error:
-        reason = f"its modified rows have no standard ones: {error}"
-        raise InputError.one(reason, source.path) from None
-    return dataclasses.replace(robot, sources=(source, *robot.spring_sources))
+    return read_robot(path).robot(changes)
+
+
+class ReadRobot(NamedTuple):
+    """A robot file that was read, and what it says."""
+
+    document: RobotFile
+    source: Source
+
+    def robot(self, changes: Changes = MappingProxyType({})) -> Robot:
+        """The robot, with changes.
+
+        Raises:
+            ChangeError: one cannot be made.
+            InputError: modified rows have no standard ones.
+        """
+        document, source = changed(self.document, self.source, changes)
+        try:
+            robot = document.robot()
+        except InputError as error:
+            reason = f"its modified rows have no standard ones: {error}"
+            raise InputError.one(reason, source.path) from None
+        return dataclasses.replace(robot, sources=(source, *robot.spring_sources))
+
+
+def read_robot(path: str | os.PathLike[str]) -> ReadRobot:
+    """Read a robot file.
+
+    Raises:
+        InputError: with every problem of the file, each with its line.
+    """
+    return ReadRobot(*read_document(path, RobotFile, FORMAT))

@@ -15,11 +15,11 @@ from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.documents.changes import Changes
+from vsacli.documents.changes import Changes, changed
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
 from vsacli.documents.plausibility import numbers
 from vsacli.documents.reading import read_document
-from vsacli.documents.source import is_table
+from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
@@ -170,6 +170,38 @@ def load_trajectory(
     """
     check_path(path, "load_trajectory(path, robot)")
     check_robot(robot)
+    return _with_devices(declared_trajectory(path, robot, changes, progress), robot)
+
+
+def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tuple[TrajectoryFile, Source]:
+    """Read a YAML trajectory file for joints.
+
+    Raises:
+        InputError: with every problem of the file, each with its line.
+    """
+    cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
+    return read_document(path, cls, FORMAT, joints.types, joints.exempt)
+
+
+def declared_trajectory(
+    path: str | os.PathLike[str],
+    robot: Robot,
+    changes: Changes = MappingProxyType({}),
+    progress: Progress = unseen,
+) -> Trajectory:
+    """A trajectory as its file has it: what devices do by themselves depends on numbers of the robot.
+
+    But for its warnings, it is the same for all robots with the same `CommandedJoints`.
+
+    Args:
+        path: as of `load_trajectory`.
+        robot: likewise.
+        changes: likewise.
+        progress: likewise.
+
+    Raises:
+        InputError: likewise.
+    """
     joints = CommandedJoints.of(robot)
     if is_table(path):
         from vsacli.trajectory.recorded.recording import recorded_trajectory
@@ -177,9 +209,8 @@ def load_trajectory(
         if changes:
             reason = "is a table, in which nothing can be set; name it in a YAML trajectory and set its keys"
             raise InputError.one(reason, os.fspath(path))
-        return _with_devices(recorded_trajectory(path, joints, progress), robot)
-    cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
-    document, source = read_document(path, cls, FORMAT, joints.types, joints.exempt, changes)
+        return recorded_trajectory(path, joints, progress)
+    document, source = changed(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
     declared = _times(document, recordings, source.path)
     if recordings:
@@ -188,7 +219,7 @@ def load_trajectory(
     wrench = document.declared.get(WRENCH)
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
     facts = Facts(robot, tuple(numbers(document, joints.types)), times, motion)
-    trajectory = Trajectory(
+    return Trajectory(
         times,
         profiles[POSITION.key],
         profiles,
@@ -202,7 +233,6 @@ def load_trajectory(
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, declared)],
         sources=[source, *(recording.source for recording in recordings)],
     )
-    return _with_devices(trajectory, robot)
 
 
 def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:

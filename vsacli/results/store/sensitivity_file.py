@@ -68,7 +68,7 @@ class SensitivityWriter(ResultWriter):
 
     def _create(self) -> None:
         super()._create()
-        with self._hdf5():
+        with self._hdf5.used():
             paths, _, unit_names = zip(*self._numbers, strict=True)
             scale = self._labels("parameter", paths, "number of the robot file")
             scale.make_scale("parameter")

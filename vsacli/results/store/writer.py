@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import json
-import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType, TracebackType
 from typing import Any, Protocol, Self
-
-import h5py
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
 from vsacli.base.signals import COMMANDED
-from vsacli.base.storage import check_free_space, reporting_storage_errors, storage_error
+from vsacli.base.storage import check_free_space
 from vsacli.base.variables import MOTOR_CONSTANTS, UNCERTAIN, VARIABLES, Variable, deviation, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes
+from vsacli.results.store.new_file import NewFile
 from vsacli.results.store.schema import FORMAT, TEXT, storable
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
-
-CHUNK_CACHE_SLOTS = 11
-"""Chunks of a variable that HDF5 finds in its cache: few, since samples are written in order."""
 
 
 class Samples(Protocol):
@@ -41,9 +34,6 @@ class ResultWriter:
     """Context manager that writes a result file, which is complete after `finish`.
 
     A subclass writes another format: other variables in the same layout.
-
-    HDF5 crashes if an exception crosses its code. So its file is a `Sink`, which raises none, and signals
-    that end the run wait until a block is written.
 
     Args:
         file: where it is staged.
@@ -68,7 +58,7 @@ class ResultWriter:
         *,
         provenance: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        self._staged = file
+        self._staged, self._hdf5 = file, NewFile(file)
         self._robot = robot
         self._trajectory = trajectory
         self._variables = self._selected(variables, robot, trajectory)
@@ -81,12 +71,11 @@ class ResultWriter:
         Raises:
             StorageError: it cannot be written, or does not fit its disk.
         """
-        self._cleanup = contextlib.ExitStack()
         try:
             with interrupts_deferred():
                 self._create()
         except BaseException:
-            self._discard()
+            self._hdf5.discard()
             raise
         return self
 
@@ -96,7 +85,7 @@ class ResultWriter:
         Raises:
             StorageError: the disk is full or fails.
         """
-        with self._hdf5():
+        with self._hdf5.used():
             self._append(block)
 
     def finish(self, report: Mapping[str, Any]) -> None:
@@ -108,50 +97,22 @@ class ResultWriter:
         Raises:
             StorageError: the disk is full or fails.
         """
-        with self._hdf5():
+        with self._hdf5.used():
             self._complete(report)
-            self._file.close()
-            self._sink.close()
+            self._hdf5.close()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        unfinished = kind is None and bool(self._file)
-        self._discard()
+        unfinished = kind is None and self._hdf5.is_open
+        self._hdf5.discard()
         if unfinished:
             raise RuntimeError("a result was left without `finish`")
 
-    def _discard(self) -> None:
-        """Close what is open."""
-        with interrupts_deferred():
-            self._cleanup.close()
-
-    @contextlib.contextmanager
-    def _hdf5(self) -> Iterator[None]:
-        """Around any use of HDF5; an error of the disk counts more than what HDF5 makes of it."""
-        with interrupts_deferred():
-            try:
-                yield
-            except Exception:
-                if self._sink.error is None:
-                    raise
-            if self._sink.error is not None:
-                raise storage_error(self._staged.path, self._sink.error) from self._sink.error
-
     def _create(self) -> None:
         check_free_space(self._staged.path, self._size())
-        with reporting_storage_errors(self._staged.path):
-            raw = self._staged.temporary.open("r+b", buffering=0)
-        self._sink = self._cleanup.enter_context(Sink(raw))
-        with self._hdf5():
-            file = h5py.File(
-                self._sink,
-                "w",
-                libver=("earliest", "v110"),
-                track_order=True,
-                rdcc_nslots=CHUNK_CACHE_SLOTS,
-            )
-            self._file = self._cleanup.enter_context(file)
+        with self._hdf5.used():
+            file = self._file = self._hdf5.open()
             self._stored = create_layout(
                 file, self._format, self._robot, self._trajectory, self._variables, self._provenance
             )
@@ -216,54 +177,3 @@ def _requirement(variable: Variable) -> str:
         return f"a motor with a {variable.requires}"
     signal = COMMANDED.get(f"{variable.requires}")
     return f"{variable.requires}" if signal is None else f"a {signal.device or signal.key}"
-
-
-class Sink(io.RawIOBase):
-    """A file object for h5py whose writing never fails in HDF5's sight.
-
-    HDF5 cannot be unwound from a failed write: closing its file fails as well, and the process then crashes
-    at exit. So the first error is kept here, what follows it is dropped, and the caller looks at `error`
-    after each step.
-    """
-
-    def __init__(self, file: io.FileIO) -> None:
-        self._file = file
-        self.error: OSError | None = None
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Move to a byte."""
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        """The current byte."""
-        return self._file.tell()
-
-    def readinto(self, buffer: Any) -> int:
-        """Read bytes that were written before."""
-        return self._file.readinto(buffer)
-
-    def write(self, data: Any) -> int:
-        """Write all of `data`, or note why not."""
-        rest = memoryview(data)
-        try:
-            while len(rest) and self.error is None:
-                rest = rest[self._file.write(rest) :]
-        except OSError as error:
-            self.error = error
-        return len(data)
-
-    def truncate(self, size: int | None = None) -> int:
-        """Set the length of the file, or note why not."""
-        try:
-            return self._file.truncate(size)
-        except OSError as error:
-            self.error = self.error or error
-            return 0
-
-    def close(self) -> None:
-        """Close the file, or note what the file system reports only now."""
-        try:
-            self._file.close()
-        except OSError as error:
-            self.error = self.error or error
-        super().close()

@@ -49,6 +49,14 @@ class Tolerance(NamedTuple):
             return float(random.normal(0.0, self.size))
         return float(random.uniform(-self.size, self.size))
 
+    def below(self, share: float) -> float:
+        """The deviation that so large a share of all is below: the quantile."""
+        if self.shape == "normal":
+            from scipy.special import ndtri
+
+            return self.size * float(ndtri(share))
+        return self.size * (2 * share - 1)
+
 
 SHAPES = ("normal", "uniform")
 
@@ -96,7 +104,7 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
             problems.add(line, f"no number of the robot fits {pattern!r}{hint}")
         for place in fitting:
             try:
-                found[place] = _distribution(node, chosen[place])
+                found[place] = distribution(node, chosen[place].value, chosen[place].unit)
             except InputError as error:
                 problems.add(node.line, f"{pattern}: {error}")
                 break
@@ -104,7 +112,17 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
     return tuple(found)
 
 
-def _distribution(node: tree.Node, parameter: Parameter) -> Tolerance:
+def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
+    """The tolerance that a file says of a number.
+
+    Args:
+        node: such as `{normal: 5 %}`.
+        value: the number.
+        unit: of it.
+
+    Raises:
+        InputError: it is none.
+    """
     if not isinstance(node, tree.Mapping) or len(node.entries) != 1:
         raise InputError.one(f"expected a distribution, {FORM}, found {node}")
     ((shape, size),) = node.entries.items()
@@ -112,8 +130,8 @@ def _distribution(node: tree.Node, parameter: Parameter) -> Tolerance:
         raise InputError.one(f"expected a distribution, {FORM}, found {shape}: {size}")
     share = _SHARE.fullmatch(size.text)
     if share is None:
-        return Tolerance(shape, _number(size.text, size.text, parameter.unit))
-    return Tolerance(shape, _number(share["number"], size.text) / 100 * abs(parameter.value))
+        return Tolerance(shape, _number(size.text, size.text, unit))
+    return Tolerance(shape, _number(share["number"], size.text) / 100 * abs(value))
 
 
 def _number(text: str, whole: str, unit: str = "") -> float:
