@@ -38,6 +38,8 @@ from vsacli.documents.plausibility import Rule
 from vsacli.files.examples import Example, examples, examples_root, opening_comment
 from vsacli.robot.file import RobotFile
 from vsacli.robot.plausibility import ROBOT_RULES
+from vsacli.studies.sweeps.kept import KEPT
+from vsacli.studies.sweeps.study_file import StudyFile
 from vsacli.trajectory.file import content
 from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 
@@ -129,6 +131,22 @@ def _wrench_columns() -> Iterator[tuple[str, str, str]]:
 def pole_fields() -> str:
     """Fields of a poles file."""
     return record_sections(PolesFile)
+
+
+def study_fields() -> str:
+    """Fields of a study file."""
+    return record_sections(StudyFile)
+
+
+def study_columns() -> str:
+    """What a study keeps of each run."""
+    return table(
+        ("column", "dimensions", "unit", "meaning"),
+        (
+            (f"`{each.name}`", ", ".join(("run", *each.dims)), str(each.quantity), each.long_name)
+            for each in KEPT.values()
+        ),
+    )
 
 
 def robot_rules() -> str:
@@ -265,6 +283,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "trajectory-fields": trajectory_fields,
     "csv-columns": csv_columns,
     "pole-fields": pole_fields,
+    "study-fields": study_fields,
+    "study-columns": study_columns,
     "robot-rules": robot_rules,
     "trajectory-rules": trajectory_rules,
     "stiffness-cost": stiffness_cost,

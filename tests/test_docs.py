@@ -35,7 +35,8 @@ PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 
 LONG = (
     *("cli.md", "energy.md", "identification.md", "python.md", "quickstart.md"),
-    *("recorded.md", "robots.md", "sensitivity.md", "simulation.md", "suggestions.md", "urdf.md"),
+    *("recorded.md", "robots.md", "sensitivity.md", "simulation.md", "studies.md"),
+    *("suggestions.md", "urdf.md"),
 )
 """Pages whose examples take more than a second."""
 

@@ -30,6 +30,7 @@ _SECTIONS = {
         "codegen": "vsacli.cli.codegen:codegen",
         "sensitivity": "vsacli.cli.sensitivity:sensitivity",
         "identify": "vsacli.cli.identify:identify",
+        "study": "vsacli.cli.study:study",
     },
     "Results": {
         "plot": "vsacli.cli.plot:plot",

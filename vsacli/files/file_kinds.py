@@ -20,6 +20,7 @@ from vsacli.documents.json_schema import json_schema
 from vsacli.documents.source import HDF5_SIGNATURE, Problems, check_input_file, is_table, read_source
 from vsacli.documents.yaml_tree import parse_yaml
 from vsacli.robot import file as robot_file
+from vsacli.studies.sweeps import study_file
 from vsacli.trajectory import file as trajectory_file
 
 
@@ -33,6 +34,8 @@ class FileKind(enum.StrEnum):
     URDF = "urdf"
     RESULT = "result"
     SIMULATION = "simulation"
+    STUDY = "study"
+    STUDY_TABLE = "table of a study"
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ DOCUMENTS = {
     "robot": Document(robot_file.FORMAT, robot_file.RobotFile, "robot of vsacli"),
     "trajectory": Document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, "trajectory of vsacli"),
     "poles": Document(poles.FORMAT, poles.PolesFile, "poles of a vsacli controller"),
+    "study": Document(study_file.FORMAT, study_file.StudyFile, "study of vsacli"),
 }
 """By the word for the kind."""
 
@@ -94,10 +98,14 @@ def _beginning(path: str | os.PathLike[str]) -> bytes:
 
 
 def _stored_kind(path: str | os.PathLike[str]) -> FileKind:
-    from vsacli.results.store import schema, simulation
+    from vsacli.results.store import schema, simulation, study_table
     from vsacli.results.store.reader import stored_format
 
-    kinds = {schema.FORMAT: FileKind.RESULT, simulation.FORMAT: FileKind.SIMULATION}
+    kinds = {
+        schema.FORMAT: FileKind.RESULT,
+        simulation.FORMAT: FileKind.SIMULATION,
+        study_table.FORMAT: FileKind.STUDY_TABLE,
+    }
     found = stored_format(Path(path))
     if found not in kinds:
         raise InputError.one(

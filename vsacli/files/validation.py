@@ -14,9 +14,11 @@ from vsacli.documents.table import read_table
 from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.simulation import open_stored
+from vsacli.results.store.stored_study import StoredStudy
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
 from vsacli.robot.urdf.reader import read_urdf
+from vsacli.studies.sweeps.study import load_study
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -207,6 +209,20 @@ def _stored(path: str, _: Robots) -> Checked:
         return _usable(path, f"{result.kind} of {names}, {_count(result.samples, 'step')}, {result.verdict}")
 
 
+def _study(path: str, _: Robots) -> Checked:
+    """A study with the files it names, which no other can stand for."""
+    study = load_study(path)
+    return _usable(path, f"study {study.file.name}, {_count(study.runs, 'run')} of {study.robot.name}")
+
+
+def _table_of_study(path: str, _: Robots) -> Checked:
+    with StoredStudy(path) as table:
+        table.check()
+        return _usable(
+            path, f"table of {table.study_name}, {_count(table.rows, 'run')} of {table.robot_name}"
+        )
+
+
 def _count(number: int, word: str) -> str:
     return f"{number} {word}{'' if number == 1 else 's'}"
 
@@ -219,4 +235,6 @@ _CHECKS: dict[FileKind, Callable[[str, Robots], Checked]] = {
     FileKind.URDF: _urdf,
     FileKind.RESULT: _stored,
     FileKind.SIMULATION: _stored,
+    FileKind.STUDY: _study,
+    FileKind.STUDY_TABLE: _table_of_study,
 }

@@ -1,0 +1,83 @@
+"""Studies in several processes, and what a kill costs."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from samples.studies import DRAWN, GRID, content, study
+
+from vsacli.studies.sweeps import Journal, compute, load_study
+from vsacli.studies.sweeps.rows import Computer
+from vsacli.studies.sweeps.workers import Workers
+
+COMMAND = (sys.executable, "-m", "vsacli", "study", "study.yaml")
+
+
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*COMMAND, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.slow
+def test_the_table_is_the_same_for_any_number_of_processes(tmp_path: Path) -> None:
+    study(tmp_path, DRAWN)
+    for count in (1, 2, 3):
+        assert run(tmp_path, "--processes", f"{count}", "-o", f"{count}.h5").returncode == 0
+    assert content(tmp_path / "1.h5") == content(tmp_path / "2.h5") == content(tmp_path / "3.h5")
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_costs_its_run(tmp_path: Path) -> None:
+    """Its row says so, the others are those of one process, and the lost run is not in the journal."""
+    found = load_study(study(tmp_path, GRID))
+    with Workers(found, 1) as workers:
+        rows = workers.rows(range(6))
+        computed = [next(rows)]
+        os.kill(workers._workers[0].process.pid or 0, signal.SIGKILL)
+        computed += rows
+    lost = [row for row in computed if row.error]
+    assert [row.error for row in lost] == ["the process that computed it was ended by SIGKILL"]
+    alone = Computer(found)
+    assert sorted(row.run for row in computed) == list(range(6))
+    assert all(
+        alone.row(row.run).values.tobytes() == row.values.tobytes() for row in computed if not row.error
+    )
+
+
+def test_rows_that_were_lost_are_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from vsacli.studies.sweeps import rows, sweep
+
+    found = load_study(study(tmp_path, GRID))
+    row = Computer(found).row(0)
+    lost = rows.failed(1, "key", "the process that computed it was ended by SIGKILL")
+    monkeypatch.setattr(sweep.Workers, "rows", lambda *_: iter([row, lost]))
+    with Journal(tmp_path / "rows.journal") as journal:
+        assert compute(found, range(2), journal, 2, lambda _: None) == {1: lost}
+        assert row.key in journal
+        assert lost.key not in journal
+
+
+@pytest.mark.slow
+def test_a_study_that_is_killed_goes_on_to_the_same_table(tmp_path: Path) -> None:
+    """Three times, at any moment, with all its processes."""
+    study(tmp_path, DRAWN.replace("samples: 6", "samples: 60"))
+    assert run(tmp_path, "-o", "whole.h5", "--processes", "1").returncode == 0
+    journal, kept = tmp_path / "study.h5.journal", 0
+    for _ in range(3):
+        started = subprocess.Popen([*COMMAND, "--processes", "2"], cwd=tmp_path, start_new_session=True)
+        while not (journal.exists() and journal.read_bytes().count(b"\n") >= kept + 4):
+            time.sleep(0.01)
+        os.killpg(started.pid, signal.SIGKILL)
+        started.wait()
+        kept = journal.read_bytes().count(b"\n")
+        assert not (tmp_path / "study.h5").exists()
+    done = run(tmp_path)
+    assert f"{kept} of 60 runs are in {journal} already" in done.stderr
+    assert done.returncode == 0
+    assert content(tmp_path / "study.h5") == content(tmp_path / "whole.h5")
+    assert sorted(path.name for path in tmp_path.glob(".*")) == []

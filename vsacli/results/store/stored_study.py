@@ -1,0 +1,149 @@
+"""Reading the table of a study."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import h5py
+
+from vsacli.base.arrays import AnyArray
+from vsacli.base.errors import InputError
+from vsacli.base.texts import one_line
+from vsacli.results.store.damage import CheckedFile, bounded, own_dataset, reporting_damage
+from vsacli.results.store.inputs import StoredInput, read_sources
+from vsacli.results.store.study_table import FORMAT
+
+PROVENANCE = ("method", "seed", "engine", "command_line")
+"""Root attributes that say how a table was computed."""
+
+
+class StoredStudy:
+    """An open table of a study; a context manager that closes it.
+
+    Attributes:
+        path: the file, as given.
+        attributes: the root attributes.
+        study_name, robot_name: as in the files.
+        joint_names, joint_types: base to tip.
+        parameters: paths of what varies.
+        columns: names of what is kept.
+        rows: how many runs it has.
+        runs: how many the study has.
+        fingerprint: of the whole study.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """Open a table.
+
+        Raises:
+            InputError: there is no such file, or it is no complete table of a study.
+            StorageError: the operating system refuses to read it.
+        """
+        self.path = Path(path)
+        self._file = CheckedFile(path)
+        try:
+            with reporting_damage(path):
+                self.attributes: dict[str, Any] = dict(self._file.attrs)
+                if self.attributes.get("format") != FORMAT:
+                    raise InputError.one(
+                        f"is no table of a study ({FORMAT}), as `vsacli study` writes it", path
+                    )
+                self.study_name, self.robot_name = (
+                    one_line(str(self.attributes[name])) for name in ("study_name", "robot_name")
+                )
+                self.fingerprint, self.runs = (
+                    str(self.attributes["fingerprint"]),
+                    int(self.attributes["runs"]),
+                )
+                self.parameters, self.columns = (
+                    tuple(map(str, json.loads(self.attributes[name]))) for name in ("parameters", "columns")
+                )
+                self.joint_names, self.joint_types = self.texts("joint"), self.texts("joint_type")
+                self.rows = len(self._dataset("run"))
+                self._check()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _check(self) -> None:
+        for name in ("trajectory", "verdict", "error", "key", *self.parameters, *self.columns):
+            if self._dataset(name).shape[0] != self.rows:
+                raise ValueError(f"{name} has not {self.rows} rows")
+
+    def _dataset(self, name: str) -> h5py.Dataset:
+        return bounded(own_dataset(self._file, name))
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """Texts of all rows, or the labels of a dimension.
+
+        Raises:
+            InputError: they are damaged.
+        """
+        with reporting_damage(self.path, name):
+            return tuple(map(one_line, self._dataset(name).asstr()[...]))
+
+    def read(self, name: str) -> AnyArray:
+        """A column of numbers, (rows, ...), or the numbers of the runs.
+
+        Raises:
+            InputError: it is damaged, or not there.
+        """
+        with reporting_damage(self.path, name):
+            values: AnyArray = self._dataset(name)[...]
+        return values
+
+    def unit(self, name: str) -> str:
+        """The unit of a column or parameter; that of revolute joints if they differ."""
+        with reporting_damage(self.path, name):
+            attributes = self._dataset(name).attrs
+            return str(attributes.get("units_revolute", attributes.get("units", "")))
+
+    def parameter_is_text(self, path: str) -> bool:
+        """Whether the values of what varies are texts rather than numbers."""
+        return bool(self._dataset(path).dtype.kind != "f")
+
+    def provenance(self) -> dict[str, str]:
+        """What is known of how it was computed: method, seed and engine, and what was typed."""
+        return {name: str(self.attributes[name]) for name in PROVENANCE if name in self.attributes}
+
+    def inputs(self) -> list[StoredInput]:
+        """The files that were read.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        with reporting_damage(self.path):
+            return list(read_sources(self._file))
+
+    def check(self) -> None:
+        """Read everything once.
+
+        Raises:
+            InputError: something is damaged.
+        """
+        for name in (
+            "trajectory",
+            "verdict",
+            "error",
+            "key",
+            *filter(self.parameter_is_text, self.parameters),
+        ):
+            self.texts(name)
+        for name in ("run", *self.columns):
+            self.read(name)
+        self.inputs()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()

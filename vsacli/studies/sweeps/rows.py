@@ -1,0 +1,91 @@
+"""The row of a run: what is kept of it, or why it could not be computed."""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.analysis.run import Run
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.texts import one_line
+from vsacli.robot.commanded_joints import CommandedJoints
+from vsacli.robot.model import Robot
+from vsacli.studies.sweeps.kept import columns
+from vsacli.studies.sweeps.study import Point, Study
+from vsacli.trajectory.changes import Divided
+from vsacli.trajectory.devices import with_devices
+from vsacli.trajectory.file import declared_trajectory
+from vsacli.trajectory.trajectory import Trajectory
+
+FAILED = "failed"
+"""In place of the verdict of a run that could not be computed."""
+
+
+class Row(NamedTuple):
+    """What is known of a run.
+
+    Attributes:
+        run: its number.
+        key: of all that it depends on.
+        verdict: of its report, or `FAILED`.
+        error: why it failed, else empty.
+        values: what is kept, (columns,); empty if it failed.
+    """
+
+    run: int
+    key: str
+    verdict: str
+    error: str
+    values: FloatArray
+
+
+def failed(run: int, key: str, reason: str) -> Row:
+    """The row of a run that could not be computed."""
+    return Row(run, key, FAILED, one_line(reason), np.empty(0))
+
+
+class Computer:
+    """Computes runs of a study, one after the other.
+
+    What is the same in consecutive runs is read once: the trajectory, as long as neither it nor who it is
+    for changes.
+    """
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self._read: tuple[tuple[int, str], CommandedJoints, Trajectory] | None = None
+
+    def row(self, run: int) -> Row:
+        """The row of a run; no error of the run is raised."""
+        point = self._study.point(run)
+        key = self._study.key(point)
+        try:
+            return self._computed(run, key, point)
+        except InputError as error:
+            return failed(run, key, str(error))
+        except Exception as error:  # one run must not cost the others
+            return failed(run, key, f"a bug, please report it: {type(error).__name__}: {error}")
+
+    def _computed(self, run: int, key: str, point: Point) -> Row:
+        changes = point.changes
+        robot = self._study.read.robot(changes.robot)
+        if robot.joint_names != self._study.robot.joint_names:
+            raise InputError.one(
+                "joints have other names than in the robot file, so that rows would not compare"
+            )
+        trajectory = with_devices(self._trajectory(robot, point.trajectory, changes), robot)
+        computed = Run(robot, trajectory, engine=self._study.engine, threads=1)
+        for _ in computed:
+            pass
+        report = computed.report()
+        return Row(run, key, report.verdict, "", columns(self._study.kept, report))
+
+    def _trajectory(self, robot: Robot, index: int, changes: Divided) -> Trajectory:
+        place, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)
+        if self._read is None or self._read[:2] != (place, joints):
+            declared = declared_trajectory(self._study.trajectories[index], robot, changes.trajectory)
+            self._read = (place, joints, declared)
+        return self._read[2]

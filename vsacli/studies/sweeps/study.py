@@ -1,0 +1,146 @@
+"""A study as it is computed: files, what varies, and which values each run has."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import json
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from vsacli.base.errors import InputError
+from vsacli.base.version import __version__
+from vsacli.documents.reading import read_document
+from vsacli.documents.source import Source
+from vsacli.robot.file import ReadRobot, read_robot
+from vsacli.robot.model import Robot
+from vsacli.studies.sweeps.design import Design
+from vsacli.studies.sweeps.dimensions import Dimension
+from vsacli.studies.sweeps.entries import Entries
+from vsacli.studies.sweeps.kept import KEPT, Kept
+from vsacli.studies.sweeps.study_file import FORMAT, StudyFile
+from vsacli.trajectory.changes import Divided, divided
+from vsacli.trajectory.file import load_trajectory
+
+
+class Point(NamedTuple):
+    """What is computed in a run: the trajectory by its index, and the value of each dimension by path."""
+
+    trajectory: int
+    values: dict[str, Any]
+
+    @property
+    def changes(self) -> Divided:
+        """The values by the file that they are for."""
+        return divided(self.values)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study.
+
+    Attributes:
+        file: what the study file says.
+        source: the study file.
+        read: the robot file.
+        robot: what that says, without changes.
+        trajectories: paths of the trajectory files.
+        trajectory_sources: the files of each that were read.
+        dimensions: what varies.
+        design: which values each run has.
+        engine: what computes, "numpy" or "c".
+    """
+
+    file: StudyFile
+    source: Source
+    read: ReadRobot
+    robot: Robot
+    trajectories: tuple[str, ...]
+    trajectory_sources: tuple[tuple[Source, ...], ...]
+    dimensions: tuple[Dimension, ...]
+    design: Design
+    engine: str
+
+    @property
+    def runs(self) -> int:
+        """How many there are."""
+        return len(self.trajectories) * self.design.points
+
+    @property
+    def kept(self) -> tuple[Kept, ...]:
+        """What is kept of each run."""
+        return tuple(KEPT[name] for name in dict.fromkeys(self.file.keep or KEPT))
+
+    @property
+    def sources(self) -> list[Source]:
+        """Every file that was read, each once."""
+        files = (
+            self.source,
+            *self.robot.sources,
+            *(each for files in self.trajectory_sources for each in files),
+        )
+        return list(dict.fromkeys(files))
+
+    def point(self, run: int) -> Point:
+        """What is computed in a run; those of one trajectory come one after the other."""
+        trajectory, point = divmod(run, self.design.points)
+        return Point(trajectory, self.design.values(point))
+
+    @cached_property
+    def digest(self) -> str:
+        """Of all that the rows of the study depend on, beside the values of a run; in hex."""
+        robot = [source.sha256 for source in self.robot.sources]
+        return _digest([__version__, self.engine, robot, [each.name for each in self.kept]])
+
+    @property
+    def fingerprint(self) -> str:
+        """Of the study as a whole: of all its files, and of what computes it; in hex."""
+        return _digest([self.digest, [source.sha256 for source in self.sources]])
+
+    def key(self, point: Point) -> str:
+        """Of all that a row depends on; in hex."""
+        trajectory = [source.sha256 for source in self.trajectory_sources[point.trajectory]]
+        return _digest([self.digest, trajectory, point.values])
+
+
+def _digest(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:24]
+
+
+def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
+    """Read a study, its robot and its trajectories.
+
+    Raises:
+        InputError: with every problem of the first file that has some.
+    """
+    file, source = read_document(path, StudyFile, FORMAT)
+    folder = Path(source.path).parent
+    read = read_robot(folder / file.robot)
+    robot = read.robot()
+    trajectories = _trajectories(file, folder, source.path)
+    loaded = [load_trajectory(each, robot) for each in trajectories]
+    entries = Entries(file, source.path, read, robot, trajectories)
+    dimensions = entries.dimensions()
+    try:
+        design = Design(file, dimensions, len(trajectories))
+    except InputError as error:
+        raise InputError.one(str(error), source.path) from None
+    entries.try_values()
+    sources = tuple(each.sources for each in loaded)
+    return Study(file, source, read, robot, trajectories, sources, dimensions, design, engine)
+
+
+def _trajectories(file: StudyFile, folder: Path, path: str) -> tuple[str, ...]:
+    found: list[str] = []
+    for pattern in file.trajectory:
+        place = str(folder / pattern)
+        matching = (
+            [place] if os.path.exists(place) or not glob.has_magic(pattern) else sorted(glob.glob(place))
+        )
+        if not matching:
+            raise InputError.one(f"trajectory: no file fits {pattern!r}", path)
+        found += [each for each in matching if each not in found]
+    return tuple(found)

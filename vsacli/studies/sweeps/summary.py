@@ -1,0 +1,117 @@
+"""What a study found, in a few lines, and as JSON."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vsacli.base.json_records import Published, named
+from vsacli.results.store.stored_study import StoredStudy
+from vsacli.studies.sweeps.rows import FAILED
+
+MOST_ERRORS = 3
+"""Failed runs that the text names."""
+
+
+@dataclass(frozen=True)
+class Failure(Published):
+    """A run that could not be computed: its number, and why."""
+
+    run: int
+    error: str
+
+
+@dataclass(frozen=True)
+class Extreme(Published):
+    """The run in which the margin of a joint is smallest.
+
+    Attributes:
+        joint: name of the joint.
+        margin: relative.
+        run: its number.
+        at: what varies, as texts by path.
+    """
+
+    joint: str
+    margin: float
+    run: int
+    at: dict[str, str]
+
+
+@dataclass(frozen=True)
+class StudySummary(Published):
+    """What a study found.
+
+    Attributes:
+        study, robot: names.
+        runs: in the table.
+        verdicts: how many runs have each verdict.
+        failures: runs that could not be computed.
+        worst: the smallest margin of each joint that has one.
+    """
+
+    study: str
+    robot: str
+    runs: int
+    verdicts: dict[str, int]
+    failures: tuple[Failure, ...]
+    worst: tuple[Extreme, ...]
+
+    format: ClassVar = "vsacli-study-summary/1"
+    shape: ClassVar = named("format", "study", "robot", "runs", "verdicts", "failures", "worst")
+
+    @classmethod
+    def of(cls, table: StoredStudy) -> StudySummary:
+        """That of a table."""
+        verdicts, errors, runs = table.texts("verdict"), table.texts("error"), table.read("run").tolist()
+        return cls(
+            study=table.study_name,
+            robot=table.robot_name,
+            runs=table.rows,
+            verdicts=dict(Counter(verdicts).most_common()),
+            failures=tuple(
+                Failure(run, error)
+                for run, verdict, error in zip(runs, verdicts, errors, strict=True)
+                if verdict == FAILED
+            ),
+            worst=tuple(_worst(table)),
+        )
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{count:,} {verdict}" for verdict, count in self.verdicts.items())
+        lines = [f"{self.study}: {self.runs:,} runs of {self.robot}: {counts or 'none'}"]
+        for each in self.worst:
+            at = ", ".join(f"{path} = {value}" for path, value in each.at.items())
+            where = f"in run {each.run}{f' ({at})' if at else ''}"
+            lines.append(f"{each.joint}: smallest margin {100 * each.margin:.3g} % {where}")
+        lines += [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
+        if len(self.failures) > MOST_ERRORS:
+            lines.append(f"and {len(self.failures) - MOST_ERRORS:,} more failed, see error in the table")
+        return "\n".join(lines)
+
+
+def _worst(table: StoredStudy) -> list[Extreme]:
+    if "margin" not in table.columns or not table.rows:
+        return []
+    margins, runs = table.read("margin"), table.read("run")
+    found = []
+    for index, joint in enumerate(table.joint_names):
+        if np.isfinite(margins[:, index]).any():
+            row = int(np.nanargmin(margins[:, index]))
+            found.append(Extreme(joint, float(margins[row, index]), int(runs[row]), _shown(table, row)))
+    return found
+
+
+def _shown(table: StoredStudy, row: int) -> dict[str, str]:
+    """What a row has of what is not the same in all."""
+    shown = {}
+    for path in table.parameters:
+        is_text = table.parameter_is_text(path)
+        values = table.texts(path) if is_text else table.read(path).tolist()
+        if len(set(values)) > 1:
+            value = values[row] if is_text else f"{values[row]:.6g} {table.unit(path)}"
+            shown[path] = value.strip().removesuffix(" 1")
+    return shown

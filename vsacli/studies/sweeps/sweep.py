@@ -1,0 +1,154 @@
+"""A study carried out: what is missing is computed and kept in the journal, then all becomes a table."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vsacli.base.outputs import Staged
+from vsacli.results.store.study_table import Head, Parameter, Rows, StudyWriter
+from vsacli.studies.sweeps.journal import Journal
+from vsacli.studies.sweeps.kept import divided
+from vsacli.studies.sweeps.rows import FAILED, Computer, Row
+from vsacli.studies.sweeps.study import Study
+from vsacli.studies.sweeps.workers import LOST, Workers
+
+ROWS_AT_ONCE = 1024
+"""That are written together."""
+
+
+class Shard(NamedTuple):
+    """Which part of a study is computed: part `number` of `parts`, the runs taken in turn."""
+
+    number: int = 1
+    parts: int = 1
+
+    def runs(self, study: Study) -> range:
+        """Its runs."""
+        return range(self.number - 1, study.runs, self.parts)
+
+
+def missing(study: Study, runs: Iterable[int], journal: Journal) -> list[int]:
+    """The runs whose rows are not in the journal."""
+    return [run for run in runs if study.key(study.point(run)) not in journal]
+
+
+def compute(
+    study: Study,
+    runs: Sequence[int],
+    journal: Journal,
+    processes: int,
+    done: Callable[[int], object],
+) -> dict[int, Row]:
+    """Compute runs and add their rows to the journal as they come.
+
+    Args:
+        study: the study.
+        runs: those to compute.
+        journal: gets the rows.
+        processes: how many compute; results do not depend on it.
+        done: is told how many further runs are done.
+
+    Returns:
+        The rows of runs that were lost with their process, which the journal does not get: another trial
+        may do.
+
+    Raises:
+        InputError: a process cannot read the study as it was.
+        StorageError: the disk is full or fails; the rows before are in the journal.
+    """
+    lost = {}
+    with Workers(study, min(processes, len(runs))) as workers:
+        rows = workers.rows(runs) if processes > 1 else map(Computer(study).row, runs)
+        for row in rows:
+            if row.error.startswith(LOST):
+                lost[row.run] = row
+            else:
+                journal.add(row)
+            done(1)
+    return lost
+
+
+def write(
+    study: Study,
+    runs: Sequence[int],
+    lost: Mapping[int, Row],
+    journal: Journal,
+    file: Staged,
+    **provenance: str,
+) -> None:
+    """Write the table of runs.
+
+    Args:
+        study: the study.
+        runs: in their order.
+        lost: rows that are not in the journal.
+        journal: has the others.
+        file: where the table is staged.
+        **provenance: further root attributes.
+
+    Raises:
+        StorageError: the disk is full or fails.
+    """
+    with StudyWriter(file, _head(study, provenance), len(runs)) as writer:
+        for some in _batches(runs):
+            points = [(run, study.point(run)) for run in some]
+            rows = [lost[run] if run in lost else journal.row(run, study.key(point)) for run, point in points]
+            writer.write(_rows(study, rows))
+        writer.finish()
+
+
+def _batches(runs: Sequence[int]) -> Iterator[Sequence[int]]:
+    for start in range(0, len(runs), ROWS_AT_ONCE):
+        yield runs[start : start + ROWS_AT_ONCE]
+
+
+def _head(study: Study, provenance: dict[str, str]) -> Head:
+    parameters = [Parameter(each.path, each.unit, each.numeric) for each in study.dimensions]
+    return Head(
+        study=study.file.name,
+        robot=study.robot.name,
+        fingerprint=study.fingerprint,
+        runs=study.runs,
+        joint_names=study.robot.joint_names,
+        joint_types=study.robot.joint_types,
+        parameters=tuple(parameters),
+        columns=study.kept,
+        sources={
+            "study": (study.source,),
+            "robot": study.robot.sources,
+            "trajectory": tuple(dict.fromkeys(each for files in study.trajectory_sources for each in files)),
+        },
+        provenance={
+            "method": study.file.method,
+            "seed": str(study.file.seed),
+            "engine": study.engine,
+            **provenance,
+        },
+    )
+
+
+def _rows(study: Study, rows: Sequence[Row]) -> Rows:
+    points = [study.point(row.run) for row in rows]
+    arrays: dict[str, Any] = {
+        "trajectory": [study.trajectories[point.trajectory] for point in points],
+        **{name: [getattr(row, name) for row in rows] for name in ("verdict", "error", "key")},
+    }
+    for dimension in study.dimensions:
+        values = [point.values[dimension.path] for point in points]
+        if dimension.numeric:
+            arrays[dimension.path] = np.array([dimension.number(value) for value in values], dtype=float)
+        else:
+            arrays[dimension.path] = [
+                value if isinstance(value, str) else json.dumps(value) for value in values
+            ]
+    joints = len(study.robot.joints)
+    width = sum(int(np.prod(each.shape(joints))) for each in study.kept)
+    table = np.full((len(rows), width), np.nan)
+    for place, row in enumerate(rows):
+        if row.verdict != FAILED:
+            table[place] = row.values
+    return Rows([row.run for row in rows], arrays | divided(study.kept, table, joints))
