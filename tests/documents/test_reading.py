@@ -43,7 +43,7 @@ class Cart:
     part: object = value(OneOf({"wheel": Wheel}, not_yet=("ski",)), "part", default=None)
     wheels: tuple = value(Items(Record(Wheel)), "wheels", default=())
     count: int = integer("count", check=NON_NEGATIVE, default=0)
-    span: tuple = interval(units.POSITION, "span", one_sided=True, default=(0.0, 1.0))
+    span: tuple = interval(units.POSITION, "span", lowest=-math.inf, default=(0.0, 1.0))
     loads: tuple = value(PerJoint(units.POSITION), "loads", check=NON_NEGATIVE, default=())
 
     unit_variant = "kind"

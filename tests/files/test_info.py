@@ -214,7 +214,8 @@ def test_lists_beside_names_need_the_robot(vsacli: Any) -> None:
     path = REPOSITORY / "trajectories" / "mixed_3r.yaml"
     alone = vsacli("info", path)
     assert alone.code == 2
-    assert "does not say which joint is which in its lists; name the robot with --robot ROBOT" in alone.err
+    hint = "which is which in its lists; name the robot with --robot ROBOT"
+    assert hint in alone.err
     robot = REPOSITORY / "robots" / "mixed_3r.yaml"
     assert vsacli("info", path, "--robot", robot).code == 0
 
@@ -330,3 +331,31 @@ def test_a_cache_that_cannot_be_used(vsacli: Any, tmp_path: Path, monkeypatch: p
     done = vsacli("info", "--cache")
     assert (done.code, done.out) == (4, "")
     assert done.err.startswith("compiled code: there is no cache folder: ")
+
+
+@pytest.mark.parametrize(
+    ("signals", "stiff"),
+    [
+        ("stiffness: {type: constant, value: [1200, null, 800]}", [True, False, True]),
+        (
+            "stiffness: {type: constant, value: 900}\ndamping: {type: constant, value: [1, null, 2, null]}",
+            [True] * 4,
+        ),
+    ],
+)
+def test_joints_are_counted_by_whatever_lists_them(vsacli, tmp_path, signals, stiff):
+    (tmp_path / "t.yaml").write_text(
+        "format: vsacli-trajectory/1\nname: t\nduration: 1\n"
+        f"position: {{type: polynomial, degree: 9, start: 0, end: 1}}\n{signals}\n"
+    )
+    described = json.loads(vsacli("info", "t.yaml", "--json").out)
+    assert [joint["stiffness"]["peak"] is not None for joint in described["joints"]] == stiff
+
+
+def test_dampers_are_named(vsacli):
+    for robot, line in (
+        ("compact_1r", "dampers: elbow beside its springs, 0.5 to 12 N m s/rad"),
+        ("maccepa_vd_1r", "dampers: elbow between its links, 0 to 0.00848 N m s/rad"),
+    ):
+        assert line in vsacli("info", REPOSITORY / "robots" / f"{robot}.yaml").out.splitlines()
+    assert "damper" not in vsacli("info", REPOSITORY / "robots" / "vsa_3r.yaml").out

@@ -19,7 +19,7 @@ class Damper:
 
     location: str = choice(LOCATIONS, "between the links of the joint, or beside its springs")
     range: tuple[float, float] = interval(
-        units.DAMPING, "damping that it can have, from zero or above; flagged beyond"
+        units.DAMPING, "damping that it can have, from zero or above; flagged beyond", lowest=0
     )
 
     start: float | None = number(

@@ -104,9 +104,9 @@ def vector(length: int, unit: Quantity, doc: str, *, default: Any = REQUIRED) ->
     return _declare(Field(Vector(length, unit), doc, FINITE), default)
 
 
-def interval(unit: Quantity, doc: str, *, one_sided: bool = False, default: Any = REQUIRED) -> Any:
-    """A lower and an upper bound, in this order."""
-    return _declare(Field(Interval(unit, one_sided), doc), default)
+def interval(unit: Quantity, doc: str, *, lowest: float | None = None, default: Any = REQUIRED) -> Any:
+    """A lower and an upper bound, in this order; one number x is [-x, x], or [lowest, x] if that is given."""
+    return _declare(Field(Interval(unit, lowest), doc), default)
 
 
 def value(kind: Kind, doc: str, *, check: Check | None = None, default: Any = REQUIRED) -> Any:

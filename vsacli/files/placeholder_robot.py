@@ -65,7 +65,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
         [node for quantity, node in survey if quantity == wanted]
         for wanted in (units.POSITION, units.STIFFNESS, units.DAMPING)
     )
-    names = _of_columns(columns) or _of_nodes(positions, stiffnesses)
+    names = _of_columns(columns) or _of_nodes(positions, [*stiffnesses, *dampings])
     stiffened, damped = (
         _taking(nodes, columns, suffix, names) if key in root.entries else ()
         for key, nodes, suffix in (
@@ -102,13 +102,17 @@ def _of_suffix(columns: Iterable[str], suffix: str, names: Sequence[str]) -> tup
     return tuple(name for name in names if f"{name}{suffix}" in bare)
 
 
-def _of_nodes(positions: Sequence[tree.Node], stiffnesses: Sequence[tree.Node]) -> tuple[str, ...]:
-    """Names of joints from values per joint: keys of mappings, and as many as the longest list has."""
+def _of_nodes(positions: Sequence[tree.Node], further: Sequence[tree.Node]) -> tuple[str, ...]:
+    """Names of joints from values per joint: keys of mappings, and as many as the longest list has.
+
+    Further signals need not name, but in lists have a place for, all joints.
+    """
     named = _keys(positions)
     if named:
         return named
-    count = max((len(node.items) for node in positions if isinstance(node, tree.Sequence)), default=1)
-    named = _keys(stiffnesses)
+    lists = (node.items for node in (*positions, *further) if isinstance(node, tree.Sequence))
+    count = max(map(len, lists), default=1)
+    named = _keys(further)
     spare = (name for name in _numbered(count + len(named)) if name not in named)
     return (*named, *islice(spare, max(count - len(named), 0)))
 

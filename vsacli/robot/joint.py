@@ -138,7 +138,7 @@ class Limits:
     position: tuple[float, float] = interval(units.POSITION, "range of the joint position", default=UNBOUNDED)
     velocity: tuple[float, float] = interval(units.VELOCITY, "range of the joint velocity", default=UNBOUNDED)
     stiffness: tuple[float, float] = interval(
-        units.STIFFNESS, "range of the joint stiffness", one_sided=True, default=UNBOUNDED
+        units.STIFFNESS, "range of the joint stiffness", lowest=-math.inf, default=UNBOUNDED
     )
 
     def __post_init__(self) -> None:

@@ -4,6 +4,15 @@ from samples.slips.slip import Slip
 
 TYPICAL: list[Slip] = [
     Slip(
+        "N mm s as range of a damper",
+        "compact_1r",
+        "compact_1r",
+        {"range: [0.5, 12]": "range: [500, 12000]", "start: 2, end: 10": "start: 2000, end: 10000"},
+        "ranges of dampers",
+        "damper.range.1",
+        "12000 N mm s/rad",
+    ),
+    Slip(
         "degrees as max_deflection",
         "tendon_1r",
         "tendon_1r",

@@ -73,10 +73,10 @@ class Vector(_Numbers):
 
 @dataclass(eq=False)
 class Interval(_Numbers):
-    """`[lower, upper]`, read as a pair; a scalar means [-scalar, scalar], if `one_sided` [-inf, scalar]."""
+    """`[lower, upper]`, read as a pair; a scalar x means [-x, x], or [lowest, x] with a `lowest`."""
 
     unit: Quantity
-    one_sided: bool = False
+    lowest: float | None = None
 
     forms = " ([lower, upper] or one number)"
 
@@ -84,7 +84,7 @@ class Interval(_Numbers):
         """Both bounds."""
         if isinstance(node, tree.Scalar):
             upper = self.each.read(node, label, scope)
-            return upper if upper is INVALID else (-math.inf if self.one_sided else -upper, upper)
+            return upper if upper is INVALID else (-upper if self.lowest is None else self.lowest, upper)
         if isinstance(node, tree.Sequence) and len(node.items) == 2:
             return all_valid(self.each.read(item, label, scope) for item in node.items)
         return scope.unexpected(node, "[lower, upper] or one number", label)
@@ -105,7 +105,7 @@ class Interval(_Numbers):
     @property
     def words(self) -> str:
         """Its forms and unit."""
-        alone = "upper" if self.one_sided else "-x to x"
+        alone = {None: "-x to x", -math.inf: "upper"}.get(self.lowest, f"{self.lowest} to x")
         return f"[lower, upper], or one number x ({alone}), {unit_words(self.unit)}"
 
     def arrays(self, content: Any, _of_record: ArraysOfRecord, /) -> Iterator[ResolvedField]:

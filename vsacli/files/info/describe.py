@@ -64,8 +64,8 @@ def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:
     else:
         robot, ordered = placeholder_robot(path)
         if not ordered:
-            hint = "name the robot with --robot ROBOT"
-            raise InputError.one(f"does not say which joint is which in its lists; {hint}", path)
+            unknown = "does not say which joints there are, or which is which in its lists"
+            raise InputError.one(f"{unknown}; name the robot with --robot ROBOT", path)
     return describe_trajectory(load_trajectory(path, robot), robot.joint_names)
 
 

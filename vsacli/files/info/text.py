@@ -10,12 +10,13 @@ from vsacli.analysis import report_text
 from vsacli.analysis.report import Report
 from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
-from vsacli.base.units import POSITION, STIFFNESS, TORQUE
+from vsacli.base.units import DAMPING, POSITION, STIFFNESS, TORQUE
 from vsacli.documents.changes import written
 
 Description = Mapping[str, Any]
 
 SHOWN_DIGITS = 5
+PLACES = {"link": "between its links", "transmission": "beside its springs"}
 MOTION = ("dq", "ddq", "d3q", "d4q")
 
 
@@ -39,6 +40,7 @@ def _robot(robot: Description) -> Iterator[str]:
     yield from ("", *aligned(list(_drives(joints))), "")
     yield "static load: the largest torque of gravity that was found, over configurations within the limits"
     yield "stiffness: reachable without load, and with the static load in either direction"
+    yield from _dampers(joints)
     if robot["held_at_zero"]:
         yield f"without position limits, and held at zero: {', '.join(robot['held_at_zero'])}"
     yield from report_text.warnings_and_notes(robot["warnings"], ())
@@ -69,6 +71,17 @@ def _drives(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
         reachable = (_span(ranges[name], unit) if ranges else "-" for name in ("unloaded", "loaded"))
         load = f"{_short(joint['static_load']['torque'])} {TORQUE.unit(kind)}"
         yield joint["name"], actuator["type"], _springs(actuator) or "-", load, *reachable
+
+
+def _dampers(joints: Sequence[Description]) -> Iterator[str]:
+    """Where they are and what they can do, in one line if there are any."""
+    words = [
+        f"{joint['name']} {PLACES[damper['location']]}, {_span(damper['range'], DAMPING.unit(joint['type']))}"
+        for joint in joints
+        if (damper := joint["damper"])
+    ]
+    if words:
+        yield f"dampers: {'; '.join(words)}"
 
 
 def _springs(actuator: Description) -> str:

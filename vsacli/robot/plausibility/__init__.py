@@ -9,12 +9,13 @@ from vsacli.documents import tree
 from vsacli.documents.plausibility import Entry, NumberPath, Written, findings, strange
 from vsacli.documents.source import Source
 from vsacli.robot.plausibility.body_rules import BODY_RULES
+from vsacli.robot.plausibility.damper_rules import DAMPER_RULES
 from vsacli.robot.plausibility.drive_rules import DRIVE_RULES
 from vsacli.robot.plausibility.facts import Facts
 from vsacli.robot.plausibility.motor_rules import MOTOR_RULES
 from vsacli.robot.plausibility.spring_rules import SPRING_RULES
 
-ROBOT_RULES = (*BODY_RULES, *MOTOR_RULES, *DRIVE_RULES, *SPRING_RULES)
+ROBOT_RULES = (*BODY_RULES, *MOTOR_RULES, *DRIVE_RULES, *SPRING_RULES, *DAMPER_RULES)
 
 
 def implausible(facts: Facts, sources: Sequence[Source]) -> tuple[Problem, ...]:

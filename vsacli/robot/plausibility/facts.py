@@ -88,6 +88,7 @@ class BodySizes:
         levers: distance of what is farthest from each joint while the robot is stretched, m.
         mass: of all links, kg.
         inertias: of each link alone about its joint, kg m^2; of a prismatic joint the mass, kg.
+        moved: of all that a joint moves while the robot is stretched, kg m^2; of a prismatic joint, kg.
         loads: what the weight can ask of each joint while the robot is stretched, N m (N).
     """
 
@@ -104,6 +105,8 @@ class BodySizes:
         self.mass = float(mass[0])
         revolute = np.array([joint.is_revolute for joint in joints])
         self.inertias = masses * np.where(revolute, coms**2 + self.gyrations**2, 1.0)
+        turned = _from_tip(masses * (extents**2 + self.gyrations**2)) - 2 * before * moment + before**2 * mass
+        self.moved = np.where(revolute, turned, mass)
         self.loads = WEIGHT_PER_MASS * np.where(revolute, moment - before * mass, mass)
 
     @property
