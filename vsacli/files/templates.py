@@ -34,8 +34,8 @@ STIFFNESS_DEGREE = 5
 """With these, the motors' acceleration vanishes at both ends, and so does the step of their torques."""
 
 TRAJECTORY_HEAD = (
-    "A trajectory to begin with. Degrees 9 and 5 are the smallest with which torques of motors behind springs",
-    "start and end without a step. What stands commented out is optional.",
+    "A trajectory to begin with. Degrees 9 and 5 are the smallest with which motors behind springs start",
+    "and end without a step of their torques. What stands commented out is optional.",
 )
 
 ANGLE_OF_MOTION = math.radians(30)
