@@ -167,6 +167,8 @@ def on_one_line(value: Any) -> str:
             return f"[{', '.join(map(on_one_line, value))}]"
         case bool():
             return "true" if value else "false"
+        case None:
+            return "null"
         case float():
             return f"{value:.10g}"
     return str(value)

@@ -106,11 +106,14 @@ class Items(_Entries):
         return "list" if self.records else f"list, each {self.item.words}"
 
     def lines(self, name: str, value: Any, comment: str, of_record: LinesOfRecord, /) -> Iterator[Line]:
-        """Of records the first with all its keys and comments, the others with what is set."""
-        if not self.records:
+        """Of records the first with all its keys and comments, the others with what is set; a list a line."""
+        if not self.records and not isinstance(value[0], list):
             yield from super().lines(name, value, comment, of_record)
             return
         yield Line(f"{name}:", comment)
+        if not self.records:
+            yield from (Line(f"- {on_one_line(entry)}").inside() for entry in value)
+            return
         first, *others = value
         entries = [list(of_record(self.records[""], first))]
         entries += [[Line(f"{key}: {on_one_line(each)}") for key, each in other.items()] for other in others]
