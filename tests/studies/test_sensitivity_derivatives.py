@@ -11,7 +11,7 @@ from samples.marks import slow_but
 from samples.mechanisms import DEVICES
 from samples.springs import SPRINGS
 
-from vsacli import Antagonistic, Elastic, Motor, load_robot, load_trajectory
+from vsacli import Antagonistic, Elastic, Motor, load_robot, load_trajectory, sensitivity
 from vsacli.actuators.friction import Friction
 from vsacli.actuators.reach import margin
 from vsacli.actuators.serial import Serial
@@ -217,4 +217,33 @@ def test_torques_of_motors_by_numbers_of_links_and_springs_at_once():
 
         expected = differences(torque, each.value, 1e-4 * size)
         scale = np.abs(part.block.tau_motor).max()
-        assert np.abs(part.by_name["tau_motor"][place] - expected).max() * size < 1e-8 * scale, name
+        assert np.abs(part.over_time("tau_motor")[:, place] - expected).max() * size < 1e-8 * scale, name
+
+
+def test_what_does_not_exist_has_no_slope_by_any_number():
+    robot, trajectory = loaded("mixed_3r")
+    part = next(iter(SensitivityRun(robot, trajectory)))
+    absent = 0
+    for name in ("tau_motor", "theta", "motor_power", "margin"):
+        variable = part.margin if name == "margin" else getattr(part.block, name)
+        slopes = part.over_time(name)
+        missing = np.broadcast_to(np.isnan(variable)[:, None], slopes.shape)
+        np.testing.assert_array_equal(np.isnan(slopes), missing)
+        absent += np.isnan(variable).any(axis=0).sum()
+    assert absent
+
+
+def test_blocks_of_steps_are_joined(monkeypatch):
+    robot, trajectory = loaded("mixed_3r")
+    masses = ["joints.*.link.mass"]
+    whole = sensitivity(robot, trajectory, masses, "1%")
+    monkeypatch.setattr("vsacli.studies.sensitivities.sensitivity_run.BLOCK_SLOPES", 20_000)
+    assert len(list(SensitivityRun(robot, trajectory, masses))) > 1
+    parts = sensitivity(robot, trajectory, masses, "1%")
+    for one, other in zip(whole.parameters, parts.parameters, strict=True):
+        assert one.path == other.path
+        for joint, effect in one.joints.items():
+            assert other.joints[joint].torque == effect.torque
+            assert other.joints[joint].time == effect.time
+            # sums of thousands of terms in another order
+            assert other.joints[joint].spent == pytest.approx(effect.spent, rel=1e-12, abs=1e-14)

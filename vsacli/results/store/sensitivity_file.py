@@ -28,7 +28,7 @@ class Number(NamedTuple):
 
 
 class Sloped(Protocol):
-    """Consecutive steps with derivatives by name, (numbers, samples, joints[, 2])."""
+    """Consecutive steps with derivatives."""
 
     @property
     def time(self) -> FloatArray:
@@ -38,9 +38,8 @@ class Sloped(Protocol):
     def block(self) -> Block:
         """The variables themselves."""
 
-    @property
-    def by_name(self) -> Mapping[str, FloatArray]:
-        """Their derivatives."""
+    def over_time(self, name: str) -> FloatArray:
+        """Derivatives of a variable, (samples, numbers, joints[, 2])."""
 
 
 class SensitivityWriter(ResultWriter):
@@ -111,7 +110,7 @@ class SensitivityWriter(ResultWriter):
         start = self._written
         super()._append(block.block)
         for name, dataset in self._slopes.items():
-            dataset[start : self._written] = np.moveaxis(block.by_name[name], 0, 1)
+            dataset[start : self._written] = block.over_time(name)
 
     def _size(self) -> int:
         columns = sum(len(MOTORS) if of_motors else 1 for of_motors in self._wanted.values())

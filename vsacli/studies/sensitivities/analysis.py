@@ -15,7 +15,8 @@ from vsacli.studies.sensitivities.monte_carlo import monte_carlo
 from vsacli.studies.sensitivities.parameter_steps import step_of, words_of
 from vsacli.studies.sensitivities.parameters import Parameter
 from vsacli.studies.sensitivities.sensitivity_report import JointEffect, ParameterEffect, Sensitivity
-from vsacli.studies.sensitivities.sensitivity_run import Derivatives, SensitivityRun
+from vsacli.studies.sensitivities.sensitivity_run import SensitivityRun
+from vsacli.studies.sensitivities.slopes import Derivatives
 from vsacli.studies.sensitivities.tolerances import deviations, tolerances_of
 from vsacli.trajectory.trajectory import Trajectory
 

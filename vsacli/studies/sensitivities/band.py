@@ -8,11 +8,10 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.reach import margin
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
 from vsacli.studies.sensitivities.drive_derivatives import MARGIN
-from vsacli.studies.sensitivities.sensitivity_run import Derivatives
+from vsacli.studies.sensitivities.slopes import Derivatives
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ class Band:
     def add(self, part: Derivatives) -> None:
         """Merge the next block."""
         block = part.block
-        gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+        gap = part.margin
         of_torque, of_margin = np.zeros_like(block.tau_motor), np.zeros_like(gap)
         for group in part.groups:
             variances = self._variances[group.places]

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.reach import margin
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.studies.sensitivities.drive_derivatives import MARGIN
-from vsacli.studies.sensitivities.sensitivity_run import Derivatives
+from vsacli.studies.sensitivities.slopes import Derivatives
 
 
 class Smallest(NamedTuple):
@@ -68,9 +67,8 @@ class Effects:
         self.failed += int(np.count_nonzero(has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR)))
         self.peak = np.fmax(self.peak, np.fmax.reduce(np.abs(block.tau_motor), axis=(0, 2)))
         weights = self._weights[self._done : self._done + len(part.time), None, None]
-        spending = weights * (block.motor_power > 0)
-        gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
-        gap = np.where(np.isfinite(gap), gap, np.inf)
+        spending = weights * (block.motor_power > 0)  # what motors take back does not count as spent
+        gap = np.where(np.isfinite(part.margin), part.margin, np.inf)
         worst, joints = gap.argmin(axis=0), np.arange(gap.shape[1])
         smaller = gap[worst, joints] < self.smallest.value
         self.smallest.slopes[:, smaller] = 0.0
@@ -79,7 +77,8 @@ class Effects:
                 if slopes is None or not group.places:
                     continue
                 self._add_torque(part.time, slopes["tau_motor"], group.places, joint)
-                self._add_energy(slopes["motor_power"], spending[:, joint], group.places, joint)
+                energy = slopes.total("motor_power", spending[:, joint].T)
+                self.spent[group.places, joint] += energy * self._steps[group.places]
                 if smaller[joint]:
                     self.smallest.slopes[group.places, joint] = slopes[MARGIN][:, worst[joint]]
         self.smallest = self.smallest._replace(
@@ -104,13 +103,6 @@ class Effects:
         self.largest[at, joint] = found[larger]
         self.time[at, joint] = time[worst[larger] % len(time)]
         self.motor[at, joint] = 1 + worst[larger] // len(time)
-
-    def _add_energy(
-        self, slopes: FloatArray, spending: FloatArray, places: Sequence[int], joint: int
-    ) -> None:
-        """What motors take back does not count as spent."""
-        known = np.where(np.isfinite(slopes), slopes, 0.0).reshape(len(places), -1)
-        self.spent[places, joint] += known @ spending.T.ravel() * self._steps[places]
 
 
 def _trapezoidal(times: FloatArray) -> FloatArray:

@@ -3,106 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
-import numpy as np
-
-from vsacli.base.arrays import FloatArray
-from vsacli.base.variables import MOTORS, Block
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import command_of, compute_block, fitted
 from vsacli.robot.model import Robot
 from vsacli.studies.sensitivities.drive_derivatives import MARGIN, OF_MOTORS, drive_derivatives
 from vsacli.studies.sensitivities.link_derivatives import torque_slopes
 from vsacli.studies.sensitivities.parameters import Parameter, parameters
+from vsacli.studies.sensitivities.slopes import Chained, Derivatives, Group, Known
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
 BLOCK_SAMPLES = 4096
 """Steps at a time. 7R, 4000 steps: with 1024 it took half as long again; each block costs the interpreter."""
 
+BLOCK_SLOPES = 10_000_000
+"""Bound on numbers times joints times steps at a time, each of 24 bytes at most: 20 joints take 0.6 GB."""
+
 ACTUATOR = "actuator"
 """The part of a joint whose numbers leave the torque that its links demand as it is."""
-
-Slopes = Mapping[str, FloatArray]
-"""Derivatives of a joint by variable: (numbers, 2, samples) of its motors, else (numbers, samples)."""
-
-
-class Chained(Slopes):
-    """Derivatives by numbers that tau_e depends on, by the chain rule when one is asked for.
-
-    Args:
-        of_torques: of tau_e, tau_e', tau_e'' by the numbers, (numbers, 3, samples).
-        by_torques: of each variable by the three, (3, [2,] samples).
-    """
-
-    def __init__(self, of_torques: FloatArray, by_torques: Slopes) -> None:
-        self._of_torques, self._by_torques = of_torques, by_torques
-
-    def __getitem__(self, name: str) -> FloatArray:
-        by_torques = self._by_torques[name]
-        spread = self._of_torques if by_torques.ndim == 2 else self._of_torques[:, :, None]
-        total: FloatArray = spread[:, 0] * by_torques[0]
-        for order in range(1, len(by_torques)):
-            if by_torques[order].any():
-                total += spread[:, order] * by_torques[order]
-        return total
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._by_torques)
-
-    def __len__(self) -> int:
-        return len(self._by_torques)
-
-
-class Group(NamedTuple):
-    """Derivatives by some numbers.
-
-    Attributes:
-        places: of the numbers, among all.
-        of_joints: of each joint; None if nothing of it depends on these numbers.
-    """
-
-    places: Sequence[int]
-    of_joints: Sequence[Slopes | None]
-
-
-@dataclass(frozen=True, eq=False)
-class Derivatives:
-    """What changes with the numbers of a robot over a block of steps, per SI unit of each.
-
-    NaN where the variable does not exist, and where the decoupling matrix is singular.
-
-    Attributes:
-        block: the steps, with the variables themselves.
-        numbers: how many there are.
-        groups: the derivatives; those that are zero for a whole joint are left out.
-    """
-
-    block: Block
-    numbers: int
-    groups: Sequence[Group] = field(repr=False)
-
-    @property
-    def time(self) -> FloatArray:
-        """Times of the steps, (samples,), s."""
-        time: FloatArray = self.block.time
-        return time
-
-    @property
-    def by_name(self) -> dict[str, FloatArray]:
-        """All derivatives by variable: (numbers, samples, joints), of motors with a last axis of 2."""
-        joints = self.block.q.shape[1]
-        dense = {
-            name: np.zeros((self.numbers, joints, *([len(MOTORS)] * of_motors), len(self.time)))
-            for name, of_motors in SensitivityRun.slopes.items()
-        }
-        for group in self.groups:
-            for joint, slopes in enumerate(group.of_joints):
-                for name, values in ({} if slopes is None else slopes).items():
-                    dense[name][group.places, joint] = values
-        return {name: np.moveaxis(array, -1, 1) for name, array in dense.items()}
 
 
 class SensitivityRun:
@@ -129,8 +49,10 @@ class SensitivityRun:
         self.parameters: tuple[Parameter, ...] = parameters(robot, patterns)
 
     def __iter__(self) -> Iterator[Derivatives]:
-        for start in range(0, self.trajectory.samples, BLOCK_SAMPLES):
-            yield self._derivatives(self.trajectory.block(start, start + BLOCK_SAMPLES))
+        most = BLOCK_SLOPES // (len(self.parameters) * len(self.robot.joints))
+        steps = max(1, min(BLOCK_SAMPLES, most))
+        for start in range(0, self.trajectory.samples, steps):
+            yield self._derivatives(self.trajectory.block(start, start + steps))
 
     def _derivatives(self, motion: Motion) -> Derivatives:
         block, joints = compute_block(self.robot, motion), range(len(self.robot.joints))
@@ -140,7 +62,8 @@ class SensitivityRun:
             command = command_of(index, block.arrays())
             derived = drive_derivatives(self.robot, index, command, [self.parameters[at] for at in own])
             by_torques.append(derived.by_torques)
-            groups.append(Group(own, [derived.by_numbers if joint == index else None for joint in joints]))
+            known = Known(derived.by_numbers)
+            groups.append(Group(own, [known if joint == index else None for joint in joints]))
         of_links = [place for place, each in enumerate(self.parameters) if each.part != ACTUATOR]
         chosen = [self.parameters[at] for at in of_links]
         for places, of_torques in torque_slopes(self.robot, motion, chosen):
