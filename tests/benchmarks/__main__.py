@@ -20,6 +20,7 @@ import growth
 import kernel
 import page
 import recorders
+import sensitivities
 import stages
 from machine import description
 from subjects import ROOT
@@ -47,6 +48,7 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     runs = (stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c"))
     yield "stages", page.stage_table(*runs)
     yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats))
+    yield "sensitivity", page.sensitivity_part(sensitivities.compare(3 * repeats))
     yield "startup", page.startup_table(commands.startup(3 * repeats))
     memory = commands.peak_memory(LONG_RUN) / 1e6
     yield (

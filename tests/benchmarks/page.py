@@ -9,6 +9,7 @@ from compiled import CALLS, SCALAR_FLAGS, Calls, Cost
 from growth import Growth
 from kernel import CASADI, Kernel
 from recorders import Recorder
+from sensitivities import INVERSE_DYNAMICS, SAMPLES, Sensitivities
 from stages import Stages
 from timing import Seconds
 
@@ -106,6 +107,15 @@ def stage_table(numpy: Stages, compiled: Stages) -> str:
         for name, by_numpy, by_code in zip(Stages._fields, numpy, compiled, strict=True)
     )
     return table(("stage, µs a sample of the 7R arm", "NumPy", "compiled, 1 thread"), rows)
+
+
+def sensitivity_part(found: Sensitivities) -> str:
+    """All derivatives, against one run without them, and the memory they take."""
+    header = (f"7R arm, {SAMPLES:,} samples, {found.numbers} numbers", "ms", "ratio")
+    unit = found.seconds[INVERSE_DYNAMICS]
+    rows = [[name, f"{taken * 1e3:.0f}", f"{taken / unit:.2g}"] for name, taken in found.seconds.items()]
+    memory = ", ".join(f"{most / 1e6:.0f} MB for {joints} joints" for joints, most in found.memory.items())
+    return f"{table(header, rows)}\n\nAt most resident: {memory}.\n"
 
 
 def actuation_table(found: Iterable[Actuation]) -> str:
