@@ -39,6 +39,11 @@ def as_standard(robot: Robot) -> Robot:
     return dataclasses.replace(robot, base=_moved(robot.base, rows[0]), joints=tuple(joints))
 
 
+def modified_link(joint: Joint) -> Link:
+    """The link of a standard joint in its modified frame, as a file of that convention has it."""
+    return _moved_link(joint.link, DenavitHartenberg(a=-joint.dh.a, alpha=-joint.dh.alpha))
+
+
 def _moved(base: Pose, row: DenavitHartenberg) -> Pose:
     """The pose followed by Rx(alpha) Tx(a); the roll of a pose is turned about its own x axis, too."""
     shift = rotation_matrix(base).times(Vector(exact(row.a), 0, 0))

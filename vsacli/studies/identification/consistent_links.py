@@ -11,6 +11,7 @@ needed.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -94,7 +95,7 @@ def consistent_links(robot: Robot, told: Told) -> ConsistentLinks:
     """
     start = np.concatenate([_body_near(joint.link, robot) for joint in robot.joints])
     errors = SHARP * np.maximum(np.abs(told.values), 1.0)
-    root = np.linalg.cholesky(told.covariance + np.diag(errors**2))
+    root = np.asarray(np.linalg.cholesky(told.covariance + np.diag(errors**2)), dtype=np.float64)
     found = _nearest(_Problem.of(told, root, start), start)
     off = (told.shares @ found - told.values) / np.linalg.norm(root, axis=1)
     return ConsistentLinks(tuple(map(link_of, found.reshape(-1, len(SYMBOLS)))), off)
@@ -155,12 +156,12 @@ class _Problem(NamedTuple):
         """With the told values as coordinates, scaled by a root of their covariance."""
         from scipy.linalg import solve_triangular
 
-        q, r = np.linalg.qr(told.shares.T, mode="complete")
+        q, r = map(np.asarray, np.linalg.qr(told.shares.T, mode="complete"))
         count = len(told.values)
         to_told = q[:, :count]
         centre = to_told @ solve_triangular(r[:count], told.values, trans="T")
         errors = to_told @ solve_triangular(r[:count], root, trans="T")
-        inverse = np.linalg.inv(pseudo_inertia(start.reshape(-1, len(SYMBOLS))))
+        inverse = np.asarray(np.linalg.inv(pseudo_inertia(start.reshape(-1, len(SYMBOLS)))), dtype=np.float64)
         return cls(centre, np.hstack((errors, q[:, count:])), count, inverse)
 
     def parameters(self, s: FloatArray) -> FloatArray:
@@ -197,7 +198,7 @@ class _Problem(NamedTuple):
 
 def _nearest(problem: _Problem, start: FloatArray) -> FloatArray:
     """Standard parameters of all links with the least value, (parameters,), from those of bodies."""
-    s = np.linalg.solve(problem.directions, start - problem.centre)
+    s = np.asarray(np.linalg.solve(problem.directions, start - problem.centre), dtype=np.float64)
     off = float(s[: problem.errors] @ s[: problem.errors])
     lighter = int(np.ceil(np.log10(max(off, 1.0) / WEIGHT) / np.log10(LIGHTER)))
     for power in range(lighter, -1, -1):
@@ -209,13 +210,13 @@ def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
     """By Newton steps, halved at most to where links are bodies and the value falls for certain."""
     for _ in range(STEPS):
         gradient, hessian = problem.slopes(s, weight)
-        scale = 1 / np.sqrt(np.diagonal(hessian))
-        step = -scale * np.linalg.solve(hessian * np.outer(scale, scale), scale * gradient)
-        decrement = float(np.sqrt(max(-gradient @ step, 0.0)))
+        scale: FloatArray = 1 / np.sqrt(np.diagonal(hessian))
+        step: FloatArray = -scale * np.linalg.solve(hessian * np.outer(scale, scale), scale * gradient)
+        decrement = math.sqrt(max(-float(gradient @ step), 0.0))
         if decrement <= ARRIVED:
             break
         here, certain, part = problem.value(s, weight), 1 / (1 + decrement), 1.0
         while part > certain and not problem.value(s + part * step, weight) < here:
             part = max(part / 2, certain)
-        s = s + part * step
+        s = np.asarray(s + part * step)
     return s

@@ -52,8 +52,9 @@ def delay(found: Sequence[Solution], signals: Signals) -> Delay:
 
 def _of_system(found: Solution, signals: Signals, rates: Signals) -> tuple[float, float]:
     equations, of_rates = found.equations(signals), found.equations(rates)
-    slopes = np.column_stack((equations.slopes, -of_rates.measured))
-    fit = least_squares([equations._replace(slopes=slopes)], np.append(found.predicting, 0.0))
+    of_positions = found.equations(signals._replace(tau_motor=0 * rates.tau_motor))
+    slopes = np.column_stack((equations.slopes, of_positions.measured - of_rates.measured))
+    fit = least_squares([equations._replace(slopes=slopes, noise=None)], np.append(found.predicting, 0.0))
     return float(fit.values[-1]), float(fit.standard_errors[-1])
 
 

@@ -6,12 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from vsacli.base.errors import InputError
-from vsacli.documents.edited import edited, moved_files
+from vsacli.documents.edited import edited, moved_files, texts_at
 from vsacli.documents.remarks import with_errors
 from vsacli.documents.unaliased import unaliased
 from vsacli.robot.model import Robot
+from vsacli.robot.modified_dh import modified_link
 from vsacli.studies.identification.identification_report import Identification, Number, significant
 from vsacli.studies.sensitivities.parameters import JOINTS, parameters
+
+NOTHING = 1e-9
+"""Size of numbers of links, SI units, that are left by rounding."""
 
 
 def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
@@ -35,7 +39,7 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
     values: dict[str, Any] = {}
     errors: dict[str, str] = {}
     for number in found.numbers:
-        if not number.told or (number.path not in known and not number.changed):
+        if not number.told or number.sum or (number.path not in known and not number.changed):
             continue
         path, value = _indexed(robot, number), float(significant(number.value, number.standard_error))
         errors[path] = f"{number.standard_error:.2g}"
@@ -44,9 +48,29 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
         else:
             parent, _, key = path.rpartition(".")
             values.setdefault(parent, {"coulomb": 0.0})[key] = value
+    values |= _changed_links(robot, found.fitted, source.text)
     files = dict(moved_files(source.text, Path(source.path).parent, Path(folder)))
     text = edited(unaliased(source.text, values), {**values, **files})
     return with_errors(text, errors)
+
+
+def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:
+    """Numbers of links by path, in frames of the file's convention, of those that are not as they were."""
+    modified = dict(texts_at(text, "convention")).get("convention") == "modified"
+    found: dict[str, Any] = {}
+    for index, (joint, before) in enumerate(zip(fitted.joints, robot.joints, strict=True)):
+        if joint.link != before.link:
+            link = modified_link(joint) if modified else joint.link
+            place = f"{JOINTS}.{index}.link"
+            found[f"{place}.mass"] = _rounded(link.mass)
+            found[f"{place}.com"] = [_rounded(each) for each in link.com]
+            found[f"{place}.inertia"] = {key: _rounded(value) for key, value in vars(link.inertia).items()}
+    return found
+
+
+def _rounded(value: float) -> float:
+    """With more digits than records tell, so that links stay bodies, but for what is nothing in any unit."""
+    return 0.0 if abs(value) < NOTHING else float(f"{value:.7g}")
 
 
 def _indexed(robot: Robot, number: Number) -> str:

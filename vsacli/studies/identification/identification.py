@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import dataclasses
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -12,7 +12,10 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot, check_robot
 from vsacli.studies.identification.bandwidth import bandwidth_of, bounds
+from vsacli.studies.identification.consistent_links import ConsistentLinks
 from vsacli.studies.identification.delays import Delay, delay, without_delay
+from vsacli.studies.identification.equations import Equations
+from vsacli.studies.identification.found_links import doubts_of, found_links
 from vsacli.studies.identification.identification_report import (
     DOUBTFUL,
     MISFIT,
@@ -25,21 +28,17 @@ from vsacli.studies.identification.identification_report import (
     SystemReport,
     Torques,
 )
+from vsacli.studies.identification.link_system import LINKS, link_system
 from vsacli.studies.identification.motor_system import motor_systems
 from vsacli.studies.identification.record_doubts import model_doubts
 from vsacli.studies.identification.records import Record, complete_joints, read_record
 from vsacli.studies.identification.signals import Signals, conditioned
-from vsacli.studies.identification.solution import Solution, SystemOfEquations, held_out, rms, solution
+from vsacli.studies.identification.solution import Solution, held_out, rms, solution
 from vsacli.studies.identification.torque_noise import torque_noise
 from vsacli.studies.identification.unknowns import FRICTION, GROUPS, check_fit, with_friction
 
-Systems = Callable[[Robot, Sequence[int], Sequence[str]], Iterable[SystemOfEquations]]
-"""Makes systems of equations of a robot, the joints that were recorded, and what is to be found."""
-
-MAKERS: Mapping[tuple[str, ...], Systems] = MappingProxyType({GROUPS: motor_systems})
-"""What makes equations, by the words of `--fit` that it serves."""
-
-WORDS = tuple(word for words in MAKERS for word in words)
+WORDS = (*GROUPS, LINKS)
+"""What users may ask for by a word."""
 
 ABOVE_NOISE, ABOVE_TORQUE = 2.0, 0.02
 """Residual over the noise, and over the torque, beyond both of which the equations do not hold: what is left
@@ -76,21 +75,24 @@ def identify(
     joints = sorted({joint for record in records for joint in complete_joints(robot, record)})
     signals = [_conditioned(record, bandwidth) for record in records]
     sought = with_friction(robot, joints) if FRICTION in fit else robot
-    systems = [system for maker in MAKERS.values() for system in maker(sought, joints, fit)]
-    if not systems:
+    first = _solved(sought, joints, fit, signals)
+    if not first:
         raise InputError.one("the joints that were recorded have nothing of what is to be found")
-    signals, delays = _aligned(systems, signals)
-    found = [solution(system, signals) for system in systems]
+    delays = [delay(first, each) for each in signals]
+    late = any(each.matters(record.rate) for each, record in zip(delays, signals, strict=True))
+    signals = [_aligned(*each) for each in zip(signals, delays, strict=True)]
+    found = _solved(sought, joints, fit, signals) if late else first
     reports = tuple(_report(robot, each, signals) for each in found)
+    links = next((found_links(robot, each) for each in found if each.system.title == LINKS), None)
     doubts = [tuple(model_doubts(robot, joints, *each)) for each in zip(records, signals, strict=True)]
     used = tuple(map(_used, records, signals, delays, doubts))
     return Identification(
         robot=robot.name,
-        verdict=_verdict(reports, used),
+        verdict=_verdict(reports, used, links),
         records=used,
         systems=reports,
-        notes=tuple(_notes(robot, joints)),
-        fitted=_fitted(sought, reports),
+        notes=(*_notes(robot, joints, fit, signals), *(() if links is None else doubts_of(links))),
+        fitted=_fitted(sought, reports, links),
         torques=tuple(_torques(robot, found, records, signals)),
     )
 
@@ -112,17 +114,36 @@ def _conditioned(record: Record, bandwidth: float | None) -> Signals:
     return conditioned(record.time, record.q, record.theta, record.tau_motor, chosen)
 
 
-def _aligned(
-    systems: Sequence[SystemOfEquations], signals: Sequence[Signals]
-) -> tuple[list[Signals], list[Delay]]:
-    """Records without the delays of their torques, as far as these can be told, and these."""
-    first = [solution(system, signals) for system in systems]
-    delays = [delay(first, each) for each in signals]
-    shifted = [
-        without_delay(each, late.seconds) if late.matters(each.rate) else each
-        for each, late in zip(signals, delays, strict=True)
-    ]
-    return shifted, delays
+def _solved(
+    robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
+) -> list[Solution]:
+    """Motors joint by joint, then all links, with what springs carry by those."""
+    motors = [solution(system, signals) for system in motor_systems(robot, joints, fit)]
+    if LINKS not in fit or _without_links(robot, joints, fit, signals):
+        return motors
+    return [*motors, solution(link_system(robot, fit, motors), signals)]
+
+
+def _without_links(
+    robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
+) -> str:
+    """Why nothing is found of the links, a sentence; empty if there is no reason."""
+    unknown = [np.isnan(each).any() for each in np.concatenate([record.q for record in signals]).T]
+    if any(unknown):
+        names = ", ".join(name for name, lacking in zip(robot.joint_names, unknown, strict=True) if lacking)
+        return f"links move each other, and the positions of {names} were not recorded"
+    if any(joint.damper for joint in robot.joints):
+        return "nothing is found of links while there are dampers, whose damping was not recorded"
+    rows = len(joints) * sum(len(each.time) // each.filter.stride for each in signals)
+    count = len(link_system(robot, fit, ()).names)
+    if rows <= count:
+        return f"{rows} equations are too few for the {count} numbers of the links; record for longer"
+    return ""
+
+
+def _aligned(signals: Signals, late: Delay) -> Signals:
+    """A record without the delay of its torques, as far as this can be told."""
+    return without_delay(signals, late.seconds) if late.matters(signals.rate) else signals
 
 
 def _report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemReport:
@@ -145,7 +166,8 @@ def _report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemRepo
 def _numbers(found: Solution) -> Iterator[Number]:
     system, fit = found.system, found.fit
     inseparable = {at for each in fit.inseparable for at, _ in each.terms}
-    for number, (name, unit) in enumerate(zip(system.names, system.units, strict=True)):
+    said = zip(system.names, system.units, system.sums, strict=True)
+    for number, (name, unit, total) in enumerate(said):
         before = float(system.before[number])
         if number in found.bound:
             value, error = found.bound[number]
@@ -155,7 +177,7 @@ def _numbers(found: Solution) -> Iterator[Number]:
             value, error = float(fit.values[at]), float(fit.standard_errors[at])
             note = "cannot be told apart" if at in inseparable else ""
             note = "changes nothing" if at in fit.unexcited else note
-        yield Number(name, unit, before, value, error, note)
+        yield Number(name, unit, before, value, error, note, total)
 
 
 def _residuals(robot: Robot, found: Solution, signals: list[Signals]) -> Iterator[Residual]:
@@ -176,7 +198,7 @@ def _residuals(robot: Robot, found: Solution, signals: list[Signals]) -> Iterato
             unit=_unit(robot, name),
             torque=rms(measured[rows]),
             residual=rms(residual[rows]),
-            noise=_noise(robot, name, signals),
+            noise=_noise(robot, name, signals, equations),
             held_out=beyond.get(name, float("nan")),
         )
 
@@ -186,22 +208,26 @@ def _unit(robot: Robot, group: str) -> str:
     return "N m" if turning.get(group.rpartition(" ")[2], True) else "N"
 
 
-def _noise(robot: Robot, group: str, signals: Sequence[Signals]) -> float:
-    """Of a motor's torque, over all records; NaN of what is measured by no sensor of its own."""
+def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequence[Equations]) -> float:
+    """Of a motor's torque, over all records; of what springs carry, by the noise of positions."""
     words, joint = group.split(), group.rpartition(" ")[2]
     if words[0] != "motor":
-        return float("nan")
+        noise = [each.noise[0][each.group == group] for each in equations if each.noise is not None]
+        return rms(np.concatenate(noise)) if noise else float("nan")
     motor = int(words[1]) - 1 if words[1].isdigit() else 0
     index = robot.joint_names.index(joint)
     each = np.array([torque_noise(of_record)[index, motor] for of_record in signals])
     return rms(each)
 
 
-def _verdict(systems: Sequence[SystemReport], records: Sequence[RecordReport]) -> str:
+def _verdict(
+    systems: Sequence[SystemReport], records: Sequence[RecordReport], links: ConsistentLinks | None
+) -> str:
     residuals = [each for system in systems for each in system.residuals]
     if any(record.doubts for record in records):
         return DOUBTFUL
-    if any(map(_fails, residuals)) or not all(system.converged for system in systems):
+    held = all(system.converged for system in systems) and (links is None or links.within)
+    if any(map(_fails, residuals)) or not held:
         return MISFIT
     return OK if all(number.told for system in systems for number in system.numbers) else UNTOLD
 
@@ -226,15 +252,23 @@ def _used(record: Record, signals: Signals, late: Delay, doubts: tuple[str, ...]
     )
 
 
-def _notes(robot: Robot, joints: Sequence[int]) -> Iterator[str]:
+def _notes(
+    robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
+) -> Iterator[str]:
     left = [joint.name for index, joint in enumerate(robot.joints) if index not in joints]
     if left:
         yield f"nothing was recorded of {', '.join(left)}"
+    if LINKS in fit and (reason := _without_links(robot, joints, fit, signals)):
+        yield reason
 
 
-def _fitted(robot: Robot, systems: Sequence[SystemReport]) -> Robot:
-    found = {number.path: number.value for system in systems for number in system.numbers if number.told}
-    return robot.replace(found)
+def _fitted(robot: Robot, systems: Sequence[SystemReport], links: ConsistentLinks | None) -> Robot:
+    numbers = (number for system in systems for number in system.numbers)
+    fitted = robot.replace({each.path: each.value for each in numbers if each.told and not each.sum})
+    if links is None or not links.within:
+        return fitted
+    joints = map(lambda joint, link: dataclasses.replace(joint, link=link), fitted.joints, links.links)
+    return dataclasses.replace(fitted, joints=tuple(joints))
 
 
 def _torques(

@@ -27,12 +27,13 @@ class Number(Published):
     """A number of a robot as found.
 
     Attributes:
-        path: to it, from the robot.
+        path: to it, from the robot; of a base parameter, its name.
         unit: of all values.
         before: by the robot file.
         value: what is found, or kept.
         standard_error: of that; NaN if it was not told.
         note: why it was not told, or is at a bound; empty otherwise.
+        sum: of a base parameter, which the file does not have, what of link numbers it is; else empty.
     """
 
     path: str
@@ -41,10 +42,12 @@ class Number(Published):
     value: float
     standard_error: float
     note: str = ""
+    sum: str = ""
 
     shape: ClassVar = {
         **named("path", "unit", "before", "value", "standard_error", "changed"),
         "note?": "note",
+        "sum?": "sum",
     }
 
     @property
@@ -221,6 +224,9 @@ class Identification(Published):
     def _sentences(self) -> Iterator[str]:
         for system in self.systems:
             yield from (f"{system.title}: {sentence}" for sentence in system.combinations)
+            yield from (
+                f"{each.path} is {each.sum}" for each in system.numbers if each.sum not in ("", each.path)
+            )
         for record in self.records:
             yield from (f"{record.path}: {doubt}" for doubt in record.doubts)
         yield from self.notes

@@ -30,6 +30,7 @@ class MotorSystem:
         self.title = robot.joints[index].name
         self.names = tuple(map(str, sought))
         self.units = tuple(each.unit for each in sought)
+        self.sums = ("",) * len(self.names)
         self.before = np.array([each.value for each in sought])
 
     def equations(self, values: FloatArray, signals: Signals) -> Equations:

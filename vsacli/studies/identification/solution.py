@@ -29,12 +29,14 @@ class SystemOfEquations(Protocol):
     Attributes:
         title: whose numbers they are: the joint, or the links.
         names, units: of the numbers.
+        sums: what each number that the robot file does not have is the sum of; "" for the others.
         before: their values by the robot file, (numbers,), SI units.
     """
 
     title: str
     names: tuple[str, ...]
     units: tuple[str, ...]
+    sums: tuple[str, ...]
     before: FloatArray
 
     def equations(self, values: FloatArray, signals: Signals) -> Equations:
@@ -150,7 +152,7 @@ def held_out(found: Solution, records: list[Signals]) -> dict[str, float]:
 def split(signals: Signals) -> tuple[Signals, Signals]:
     """A record in two: what a fit is made to, and its last fifth."""
     at = len(signals.time) * 4 // 5
-    arrays = [name for name in Signals._fields if name not in {"rate", "filter"}]
+    arrays = [name for name in Signals._fields if name not in {"rate", "filter", "noise"}]
     first = signals._replace(**{name: getattr(signals, name)[:at] for name in arrays})
     return first, signals._replace(**{name: getattr(signals, name)[at:] for name in arrays})
 
