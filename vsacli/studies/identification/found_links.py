@@ -43,5 +43,5 @@ def doubts_of(links: ConsistentLinks) -> Iterator[str]:
         off = np.abs(links.off).max()
         yield (
             f"no bodies have the base parameters found: of the nearest ones some are {off:.2g} standard "
-            f"errors off, more than {WITHIN:g}, so the links stay as in the file; are there forces on the arm?"
+            f"errors off, more than {WITHIN:g}, so the links stay as in the file; do forces act on the arm?"
         )
