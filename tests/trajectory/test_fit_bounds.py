@@ -5,9 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 from samples.noisy_records import MOTIONS, record
+from scipy.interpolate import make_interp_spline
 
 from vsacli.trajectory.fits import SMOOTH, fit_samples
-from vsacli.trajectory.fits.bounds import CAUTION, unresolved, vibrations
+from vsacli.trajectory.fits.bounds import CAUTION, IMPULSES, SHORTEST_IMPULSE, unresolved, vibrations
 from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding
 
 
@@ -26,8 +27,32 @@ def test_a_component_that_is_not_resolved_has_no_covariance_but_a_bound(stepwise
     (bound,) = unresolved(stepwise, 5)
     found = np.sqrt(np.mean(bound.covariance(time)[0, 4, 4]))
     size = np.sqrt(np.mean(part.at(time, 5)[4] ** 2))
-    assert found == pytest.approx(CAUTION * part.smoothing.relative * size)
+    impulses = IMPULSES * np.sqrt(part.smoothing.spread / SHORTEST_IMPULSE)
+    assert found == pytest.approx(np.hypot(CAUTION * part.smoothing.relative, impulses) * size)
     assert list(bound.members) == [0]
+
+
+@pytest.mark.parametrize("rate", [250, 2000])
+def test_impulses_where_jerk_jumps_are_within_the_bound(rate):
+    """Each as long as `SHORTEST_IMPULSE`: the truth is a spline through exact samples that far apart."""
+    motion = MOTIONS["minimum jerk"]
+    made = record(motion, "white, 1e-5 rad", 4, rate)
+    fit = fit_samples(made.time, made.values[None], 7, 4, SMOOTH)
+    fine = np.arange(0, made.time[-1] + SHORTEST_IMPULSE / 2, SHORTEST_IMPULSE)
+    exact = make_interp_spline(fine, motion(fine, 4)[0], k=9)
+    start, end = fit.parts[0].inside
+    fine = fine[(fine >= start) & (fine <= end)]
+    error = np.sqrt(np.mean((fit.at(fine, 5)[4, 0] - exact(fine, nu=4)) ** 2))
+    (bound,) = unresolved(fit, 5)
+    stated = 2 * np.sqrt(np.mean(bound.covariance(fine[::100])[0, 4, 4]))
+    assert error < stated < 2.5 * error
+
+
+def test_steps_of_velocity_that_are_smooth_have_no_impulses():
+    made = record(MOTIONS["velocity steps, 200 ms"], "white, 1e-5 rad", 4, 250)
+    (part,) = fit_samples(made.time, made.values[None], 7, 4, SMOOTH).parts
+    assert not part.smoothing.resolved
+    assert part.smoothing.spread == 0
 
 
 def test_what_is_resolved_needs_no_bound():

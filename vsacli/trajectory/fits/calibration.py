@@ -4,25 +4,25 @@ The posterior variance of a penalised spline is the sum of what noise makes of i
 the prior expects, averaged over all motions that it holds possible. One motion has a bias of its own: sines
 far below the cut-off have next to none, a motion whose spectrum falls more slowly than the prior's has many
 times as much. Both parts follow from how the posterior variance v changes with a common factor t of all
-penalties: the expected bias is -dv/dlog t, noise is the rest. How large the bias is shows at the cut-off: by
-how much the spline itself changes with t, between what noise alone makes of that and what the prior expects.
+penalties: the expected bias is -dv/dlog t, noise is the rest. How large the bias is shows at the cut-off, by
+how much motion there is beside what the prior expects.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.trajectory.fits.cutoff import motion_power
 from vsacli.trajectory.fits.penalised import KINK_VARIANCE, Model
 
 STEP = 0.35
-"""Of log t between the splines that derivatives are taken of."""
+"""Of log t to both sides, between which derivatives by it are taken."""
 
 LEAST_SHARE = 0.3
-"""Of the expected bias. Its measure is off by some 0.5 from record to record."""
+"""Of the expected bias. Its measure is off by some 0.4 from record to record."""
 
 
 FEW_SAMPLES = 2.0
@@ -52,10 +52,11 @@ def calibrated(model: Model, orders: int, unexplained: float) -> Calibration:
         unexplained: how much the highest derivative changes from one resolution to the next beyond what noise
             explains, root mean square away from the ends.
     """
-    near = [model.stiffened(STEP * steps) for steps in range(-2, 3)]
-    share = _bias_share(near, orders - 1)
+    near = [model.stiffened(-STEP), model.stiffened(STEP)]
+    share = _bias_share(model, orders - 1)
     cautious = np.array([model.variances(order, model.cautious) for order in range(orders)])
-    bias = np.array([-_slope([each.variances(order) for each in near[1:4]]) for order in range(orders)])
+    softer, stiffer = (np.array([each.variances(order) for order in range(orders)]) for each in near)
+    bias = (softer - stiffer) / (2 * STEP)
     found = cautious - (1 - share) * bias
     found = np.where(model.kinks, np.maximum(found, KINK_VARIANCE * cautious), found)
     found *= 1 + unexplained**2 / float(np.mean(found[-1, model.inside]) * model.noise_variance)
@@ -70,27 +71,14 @@ def posterior_error(model: Model, order: int) -> float:
     return float((FEW_SAMPLES if model.segments > 1 else 1.0) * np.sqrt(variance))
 
 
-def _bias_share(near: Sequence[Model], order: int) -> float:
-    """The squared bias of a derivative, as share of what the prior expects, by how it changes at the cut-off.
+def _bias_share(model: Model, order: int) -> float:
+    """The squared bias of a derivative, as share of what the prior expects, by the motion at the cut-off.
 
-    With the gain H of the spline at a frequency, and noise of density N, the posterior variance is the
-    integral of N H. The change of the spline with log t has the variance N H^2 (1 - H)^2 if there is no
-    motion at the cut-off, and N H^2 (1 - H) if there is as much as the prior expects. What lies above the
-    cut-off is extrapolated: if the spectrum falls more slowly than the prior's, it is more again.
+    What lies above the cut-off is extrapolated: if the spectrum falls more slowly than the prior's, it is
+    more again.
     """
-    model = near[2]
-    variances = [each.variances(order) for each in near]
-    first, second = _slope(variances[1:4]), (variances[1] - 2 * variances[2] + variances[3]) / STEP**2
-    third = (variances[4] - 2 * variances[3] + 2 * variances[1] - variances[0]) / (2 * STEP**3)
-    expected = -(first + second) / 2
-    noise = (expected + (second + third) / 2) / 3
-    change = _slope([each.spline(model.probes, nu=order)[:, 0] for each in near[1:4]])
-    weight = model.inside / variances[2]  # each part of the record counts alike
-    measured = float(weight @ (change**2 / model.noise_variance - noise))
-    share = measured / float(weight @ (expected - noise))
+    weight = model.inside / model.variances(order)  # each part of the record counts alike
+    power = motion_power(model, order, 2, weight)
+    exists = power.expected > 0  # a straight line has no cut-off
+    share = float(np.max(power.found[exists] / power.expected[exists], initial=0.0))
     return max(share, LEAST_SHARE, share * abs(share))
-
-
-def _slope(rows: Sequence[FloatArray]) -> FloatArray:
-    """Derivative by log t in the middle of three."""
-    return (rows[2] - rows[0]) / (2 * STEP)

@@ -101,18 +101,27 @@ class Model:
 
         return BSpline(self.bins.knots, self.coefficients[:, None], self.bins.degree)
 
+    @cached_property
+    def freedoms(self) -> FloatArray:
+        """Of each difference of coefficients: 1 if the samples determine it, 0 if the prior does."""
+        certain = self.posterior.variances(self.bins.differences).ravel()[: len(self.penalties)]
+        return np.clip(1 - certain * self.penalties, 0, 1)
+
+    @property
+    def piece(self) -> float:
+        """Mean length of what the samples determine one coefficient of, s: a knot span, or longer."""
+        bins = self.bins
+        return bins.span * bins.spans / (bins.degree + float(np.sum(self.freedoms)))
+
     def updated(self, step: float) -> Model:
         """With the penalties that the found spline suggests.
 
         Args:
             step: share of the logarithmic step that is taken.
         """
-        order, count = self.bins.degree, len(self.penalties)
         segment = self._segment
-        certain = self.posterior.variances(self.bins.differences).ravel()[:count] * self.penalties
-        size = np.bincount(segment)
-        free = np.maximum(np.bincount(segment, np.clip(1 - certain, 0, 1)), 1e-4 * size)
-        found = np.bincount(segment, self.penalties * np.diff(self.coefficients, order) ** 2)
+        free = np.maximum(np.bincount(segment, self.freedoms), 1e-4 * np.bincount(segment))
+        found = np.bincount(segment, self.penalties * np.diff(self.coefficients, self.bins.degree) ** 2)
         change = np.log(free * self.noise_variance / np.maximum(found, np.finfo(float).tiny))
         change = step * np.clip(change, -LARGEST_STEP, LARGEST_STEP)
         penalties = np.clip(self.penalties * np.exp(change[segment]), LEAST_PENALTY, LARGEST_PENALTY)

@@ -9,6 +9,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.calibration import calibrated, posterior_error
+from vsacli.trajectory.fits.cutoff import falls
 from vsacli.trajectory.fits.information import Posterior
 from vsacli.trajectory.fits.resolution import KnownNoise, find_resolution
 from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding, spectral_lines
@@ -32,6 +33,8 @@ class Smoothing:
         relative: error that must be expected of the highest derivative that is needed, over this derivative's
             own root mean square; rather more than the deviation.
         resolved: whether two successive resolutions agree on that derivative.
+        spread: length over which it has what may be impulses, s; zero if it is resolved, or its spectrum
+            falls.
         lines: frequencies that stand out of the residual.
         posterior: of the coefficients.
         units: of the posterior's deviations of the value and each derivative, at equal steps of the spline's
@@ -42,6 +45,7 @@ class Smoothing:
     deviations: FloatArray
     relative: float
     resolved: bool
+    spread: float
     lines: Lines
     posterior: Posterior
     units: FloatArray
@@ -66,6 +70,7 @@ class Smoothing:
         return replace(
             self,
             deviations=self.deviations / factor ** np.arange(len(self.deviations)),
+            spread=factor * self.spread,
             lines=self.lines.stretched(factor),
         )
 
@@ -111,5 +116,6 @@ def smoothing_spline(
         else spectral_lines(time, residual, order, size, known.bandwidth)
     )
     units = scale * known_errors.units
-    smoothing = Smoothing(deviations, relative, found.accepted, lines, model.cautious, units)
+    spread = 0.0 if found.accepted or falls(model, order) else model.piece
+    smoothing = Smoothing(deviations, relative, found.accepted, spread, lines, model.cautious, units)
     return BSpline(spline.t, scale * spline.c + offset, degree), smoothing
