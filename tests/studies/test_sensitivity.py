@@ -12,7 +12,6 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, rest_to_rest
 
 from vsacli import load_robot, load_trajectory, sensitivity
 from vsacli.actuators.reach import margin
-from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.inverse import compute_block
 from vsacli.studies.sensitivities import SensitivityRun
 from vsacli.studies.sensitivities.parameters import parameters
@@ -69,15 +68,18 @@ def test_published_figures_of_the_papers_arm(vsacli):
 
 
 @pytest.mark.slow
-def test_drawn_robots_agree_with_the_first_order(arm, motion):
-    """Where margins exceed 5 %: with 1000 draws a deviation is known to 2 %, and 1 % tolerances are small."""
-    stiff = motion.commanding(STIFFNESS, (950.0, 930.0, 950.0), "")
-    found = sensitivity(arm, stiff, tolerances="1%", runs=1000)
-    assert found.monte_carlo.refused == 0
+def test_drawn_robots_agree_with_the_first_order(arm):
+    """With 1000 draws a deviation is known to 2 %; the rest is what first order leaves out."""
+    page = (REPOSITORY / "docs/sensitivity.md").read_text(encoding="utf-8")
+    found = sensitivity(arm, load_trajectory(REST_TO_REST, arm), tolerances="2%", runs=1000)
+    drawn = found.monte_carlo
+    assert drawn.refused == 0
     for joint, band in found.band.items():
-        assert band.margin > 0.05
-        assert found.monte_carlo.torque[joint] == pytest.approx(band.torque, rel=0.1)
-        assert found.monte_carlo.lost[joint] == 0
+        if band.margin > 0.05:
+            assert drawn.torque[joint] == pytest.approx(band.torque, rel=0.1)
+        torques = f"| +- {band.torque:.2f} N m | +- {drawn.torque[joint]:.2f} N m"
+        lost = f"| {100 * band.lost:.2g} % | {100 * drawn.lost[joint]:.2g} % |"
+        assert f"| {joint} | {100 * band.margin:.2f} % {torques} {lost}" in page
 
 
 def test_a_deviation_takes_two_robots_with_torques():

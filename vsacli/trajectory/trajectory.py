@@ -166,13 +166,9 @@ class Trajectory:
         """
         from vsacli.trajectory.recorded.arrays import profiles_of_arrays
 
-        of_joints = {"stiffness": stiffness, **commanded}
-        unknown = of_joints.keys() - set(commanded_names())
-        if unknown:
-            raise TypeError(f"no signal is called {', '.join(sorted(unknown))}")
         given = {
             POSITION: (q, dq, ddq, d3q, d4q),
-            **{each: tuple(map(of_joints.get, each.names)) for each in COMMANDED.values()},
+            **_by_signal({"stiffness": stiffness, **commanded}),
             WRENCH: (wrench, dwrench, ddwrench),
         }
         times, profiles, warnings = profiles_of_arrays(time, given, fit)
@@ -307,3 +303,17 @@ class Trajectory:
         left, right = starts[piece][which], stops[piece][which]
         time = left + (right - left) * (rank + 0.5) / hits[which]
         return time, np.minimum(time - left, right - time)
+
+
+def _by_signal(
+    of_joints: Mapping[str, ArrayLike | None],
+) -> dict[Signal, tuple[ArrayLike | None, ...]]:
+    """Commanded signals with their derivatives, from arrays by name.
+
+    Raises:
+        TypeError: there is no such signal.
+    """
+    unknown = of_joints.keys() - set(commanded_names())
+    if unknown:
+        raise TypeError(f"no signal is called {', '.join(sorted(unknown))}")
+    return {signal: tuple(map(of_joints.get, signal.names)) for signal in COMMANDED.values()}

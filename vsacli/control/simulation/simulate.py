@@ -156,45 +156,68 @@ def simulate(
     first, elapsed = trajectory.start, trajectory.from_zero()
     loop = _closed_loop(robot, elapsed, model or robot, gains)
     start = start_state(robot, elapsed, initial_error)
-    readings: Readings | None = None
-    if sensors is not None:
-        readings = Readings(sensors, robot, loop.plant.drivetrain, elapsed.samples)
+    readings = None if sensors is None else Readings(sensors, robot, loop.plant.drivetrain, elapsed.samples)
 
     def passed(time: float) -> None:
         progress(first + time)
 
     integrated = _integrate(robot, loop, elapsed, start, measured, readings, tolerances, budget, passed)
     past = history(robot, loop, integrated, first, readings)
-    joints = joint_trackings(robot, past, goal_tolerance)
     full: SimulationReport | None = None
     if measured == "positions":
         conditions: Any = {"gains": gains, "model": model, "initial_error": initial_error}
         full = simulate(robot, trajectory, **conditions, tolerances=tolerances, budget=budget).report
-    verdict = verdict_on(past, joints, integrated.ending)
     exact = gains is None and (model is None or model is robot) and initial_error.is_zero
-    report = SimulationReport(
+    return Simulation(past, _report(robot, trajectory, gains, past, integrated, goal_tolerance, exact, full))
+
+
+def _report(
+    robot: Robot,
+    trajectory: Trajectory,
+    gains: Gains | None,
+    past: History,
+    integrated: StateTrajectory,
+    goal_tolerance: GoalTolerance,
+    exact: bool,
+    full: SimulationReport | None,
+) -> SimulationReport:
+    """The report on a run.
+
+    Args:
+        robot: as of `simulate`.
+        trajectory: likewise.
+        gains: likewise.
+        past: what happened.
+        integrated: how it was integrated.
+        goal_tolerance: as of `simulate`.
+        exact: whether model and start were.
+        full: the report on the same run with the full state measured, if positions were.
+    """
+    joints = joint_trackings(robot, past, goal_tolerance)
+    effort, ending = integrated.effort, integrated.ending
+    verdict = verdict_on(past, joints, ending)
+    return SimulationReport(
         robot=robot.name,
         trajectory=trajectory.name,
         controller="feedforward" if gains is None else "feedback-linearization",
         samples=len(past.time),
         duration=trajectory.duration,
         verdict=verdict,
-        ending=None if integrated.ending is None else integrated.ending.described(robot.joint_names, first),
-        evaluations=integrated.effort.evaluations,
-        budget=integrated.effort.budget,
-        methods=tuple(replace(method, start=first + method.start) for method in integrated.effort.methods),
+        ending=None if ending is None else ending.described(robot.joint_names, trajectory.start),
+        evaluations=effort.evaluations,
+        budget=effort.budget,
+        methods=tuple(replace(each, start=trajectory.start + each.start) for each in effort.methods),
         warnings=(
             *(*robot.warnings, *trajectory.warnings),
             *_undetermined(robot, trajectory),
             *([_AMPLIFIED] if exact and verdict == "strayed" else []),
-            *(stiffness_warnings(robot, past) if integrated.ending is None else []),
+            *(stiffness_warnings(robot, past) if ending is None else []),
             *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
         ),
         notes=trajectory.notes,
         joints=joints,
         with_full_state=tuple(joint.q for joint in full.joints) if full else (),
     )
-    return Simulation(past, report)
 
 
 def check_measured(measured: Measured, gains: Gains | None) -> None:
