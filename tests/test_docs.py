@@ -34,7 +34,7 @@ README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 
 LONG = (
-    *("cli.md", "energy.md", "identification.md", "python.md", "quickstart.md"),
+    *("cli.md", "energy.md", "identification.md", "optimisation.md", "python.md", "quickstart.md"),
     *("recorded.md", "robots.md", "sensitivity.md", "simulation.md", "studies.md"),
     *("suggestions.md", "urdf.md"),
 )

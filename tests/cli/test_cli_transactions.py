@@ -66,6 +66,7 @@ TASKS = {
             "seen",
         )
     ),
+    "optimize": Task(("optimize", ROBOT, "move.yaml", "-o", "best.yaml")),
     "export": Task(("export", "given.h5", "-o", "torques.csv")),
     "new robot": Task(("new", "robot", "--joints", "RR", "-o", "arm.yaml")),
     "new trajectory": Task(("new", "trajectory", "--robot", ROBOT, "-o", "rise.yaml")),

@@ -135,6 +135,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("export", "RESULT", "-o", "OUT/table.csv", "--variables", "q,stiffness"),
     ("invdyn", "ROBOT", "OUT/table.csv", "-o", "OUT/again.h5"),
     ("compare", "RESULT", "OUT/table.csv"),
+    ("optimize", "ROBOT", "MOVE", "-o", "OUT/best.yaml"),
     ("sensitivity", "ROBOT", "MOVE", "--parameters", "joints.base.link.mass"),
     ("info", "RESULT"),
     ("info", "RESULT", "--json"),

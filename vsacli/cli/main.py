@@ -31,6 +31,7 @@ _SECTIONS = {
         "sensitivity": "vsacli.cli.sensitivity:sensitivity",
         "identify": "vsacli.cli.identify:identify",
         "study": "vsacli.cli.study:study",
+        "optimize": "vsacli.cli.optimize:optimize",
     },
     "Results": {
         "plot": "vsacli.cli.plot:plot",

@@ -7,15 +7,18 @@ from vsacli.base.lazy import lazy_exports
 if TYPE_CHECKING:
     from vsacli.studies.identification import Identification, identify
     from vsacli.studies.measured import Comparison, compare
+    from vsacli.studies.optimisation import Optimum, optimize
     from vsacli.studies.remedies import suggest
     from vsacli.studies.sensitivities import Sensitivity, sensitivity
 
 __all__ = [
     "Comparison",
     "Identification",
+    "Optimum",
     "Sensitivity",
     "compare",
     "identify",
+    "optimize",
     "sensitivity",
     "suggest",
 ]

@@ -35,12 +35,12 @@ def formula(profile: Profile) -> dict[str, Any] | None:
 
 
 def _sinusoids(profile: Sinusoids) -> dict[str, Any]:
+    amplitudes = {"sine": list(map(_values, profile.sine)), "cosine": list(map(_values, profile.cosine))}
     return {
         "type": "sinusoids",
         "frequency": profile.cycles / _duration(profile),
         "offset": _values(profile.offset),
-        "sine": list(map(_values, profile.sine)),
-        "cosine": list(map(_values, profile.cosine)),
+        **{name: harmonics for name, harmonics in amplitudes.items() if harmonics},
         "ramp": profile.ramp * _duration(profile),
     }
 

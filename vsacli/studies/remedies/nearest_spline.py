@@ -141,7 +141,7 @@ def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smooth
         missed = bounds.missed_by(BSpline(knots, shapes @ amounts, DEGREE)(bounds.time))
         if missed.max() <= BOUND_ACCURACY:
             return amounts
-        watched = np.union1d(watched, _peaks(missed))
+        watched = np.union1d(watched, peaks(missed))
     raise NoSplineError
 
 
@@ -177,7 +177,7 @@ def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> Floa
     return np.asarray(solve_triangular(root, residual[:-1] / -residual[-1]), dtype=np.float64)
 
 
-def _peaks(missed: FloatArray) -> IndexArray:
+def peaks(missed: FloatArray) -> IndexArray:
     """The worst instant of each stretch at which bounds are missed."""
     padded = np.concatenate([[0.0], np.maximum(missed, 0), [0.0]])
     rising, falling = padded[1:-1] > padded[:-2], padded[1:-1] >= padded[2:]

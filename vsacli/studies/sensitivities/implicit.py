@@ -46,29 +46,42 @@ class ImplicitSolution:
     def __init__(self, actuator: Actuator, carrying: Actuator, directions: int) -> None:
         self._actuator, self._carrying, self._directions = actuator, carrying, directions
 
-    def solve(self, tau_e: Dual, stiffness: FloatArray, q: FloatArray) -> PairSolution:
+    def solve(self, tau_e: Dual | FloatArray, stiffness: Dual | FloatArray, q: FloatArray) -> PairSolution:
         """As `Actuator.solve`, with derivatives."""
-        found = self._actuator.solve(tau_e.value, stiffness, q)
+        found = self.solve_within(tau_e, stiffness, q)
+        if self._actuator.motor_count == 1:
+            return found
+        never = np.zeros_like(found.slack_below)
+        derived: dict[str, Any] = {
+            "lower": self._end(tau_e, found.lower, found.lower_critical, found.slack_below, q),
+            "upper": self._end(tau_e, found.upper, found.upper_critical, never, q),
+        }
+        return found._replace(**derived)
+
+    def solve_within(
+        self, tau_e: Dual | FloatArray, stiffness: Dual | FloatArray, q: FloatArray
+    ) -> PairSolution:
+        """The same with a corridor that carries none, as where nothing that moves it does."""
+        found = self._actuator.solve(value_of(tau_e), value_of(stiffness), q)
         slopes = self._slopes(found.deflections[: self._actuator.motor_count], q)
-        torque, of_stiffness = self._all(tau_e) - slopes.of_torque, slopes.of_stiffness
+        torque = self._all(tau_e, q) - slopes.of_torque
+        change = self._all(stiffness, q) - slopes.of_stiffness
         if self._actuator.motor_count == 1:
             alone: Any = Dual.of(found.phi_1, torque / slopes.torque[0])
             return found._replace(phi_1=alone)
         (torque_1, torque_2), (stiffness_1, stiffness_2) = slopes.torque, slopes.stiffness
         determinant = torque_1 * stiffness_2 - torque_2 * stiffness_1
         with np.errstate(divide="ignore", invalid="ignore"):
-            dphi_1 = (stiffness_2 * torque + torque_2 * of_stiffness) / determinant
-            dphi_2 = (-stiffness_1 * torque - torque_1 * of_stiffness) / determinant
+            dphi_1 = (stiffness_2 * torque - torque_2 * change) / determinant
+            dphi_2 = (-stiffness_1 * torque + torque_1 * change) / determinant
         derived: dict[str, Any] = {
-            "lower": self._end(tau_e, found.lower, found.lower_critical, found.slack_below, q),
-            "upper": self._end(tau_e, found.upper, found.upper_critical, np.zeros_like(found.slack_below), q),
             "phi_1": Dual.of(found.phi_1, dphi_1),
             "phi_2": Dual.of(found.phi_2, dphi_2),
         }
         return found._replace(**derived)
 
-    def _all(self, tau_e: Dual) -> FloatArray:
-        return tangent_of(tau_e, self._directions, tau_e.shape)
+    def _all(self, demanded: Dual | FloatArray, q: FloatArray) -> FloatArray:
+        return tangent_of(demanded, self._directions, q.shape)
 
     def _slopes(self, phi: FloatArray, q: FloatArray) -> _Slopes:
         last = self._directions - len(phi)
@@ -83,7 +96,7 @@ class ImplicitSolution:
         return _Slopes(torque[last:], stiffness[last:], *by_directions)
 
     def _end(
-        self, tau_e: Dual, end: FloatArray, critical: BoolArray, slack: BoolArray, q: FloatArray
+        self, tau_e: Dual | FloatArray, end: FloatArray, critical: BoolArray, slack: BoolArray, q: FloatArray
     ) -> Dual | FloatArray:
         """An end of the corridor: critical, or where a side goes slack, or at the end of a range.
 
@@ -92,7 +105,7 @@ class ImplicitSolution:
         bounded = np.isfinite(end) & (end > 0)
         if not bounded.any():
             return end
-        phi = self._actuator.solve(tau_e.value, np.where(bounded, end, np.nan), q).deflections
+        phi = self._actuator.solve(value_of(tau_e), np.where(bounded, end, np.nan), q).deflections
         slopes = self._slopes(phi, q)
         pinned, by_pinned = self._pinned(phi)
         pinned = np.where(slack, np.abs(phi[1]) < np.abs(phi[0]), pinned)
@@ -101,7 +114,7 @@ class ImplicitSolution:
         larger = np.abs(slopes.torque[0]) >= np.abs(slopes.torque[1])
         first_free = np.where(critical, larger, pinned == 1)
         multiplier = np.where(first_free, multipliers[0], multipliers[1])
-        tangent = slopes.of_stiffness + multiplier * (self._all(tau_e) - slopes.of_torque)
+        tangent = slopes.of_stiffness + multiplier * (self._all(tau_e, q) - slopes.of_torque)
         fixed = np.where(first_free, 1, 0)
         at_end = (
             np.take_along_axis(slopes.stiffness, fixed[None], 0)[0]

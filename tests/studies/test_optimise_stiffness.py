@@ -1,0 +1,163 @@
+"""The best stiffness of a motion, against a dense grid, another optimiser, and runs of the result."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
+from samples.marks import slow
+
+from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
+from vsacli.base.signals import STIFFNESS
+from vsacli.dynamics.drive import drive
+from vsacli.studies.optimisation.criteria import CRITERIA
+from vsacli.studies.optimisation.spline_space import SplineSpace
+from vsacli.studies.optimisation.stiffness import StiffnessSearch
+from vsacli.studies.remedies.acceptance import Acceptance
+from vsacli.studies.remedies.admissible_stiffness import admissible_stiffness, joint_loads
+
+MARGIN = 0.03
+SHOULDER = 1
+
+SWING = """
+format: vsacli-trajectory/1
+name: swing
+duration: 0.125
+rate: 800
+position: {type: sinusoids, frequency: 8, offset: [0, 0.3, -0.4], sine: [[0.1, 0.1, 0.1]]}
+stiffness: {type: constant, value: 4000}
+"""
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return load_robot(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def swing(arm, tmp_path_factory):
+    """Fast and periodic."""
+    path = tmp_path_factory.mktemp("swing") / "swing.yaml"
+    path.write_text(SWING)
+    return load_trajectory(path, arm)
+
+
+@pytest.fixture(scope="module")
+def load(arm, swing):
+    return joint_loads(arm, swing, [SHOULDER])[0]
+
+
+def search(arm, load, criterion, space):
+    found = StiffnessSearch(
+        Acceptance(arm, MARGIN), arm.joints[SHOULDER], load, criterion, space, 0, lambda: None
+    )
+    return found.best()
+
+
+def costs(arm, load, criterion, rows):
+    """Of many profiles at once, rows (3, profiles, instants); infinite where one is not admitted."""
+    joint, profiles = arm.joints[SHOULDER], rows.shape[1]
+    command = {name: np.tile(row, profiles) for name, row in load.command.arrays().items()}
+    asked = dict(zip(STIFFNESS.names, rows.reshape(3, -1), strict=True))
+    tiled = load.command._replace(
+        **{name: row for name, row in command.items() if name in load.command._fields},
+        commanded={**{name: command[name] for name in load.command.commanded}, **asked},
+    )
+    with np.errstate(invalid="ignore", divide="ignore"):
+        driven = drive(joint, tiled)
+    torques = driven.tau_motor.reshape(2, profiles, -1)
+    low, high = admissible_stiffness(joint, load.command, MARGIN)
+    kept = np.all((rows[0] >= low) & (rows[0] <= high), axis=1)
+    if criterion == "peak":
+        return np.where(kept, np.abs(torques).max(axis=(0, 2)), np.inf)
+    squares = np.trapezoid((torques**2).mean(axis=0), load.time) / (load.time[-1] - load.time[0])
+    return np.where(kept, np.sqrt(squares), np.inf)
+
+
+@pytest.mark.parametrize("criterion", ["torque", slow("peak")])
+def test_no_profile_of_a_dense_grid_is_better(arm, load, criterion):
+    """Of splines with two shapes, so that the grid has two dimensions; refined about its best four times."""
+    spaces = lambda span, _: SplineSpace.at_rest(span, 1)  # noqa: E731
+    found = search(arm, load, CRITERIA[criterion](), spaces)
+    basis = SplineSpace.at_rest((load.time[0], load.time[-1]), 1).basis(load.time, 3)
+    centre, width = np.array([3000.0, 3000.0]), 2500.0
+    for _ in range(5):
+        axis = np.linspace(-width, width, 15)
+        amounts = centre[:, None] + np.stack(np.meshgrid(axis, axis)).reshape(2, -1)
+        on_grid = costs(arm, load, criterion, np.einsum("ain,np->api", basis, amounts))
+        centre, width = amounts[:, on_grid.argmin()], width / 5
+    found_cost = costs(arm, load, criterion, found.rows[:, None])[0]
+    # The last grid is 0.3 N m/rad wide, at a flat minimum; bounds are kept with 1e-6 to spare.
+    assert found_cost == pytest.approx(on_grid.min(), rel=1e-4)
+
+
+@pytest.mark.slow
+def test_scipys_optimiser_comes_to_the_same_cost(arm, load):
+    """Without bounds, since none of them holds this motion back."""
+    from scipy.optimize import minimize
+
+    found = search(arm, load, CRITERIA["torque"](), lambda span, _: SplineSpace.periodic(span, 8))
+    basis = SplineSpace.periodic((load.time[0], load.time[-1]), 8).basis(load.time, 3)
+
+    def other_cost(amounts):
+        return costs(arm, load, "torque", (basis @ (1000 * amounts))[:, None])[0] / 1000
+
+    other = minimize(
+        other_cost, np.full(8, 4.0), jac="3-point", method="trust-constr", options={"gtol": 1e-5}
+    )
+    # SciPy stops where a slope is left that is worth 1e-5 of the cost.
+    assert costs(arm, load, "torque", found.rows[:, None])[0] == pytest.approx(1000 * other.fun, rel=1e-4)
+
+
+def test_a_fast_periodic_motion_has_its_optimum_inside_the_corridor(arm, load):
+    found = search(arm, load, CRITERIA["torque"](), SplineSpace.periodic)
+    low, high = admissible_stiffness(arm.joints[SHOULDER], load.command, MARGIN)
+    assert np.all((found.rows[0] > 1.2 * low) & (found.rows[0] < high))
+    assert found.found
+    assert (found.agreeing, found.bounding) == (found.starts, {})
+    np.testing.assert_allclose(found.rows[:, 0], found.rows[:, -1], rtol=1e-9, atol=1e-6)
+    near_edge = SplineSpace.periodic((load.time[0], load.time[-1]), 12)
+    rows = near_edge.basis(load.time, 3) @ near_edge.fitted(load.time, 1.02 * low)
+    best = costs(arm, load, "torque", found.rows[:, None])[0]
+    assert costs(arm, load, "torque", rows[:, None])[0] > 1.5 * best
+
+
+@pytest.mark.slow
+def test_what_is_written_runs_with_the_margin_and_costs_what_the_report_says(vsacli, arm):
+    done = vsacli("optimize", ROBOT, REST_TO_REST, "--margin", "2%", "--json", "-o", "best.yaml", "-q")
+    assert done.code == 0
+    found = json.loads(done.out)
+    assert (found["format"], found["possible"]) == ("vsacli-optimum/1", True)
+    result = inverse_dynamics(arm, load_trajectory("best.yaml", arm))
+    assert result.report.verdict == "ok"
+    assert min(joint.margin for joint in result.report.joints) >= 0.02
+    for index, name in enumerate(arm.joint_names):
+        mean = np.trapezoid((result.tau_motor[:, index] ** 2).mean(axis=-1), result.time) / result.time[-1]
+        assert found["joints"][name]["after"] == pytest.approx(math.sqrt(mean), rel=1e-9)
+        assert found["joints"][name]["after"] < 0.97 * found["joints"][name]["before"]
+    assert np.abs(result.dstiffness[[0, -1]]).max() < 1e-6
+    assert np.abs(result.ddstiffness[[0, -1]]).max() < 1e-3  # of some 1e3 N m/rad in 0.1 s^2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("criterion", ["torque", "energy", "peak"])
+def test_nothing_feasible_is_said_and_nothing_written(vsacli, criterion):
+    asked = ("--minimize", criterion, "--set", "joints.*.actuator.motor.max_torque=5", "-o", "best.yaml")
+    done = vsacli("optimize", ROBOT, REST_TO_REST, *asked)
+    assert done.code == 3
+    assert "nothing feasible was found" in done.out
+    assert "best.yaml is not written" in done.err
+
+
+def test_what_cannot_be_minimised_is_refused(arm, swing):
+    with pytest.raises(InputError, match=r"the motors of base have no resistance.*or --minimize torque"):
+        optimize(arm, swing, "copper")
+    with pytest.raises(InputError, match="what is minimised must be one of torque, energy, copper, peak"):
+        optimize(arm, swing, "power")
+    elastic = load_robot(REPOSITORY / "robots" / "hardening_1r.yaml")
+    moved = load_trajectory(REPOSITORY / "trajectories" / "hardening_1r.yaml", elastic)
+    with pytest.raises(InputError, match=r"no joint of .* has a stiffness to choose"):
+        optimize(elastic, moved)

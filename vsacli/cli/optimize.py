@@ -1,0 +1,115 @@
+"""`vsacli optimize`."""
+
+from __future__ import annotations
+
+import json
+
+import click
+
+from vsacli.cli.command_parts import (
+    example,
+    json_option,
+    load_inputs,
+    overwrite_option,
+    robot_argument,
+    set_option,
+    trajectory_argument,
+)
+from vsacli.cli.console import Exit, Talk, say, talk_options
+
+
+def _share(_context: click.Context, _parameter: click.Parameter, text: str | None) -> float | None:
+    """A share such as `3%` or `0.03`."""
+    if text is None:
+        return None
+    try:
+        return float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        raise click.BadParameter(f"expected a share such as 3% or 0.03, not {text!r}") from None
+
+
+@click.command(
+    "optimize",
+    short_help="Find the stiffness with which a motion costs least.",
+    epilog=example(
+        "vsacli optimize robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --minimize torque -o best.yaml"
+    ),
+)
+@robot_argument
+@trajectory_argument
+@set_option
+@click.option(
+    "--minimize",
+    type=click.Choice(["torque", "energy", "copper", "peak"]),
+    default="torque",
+    show_default=True,
+    help="Rms of motor torques, energy that the motors spend, heat in their windings, peak of motor torques.",
+)
+@click.option(
+    "--vary",
+    type=click.Choice(["stiffness"]),
+    default="stiffness",
+    show_default=True,
+    help="What may change.",
+)
+@click.option(
+    "--margin",
+    metavar="SHARE",
+    callback=_share,
+    help="Relative margin that every step shall keep to the ends of its corridor, e.g. 3%; by default 1%.",
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="Write the best trajectory, with a CSV beside it for what is no formula.",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts drawn.")
+@json_option
+@overwrite_option
+@talk_options
+def optimize(
+    robot: str,
+    trajectory: str,
+    changes: tuple[str, ...],
+    minimize: str,
+    vary: str,
+    margin: float | None,
+    output: str | None,
+    seed: int,
+    as_json: bool,
+    overwrite: bool,
+    talk: Talk,
+) -> Exit:
+    """Find the stiffness with which ROBOT executes the motion of TRAJECTORY at the least cost.
+
+    Every step keeps the margin and all limits. What is found is a local optimum; the report says from how
+    many starts the search came to it.
+    """
+    inputs = load_inputs(robot, trajectory, talk, changes)
+    from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+    from vsacli.base.outputs import Outputs
+    from vsacli.studies.optimisation import SEARCHES, chosen_joints
+    from vsacli.studies.optimisation import optimize as optimized
+    from vsacli.studies.remedies import Remedy, check_fixed_target, write_fixed
+
+    with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
+        if output is not None:
+            check_fixed_target(output, outputs)
+        searches = SEARCHES * len(chosen_joints(inputs.robot))
+        with talk.progress(searches, shown_from=0, label="searching") as progress:
+            found = optimized(
+                *inputs,
+                minimize,
+                vary,
+                margin=NEAR_SINGULAR_MARGIN if margin is None else margin,
+                seed=seed,
+                progress=progress.update,
+            )
+        if output is not None and found.trajectory is not None:
+            write_fixed(Remedy(0.0, inputs.robot, found.trajectory), output, outputs)
+        elif output is not None:
+            talk.note(f"{output} is not written: nothing feasible was found")
+    talk.wrote(outputs)
+    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    return Exit.OK if found.possible else Exit.VERDICT

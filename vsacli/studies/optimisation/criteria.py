@@ -1,0 +1,220 @@
+"""What is minimised: rms or peak of the motor torques, energy, heat in the windings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.units import ENERGY, TORQUE, Quantity
+from vsacli.base.variables import VARIABLES
+from vsacli.compute.duals import Dual
+from vsacli.dynamics.drive import Drive
+from vsacli.robot.joint import Joint
+
+Values = Dual | FloatArray
+"""(instants,), which may carry derivatives."""
+
+SMOOTHINGS = (0.1, 0.01, 1e-3)
+"""Shares of the mean power over which the positive part of power is smoothed, one after the other: with
+the last, a cost is overestimated by at most half as much, and the place of the optimum moves by less."""
+
+
+class Scale(NamedTuple):
+    """By what a cost is scaled, in its unit, over how long it is integrated, s, and how it is smoothed."""
+
+    cost: float = 1.0
+    duration: float = 1.0
+    smoothing: float = 0.0
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A cost of a joint: an integral over time, or a level that bounds something.
+
+    Attributes:
+        name: as on the command line.
+        words: for reports.
+        quantity: what it is measured in.
+        levels: rows besides those of the motion: 1 if the cost is a level that bounds something, else 0.
+        smoothings: how much it is smoothed, one search after the other.
+        repeating: whether the motion ends as it begins, on its way.
+    """
+
+    name: ClassVar[str]
+    words: ClassVar[str]
+    quantity: ClassVar[Quantity] = ENERGY
+    levels: ClassVar[int] = 0
+    smoothings: ClassVar[tuple[float, ...]] = (0.0,)
+    repeating: bool = False
+
+    def check(self, joint: Joint) -> None:
+        """Refuse a joint of which it cannot be computed.
+
+        Raises:
+            InputError: something is not given.
+        """
+
+    def integrands(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:
+        """What is integrated, each (instants,), by which the cost is scaled.
+
+        Args:
+            joint: the joint.
+            driven: what its motors do.
+            level: the further row, if there is one, scaled likewise.
+            scale: of the cost.
+        """
+        raise NotImplementedError
+
+    def weights(self, time: FloatArray) -> FloatArray:
+        """What each integrand counts at each instant, (integrands, instants)."""
+        weights: FloatArray = trapezoidal(time)[None]
+        return weights
+
+    def bound_count(self, joint: Joint) -> int:  # noqa: ARG002
+        """Number of `bounds`."""
+        return 0
+
+    def bounds(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:  # noqa: ARG002
+        """What a level keeps from being positive, each (instants,)."""
+        return ()
+
+    def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+        """The cost itself, in its unit."""
+        raise NotImplementedError
+
+    def size(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+        """By what it is scaled: what it is, of some motion."""
+        return self.of(joint, driven, time)
+
+
+class Torque(Criterion):
+    """Root mean square over time and the motors of the joint."""
+
+    name = "torque"
+    words = "rms motor torque"
+    quantity = TORQUE
+
+    def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
+        """The mean square."""
+        torques = _of_motors(joint, driven.tau_motor)
+        return [sum(torque * torque for torque in torques) / (len(torques) * scale.cost**2)]
+
+    def weights(self, time: FloatArray) -> FloatArray:
+        """Those of a mean."""
+        weights: FloatArray = trapezoidal(time)[None] / (time[-1] - time[0])
+        return weights
+
+    def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+        """N m (N)."""
+        (square,) = self.integrands(joint, driven, None, Scale())
+        return math.sqrt(float(self.weights(time)[0] @ square))
+
+
+class Copper(Criterion):
+    """Heat in the windings of the motors of the joint."""
+
+    name = "copper"
+    words = "heat in the windings"
+
+    def check(self, joint: Joint) -> None:
+        """Refuse motors without resistance."""
+        if not all(joint.has(VARIABLES["copper_loss"])[: joint.actuator.motor_count]):
+            raise InputError.one(
+                f"the motors of {joint.name} have no resistance, without which their heat is not known; give "
+                "torque_constant and resistance, or --minimize torque"
+            )
+
+    def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
+        """The power of all windings."""
+        return [sum(_of_motors(joint, driven.copper_loss)) / scale.cost]
+
+    def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+        """J."""
+        (power,) = self.integrands(joint, driven, None, Scale())
+        return float(trapezoidal(time) @ power)
+
+
+class Energy(Criterion):
+    """What the motors of the joint spend, without what they take back.
+
+    Unless the motion repeats itself, what its springs hold at the start counts as well: someone loaded them.
+    """
+
+    name = "energy"
+    words = "energy spent"
+    smoothings = SMOOTHINGS
+
+    def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
+        """The positive part of each power, smoothed; and the energy in the springs."""
+        width = scale.smoothing * scale.cost / scale.duration
+        powers = _of_motors(joint, driven.motor_power)
+        positive = [(power + np.sqrt(power * power + width * width)) / 2 for power in powers]
+        return [sum(positive) / scale.cost, driven.elastic_energy / scale.cost]
+
+    def weights(self, time: FloatArray) -> FloatArray:
+        """An integral, and the value at the start."""
+        loaded = np.zeros_like(time)
+        loaded[0] = 0.0 if self.repeating else 1.0
+        return np.stack([trapezoidal(time), loaded])
+
+    def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+        """J."""
+        spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven.motor_power))
+        return float(np.sum(self.weights(time) * np.stack([spent, driven.elastic_energy])))
+
+    def size(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
+        """What passes the motors either way: what they spend may be nothing."""
+        passed = sum(map(np.abs, _of_motors(joint, driven.motor_power)))
+        return float(trapezoidal(time) @ passed) or 1.0
+
+
+class Peak(Criterion):
+    """The largest motor torque of the joint."""
+
+    name = "peak"
+    words = "peak motor torque"
+    quantity = TORQUE
+    levels = 1
+
+    def integrands(self, _joint: Joint, _driven: Drive, level: Values | None, _scale: Scale) -> Sequence[Any]:
+        """The level."""
+        return [level]
+
+    def weights(self, time: FloatArray) -> FloatArray:
+        """Those of a mean."""
+        return np.full((1, len(time)), 1 / len(time))
+
+    def bound_count(self, joint: Joint) -> int:
+        """Two a motor."""
+        return 2 * joint.actuator.motor_count
+
+    def bounds(self, joint: Joint, driven: Drive, level: Values | None, scale: Scale) -> Sequence[Any]:
+        """The torques, either way."""
+        torques = _of_motors(joint, driven.tau_motor)
+        return [sign * torque / scale.cost - level for torque in torques for sign in (1.0, -1.0)]
+
+    def of(self, joint: Joint, driven: Drive, _time: FloatArray) -> float:
+        """N m (N)."""
+        return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven.tau_motor)))
+
+
+CRITERIA = {criterion.name: criterion for criterion in (Torque, Energy, Copper, Peak)}
+"""Those of the stiffness by name."""
+
+
+def trapezoidal(time: FloatArray) -> FloatArray:
+    """Weights of the trapezoidal rule, (instants,), s."""
+    halves = np.diff(time) / 2
+    weights: FloatArray = np.append(halves, 0.0) + np.append(0.0, halves)
+    return weights
+
+
+def _of_motors(joint: Joint, variable: Any) -> list[Any]:
+    """The rows of the motors there are."""
+    return [variable[motor] for motor in range(joint.actuator.motor_count)]

@@ -1,0 +1,128 @@
+"""What an optimisation found, as text and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from vsacli.base.json_records import Published, named
+from vsacli.base.tables import aligned
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+FULL = 0.995
+"""Share of the time that is all of it, as it is printed."""
+
+
+@dataclass(frozen=True)
+class JointOptimum(Published):
+    """The best stiffness of a joint that was found.
+
+    Attributes:
+        before: cost with the stiffness that is commanded; NaN where that is out of reach.
+        constant: with the best constant; NaN if there is none.
+        after: with the best profile.
+        unit: of the costs.
+        found: whether the conditions for a local optimum hold.
+        starts: with how many profiles the search began.
+        agreeing: from how many of them it came to this optimum.
+        bounding: share of the time during which the profile runs along a bound, by the name of the bound.
+    """
+
+    before: float
+    constant: float
+    after: float
+    unit: str
+    found: bool
+    starts: int
+    agreeing: int
+    bounding: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Optimum(Published):
+    """The trajectory with which a cost is least, as far as was searched.
+
+    Attributes:
+        robot: the robot.
+        asked: name of the trajectory that was to be improved.
+        minimised: what is least: torque, energy, copper or peak.
+        words: the same in words.
+        varied: what was varied.
+        margin: that every step has.
+        joints: by name; empty if nothing was found.
+        reasons: why nothing was found, in clauses.
+        trajectory: the best; None if nothing was found.
+    """
+
+    robot: Robot = field(repr=False)
+    asked: str
+    minimised: str
+    words: str
+    varied: str
+    margin: float
+    joints: dict[str, JointOptimum]
+    reasons: tuple[str, ...] = ()
+    trajectory: Trajectory | None = field(default=None, repr=False)
+
+    format: ClassVar[str] = "vsacli-optimum/1"
+    shape: ClassVar = {
+        "format": "format",
+        "robot": "robot_name",
+        "trajectory": "asked",
+        "possible": "possible",
+        **named("minimised", "varied", "margin", "joints"),
+        "reasons?": "reasons",
+    }
+
+    @property
+    def possible(self) -> bool:
+        """Whether anything feasible was found."""
+        return self.trajectory is not None
+
+    @property
+    def robot_name(self) -> str:
+        """Of the robot."""
+        return self.robot.name
+
+    def __str__(self) -> str:
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        title = f"{self.robot_name}, {self.asked}: {self.words} by another {self.varied}"
+        if not self.possible:
+            yield f"{title}: nothing feasible was found"
+            yield from (f"- {reason}" for reason in self.reasons)
+            return
+        yield title
+        yield from aligned(list(self._rows()))
+        yield from (f"{name}: {_bounds(each)}; {_search(each)}" for name, each in self.joints.items())
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        yield ("joint", "as commanded", "best constant", "local optimum", "change")
+        for name, each in self.joints.items():
+            costs = [_cost(cost, each.unit) for cost in (each.before, each.constant, each.after)]
+            yield (name, *costs, _change(each.before, each.after))
+
+
+def _cost(cost: float, unit: str) -> str:
+    return "-" if math.isnan(cost) else f"{cost:.4g} {unit}"
+
+
+def _change(before: float, after: float) -> str:
+    return "-" if not before > 0 else f"{100 * (after / before - 1):+.1f} %"
+
+
+def _bounds(joint: JointOptimum) -> str:
+    along = [
+        f"the {name} {'all' if share > FULL else f'{100 * share:.2g} %'} of the time"
+        for name, share in joint.bounding.items()
+    ]
+    return "inside all bounds" if not along else f"along {', '.join(along)}"
+
+
+def _search(joint: JointOptimum) -> str:
+    ended = "local optimum" if joint.found else "no local optimum, the search ended before"
+    return f"{ended}, from {joint.agreeing} of {joint.starts} starts"

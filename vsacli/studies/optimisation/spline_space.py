@@ -1,0 +1,75 @@
+"""Splines of degree 5, four times continuously differentiable, as linear combinations of shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+
+DEGREE = 5
+
+FLAT_ENDS = 2
+"""Derivatives that vanish at both ends of a spline from rest to rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class SplineSpace:
+    """The splines over a span that begin and end at rest, or repeat, or are constant.
+
+    Attributes:
+        knots: (coefficients + 6,), s.
+        shapes: B-spline coefficients of each shape, (coefficients, shapes).
+    """
+
+    knots: FloatArray
+    shapes: FloatArray
+
+    @classmethod
+    def at_rest(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
+        """Splines of so many equal pieces whose first two derivatives vanish at both ends.
+
+        They vanish where the first three coefficients are equal.
+        """
+        first, last = span
+        ends = np.linspace(first, last, pieces + 1)
+        knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
+        coefficients = pieces + DEGREE
+        shape_of = np.clip(np.arange(coefficients) - FLAT_ENDS, 0, coefficients - 1 - 2 * FLAT_ENDS)
+        return cls(knots, np.eye(shape_of[-1] + 1)[shape_of])
+
+    @classmethod
+    def periodic(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
+        """Splines of so many equal pieces that go on at the end as they begin."""
+        first, last = span
+        knots = first + (last - first) * np.arange(-DEGREE, pieces + DEGREE + 1, dtype=np.float64) / pieces
+        return cls(knots, np.eye(pieces)[np.arange(pieces + DEGREE) % pieces])
+
+    @classmethod
+    def constant(cls, span: tuple[float, float]) -> SplineSpace:
+        """Constants."""
+        whole = cls.at_rest(span, 1)
+        return cls(whole.knots, np.ones((len(whole.shapes), 1)))
+
+    @property
+    def size(self) -> int:
+        """Number of shapes."""
+        return int(self.shapes.shape[1])
+
+    @property
+    def piece(self) -> float:
+        """Length of a piece, s."""
+        return float(self.knots[DEGREE + 1] - self.knots[DEGREE])
+
+    def basis(self, time: FloatArray, orders: int) -> FloatArray:
+        """The shapes and their derivatives, (orders, instants, shapes)."""
+        from scipy.interpolate import BSpline
+
+        spline = BSpline(self.knots, self.shapes, DEGREE)
+        return np.stack([spline(time, nu=order) for order in range(orders)])
+
+    def fitted(self, time: FloatArray, values: FloatArray) -> FloatArray:
+        """The amounts of the shapes with which they come nearest to values, (shapes,)."""
+        amounts: FloatArray = np.linalg.lstsq(self.basis(time, 1)[0], values, rcond=None)[0]
+        return amounts
