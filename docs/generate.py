@@ -55,6 +55,9 @@ SHOWN = (
     "rest_to_rest_soft-rest_to_rest_stiff-compare.png",
     "rest_to_rest-rest_to_rest_soft-rest_to_rest_stiff-compare.png",
     "vsa_3r_pick_and_place-motion.png",
+    "yield-1-yield-2-yield-3-yield-5-compare.png",
+    "design-margin.png",
+    "design-pareto.png",
 )
 """Figures on the pages."""
 
@@ -316,9 +319,25 @@ def draw_images() -> None:
         _run("plot", "vsa_3r_pick_and_place.h5")
         _run("plot", "rest_to_rest_soft.h5", "rest_to_rest_stiff.h5")
         _run("plot", "rest_to_rest.h5", "rest_to_rest_soft.h5", "rest_to_rest_stiff.h5")
+        _draw_studies()
         for name in SHOWN:
             shutil.copy(name, IMAGES)
     draw(IMAGES / "recorded-noise.png")
+
+
+def _draw_studies() -> None:
+    """Draw the pictures of the studies that their page has."""
+    for name in ("robots", "trajectories"):
+        shutil.copytree(ROOT / name, name)
+    page = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
+    studies = dict(re.findall(r"Save as `(\w+)\.yaml`:\n\n```yaml\n(.*?)```", page, re.DOTALL))
+    tolerances = (1, 2, 3, 5)
+    texts = {f"yield-{size}": studies["yield"].replace("2 %", f"{size} %") for size in tolerances}
+    for name, text in {**texts, "design": studies["design"]}.items():
+        Path(f"{name}.yaml").write_text(text, encoding="utf-8")
+        _run("study", f"{name}.yaml")
+    _run("plot", *(f"{name}.h5" for name in texts))
+    _run("plot", "design.h5")
 
 
 def _run(*arguments: Any) -> None:

@@ -45,15 +45,43 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
     what that takes; results of robots with dampers <stem>-damper. Two or more FILEs give one figure
     <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid joint by
     joint.
+
+    The table of a study gives <stem>-margin, over the numbers that vary, <stem>-pareto, cost over margin, and
+    <stem>-feasibility, the share of runs with at least a margin; of several tables the latter are compared.
     """
     from vsacli.base.outputs import Outputs
 
     with Outputs(overwrite=overwrite, inputs=files) as outputs:
-        if len(files) == 1:
+        if _are_studies(files):
+            _draw_studies([Path(file) for file in files], Path(folder), file_format, outputs)
+        elif len(files) == 1:
             _draw_file(Path(files[0]), Path(folder), file_format, outputs, talk)
         else:
             _draw_comparison([Path(file) for file in files], Path(folder), file_format, outputs, talk)
     talk.wrote(outputs)
+
+
+def _are_studies(files: tuple[str, ...]) -> bool:
+    """Whether the first file is the table of a study; then all have to be."""
+    from vsacli.results.store.reader import stored_format
+    from vsacli.results.store.study_table import FORMAT
+
+    return stored_format(files[0]) == FORMAT
+
+
+def _draw_studies(paths: list[Path], folder: Path, file_format: str, outputs: Outputs) -> None:
+    """Draw the figures of a study, or compare how probable margins are in several."""
+    from vsacli.results.plots import COMPARISON, FigureFiles, compared_studies, study_figures
+    from vsacli.results.store.stored_study import StoredStudy
+
+    stem = "-".join(path.stem for path in paths)
+    with ExitStack() as stack:
+        tables = [stack.enter_context(StoredStudy(path)) for path in paths]
+        if len(tables) == 1:
+            figures = study_figures(tables[0])
+        else:
+            figures = {COMPARISON: compared_studies(tables, [path.stem for path in paths])}
+    FigureFiles(figures, folder, stem, file_format, outputs).save(figures)
 
 
 def _draw_file(path: Path, folder: Path, file_format: str, outputs: Outputs, talk: Talk) -> None:

@@ -27,6 +27,7 @@ from vsacli.results.plots.figures import (
 from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
 from vsacli.results.plots.measured_figure import MeasuredCurve, measured_figure
 from vsacli.results.plots.sensitivity_figures import Bar, Torque, band_figure, ranking_figure
+from vsacli.results.plots.study_figures import compared_studies, study_figures
 
 __all__ = [
     "COMPARISON",
@@ -41,6 +42,7 @@ __all__ = [
     "band_figure",
     "check_drawable",
     "compare_files",
+    "compared_studies",
     "drawable_figures",
     "drawings_of",
     "measured_figure",
@@ -51,4 +53,5 @@ __all__ = [
     "result_drawings",
     "save_figures",
     "simulation_drawings",
+    "study_figures",
 ]
