@@ -117,6 +117,7 @@ def test_an_inertia_below_zero_beyond_its_error_is_said_to_be_of_no_body() -> No
     assert bodies.off[0] > 9
 
 
+@pytest.mark.slow
 def test_links_of_the_file_that_are_no_bodies_become_some() -> None:
     """A published arm has a link without mass, and others whose inertia breaks the triangle inequality."""
     robot = shipped_robot("puma_560")

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from samples.marks import slow
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -87,7 +88,7 @@ def test_two_standard_errors_cover_the_truth(noise: Noise) -> None:
     assert np.all(np.abs(np.mean(off, axis=0)) < 4 / math.sqrt(DRAWS))
 
 
-@pytest.mark.parametrize("noise", [blue, low_passed])
+@pytest.mark.parametrize("noise", [blue, slow(low_passed)])
 def test_derivatives_of_noise_alone_leave_errors_at_most_somewhat_too_large(noise: Noise) -> None:
     """They have nothing at frequency zero but what neighbouring frequencies let in."""
     found = fits(noise)
