@@ -42,11 +42,11 @@ def moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, st
         yield path, os.path.relpath(origin / file, folder)
 
 
-def node_at(root: yaml.Node, path: str) -> yaml.Node:
-    """What stands at a path that leads somewhere."""
-    node = root
+def node_at(root: yaml.Node, path: str) -> yaml.Node | None:
+    """What stands at a path; None if it leads nowhere."""
+    node: yaml.Node | None = root
     for word in path.split("."):
-        node = dict(_entries(node))[word]
+        node = None if node is None else dict(_entries(node)).get(word)
     return node
 
 

@@ -18,15 +18,16 @@ def with_errors(text: str, errors: Mapping[str, str]) -> str:
 
     Args:
         text: a YAML document that can be read.
-        errors: by path; entries of lists by index.
+        errors: by path, entries of lists by index; those of numbers that do not stand there do not count.
     """
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     assert root is not None, "a document that can be read"
     by_line: dict[int, list[str]] = {}
     for path, error in errors.items():
         *_, key = path.split(".")
-        mark = node_at(root, path).start_mark
-        by_line.setdefault(mark.line, []).append(f"{key} +- {error}")
+        node = node_at(root, path)
+        if node is not None:
+            by_line.setdefault(node.start_mark.line, []).append(f"{key} +- {error}")
     lines = text.split("\n")
     ends = _content_ends(text)
     for number, remarks in by_line.items():

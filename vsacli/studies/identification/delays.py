@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +42,8 @@ def delay(found: Sequence[Solution], signals: Signals) -> Delay:
     Torques that are late by d are tau(t - d) = tau(t) - d tau'(t): a further unknown of each system.
     """
     rates = np.gradient(signals.tau_motor, 1 / signals.rate, axis=0)
-    told = [_of_system(each, signals, signals._replace(tau_motor=rates)) for each in found]
+    beside = signals._replace(tau_motor=rates, noise=None)
+    told = [each for system in found for each in _of_system(system, signals._replace(noise=None), beside)]
     values, errors = np.array([each for each in told if np.isfinite(each).all()]).reshape(-1, 2).T
     if not len(values):
         return Delay(np.nan, np.nan)
@@ -50,12 +51,14 @@ def delay(found: Sequence[Solution], signals: Signals) -> Delay:
     return Delay(float(weights @ values / weights.sum()), float(weights.sum() ** -0.5))
 
 
-def _of_system(found: Solution, signals: Signals, rates: Signals) -> tuple[float, float]:
+def _of_system(found: Solution, signals: Signals, rates: Signals) -> Iterator[tuple[float, float]]:
+    """The delay with its standard error, unless nothing of the system was recorded."""
     equations, of_rates = found.equations(signals), found.equations(rates)
-    of_positions = found.equations(signals._replace(tau_motor=0 * rates.tau_motor))
-    slopes = np.column_stack((equations.slopes, of_positions.measured - of_rates.measured))
-    fit = least_squares([equations._replace(slopes=slopes, noise=None)], np.append(found.predicting, 0.0))
-    return float(fit.values[-1]), float(fit.standard_errors[-1])
+    if len(equations.measured):
+        of_positions = found.equations(signals._replace(tau_motor=0 * rates.tau_motor))
+        slopes = np.column_stack((equations.slopes, of_positions.measured - of_rates.measured))
+        fit = least_squares([equations._replace(slopes=slopes)], np.append(found.predicting, 0.0))
+        yield float(fit.values[-1]), float(fit.standard_errors[-1])
 
 
 def without_delay(signals: Signals, late: float) -> Signals:

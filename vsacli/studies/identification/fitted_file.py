@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,24 @@ from vsacli.documents.remarks import with_errors
 from vsacli.documents.unaliased import unaliased
 from vsacli.robot.model import Robot
 from vsacli.robot.modified_dh import modified_link
-from vsacli.studies.identification.identification_report import Identification, Number, significant
+from vsacli.studies.identification.identification_report import (
+    Identification,
+    Number,
+    SystemReport,
+    significant,
+)
 from vsacli.studies.sensitivities.parameters import JOINTS, parameters
 
 NOTHING = 1e-9
 """Size of numbers of links, SI units, that are left by rounding."""
+
+
+def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
+    """The numbers that a file with what was found holds: of friction that it has none of, what was found."""
+    known = set(map(str, parameters(robot)))
+    for number in (number for system in systems for number in system.numbers):
+        if number.told and not number.sum and (number.path in known or number.changed):
+            yield number
 
 
 def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
@@ -38,11 +52,11 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
     known = set(map(str, parameters(robot)))
     values: dict[str, Any] = {}
     errors: dict[str, str] = {}
-    for number in found.numbers:
-        if not number.told or number.sum or (number.path not in known and not number.changed):
-            continue
+    for number in to_write(robot, found.systems):
         path, value = _indexed(robot, number), float(significant(number.value, number.standard_error))
         errors[path] = f"{number.standard_error:.2g}"
+        if number.value == number.before:
+            continue
         if number.path in known:
             values[path] = value
         else:

@@ -15,6 +15,7 @@ from vsacli.studies.identification.bandwidth import bandwidth_of, bounds
 from vsacli.studies.identification.consistent_links import ConsistentLinks
 from vsacli.studies.identification.delays import Delay, delay, without_delay
 from vsacli.studies.identification.equations import Equations
+from vsacli.studies.identification.fitted_file import to_write
 from vsacli.studies.identification.found_links import doubts_of, found_links
 from vsacli.studies.identification.identification_report import (
     DOUBTFUL,
@@ -92,7 +93,7 @@ def identify(
         records=used,
         systems=reports,
         notes=(*_notes(robot, joints, fit, signals), *(() if links is None else doubts_of(links))),
-        fitted=_fitted(sought, reports, links),
+        fitted=_fitted(robot, sought, reports, links),
         torques=tuple(_torques(robot, found, records, signals)),
     )
 
@@ -118,7 +119,7 @@ def _solved(
     robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
 ) -> list[Solution]:
     """Motors joint by joint, then all links, with what springs carry by those."""
-    motors = [solution(system, signals) for system in motor_systems(robot, joints, fit)]
+    motors = [solution(system, signals) for system in motor_systems(robot, joints, fit, signals)]
     if LINKS not in fit or _without_links(robot, joints, fit, signals):
         return motors
     return [*motors, solution(link_system(robot, fit, motors), signals)]
@@ -217,7 +218,7 @@ def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequ
     motor = int(words[1]) - 1 if words[1].isdigit() else 0
     index = robot.joint_names.index(joint)
     each = np.array([torque_noise(of_record)[index, motor] for of_record in signals])
-    return rms(each)
+    return rms(each[np.isfinite(each)])
 
 
 def _verdict(
@@ -262,9 +263,10 @@ def _notes(
         yield reason
 
 
-def _fitted(robot: Robot, systems: Sequence[SystemReport], links: ConsistentLinks | None) -> Robot:
-    numbers = (number for system in systems for number in system.numbers)
-    fitted = robot.replace({each.path: each.value for each in numbers if each.told and not each.sum})
+def _fitted(
+    robot: Robot, sought: Robot, systems: Sequence[SystemReport], links: ConsistentLinks | None
+) -> Robot:
+    fitted = sought.replace({each.path: each.value for each in to_write(robot, systems)})
     if links is None or not links.within:
         return fitted
     joints = map(lambda joint, link: dataclasses.replace(joint, link=link), fitted.joints, links.links)

@@ -45,8 +45,8 @@ def motor_equations(
         signals.filter.applied(np.stack((measured[motor], value_of(torques)[motor], *slopes[:, motor])).T)
         for motor in recorded
     ]
-    count = len(columns[0])
-    together = np.concatenate(columns)
+    count = len(columns[0]) if columns else 0
+    together = np.concatenate([np.empty((0, 2 + len(unknowns))), *columns])
     names = motor_names(robot, index)
     return Equations(
         measured=together[:, 0],

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.equations import Equations
+from vsacli.studies.identification.equations import Equations, with_noise
 from vsacli.studies.identification.motor_equations import motor_equations
 from vsacli.studies.identification.signals import Signals
-from vsacli.studies.identification.unknowns import unknowns
+from vsacli.studies.identification.unknowns import SPRINGS, group_of, unknowns
 from vsacli.studies.sensitivities.parameters import Parameter
 
 
@@ -35,7 +36,8 @@ class MotorSystem:
 
     def equations(self, values: FloatArray, signals: Signals) -> Equations:
         """Those of a record at some values of the numbers, (numbers,)."""
-        return motor_equations(self._robot, self._index, self._sought, values, signals)
+        made = partial(motor_equations, self._robot, self._index, self._sought, values)
+        return with_noise(made, signals)
 
     def admissible(self, number: int, value: float) -> float | None:
         """The value itself if the robot file may hold it, else zero if it may hold that; None if neither."""
@@ -53,16 +55,27 @@ class MotorSystem:
         return MotorSystem(robot, self._index, [e for n, e in enumerate(self._sought) if n not in fixed])
 
 
-def motor_systems(robot: Robot, joints: Sequence[int], fit: Sequence[str]) -> Iterator[MotorSystem]:
+def motor_systems(
+    robot: Robot,
+    joints: Sequence[int],
+    fit: Sequence[str],
+    records: Sequence[Signals],
+) -> Iterator[MotorSystem]:
     """Of the joints with springs, those of which anything is to be found.
+
+    Numbers of springs that change no torque at all, since they but bound where these work, are passed over.
 
     Args:
         robot: the robot.
         joints: indices of those that were recorded.
         fit: words and patterns, see `unknowns`.
+        records: of its motion.
     """
     for index in joints:
-        actuator = robot.joints[index].actuator
-        sought = unknowns(robot, index, fit) if actuator.sprung else ()
-        if sought:
-            yield MotorSystem(robot, index, sought)
+        sought = unknowns(robot, index, fit) if robot.joints[index].actuator.sprung else ()
+        values = np.array([each.value for each in sought])
+        slopes = [motor_equations(robot, index, sought, values, each).slopes for each in records]
+        acts = np.any(np.concatenate(slopes) != 0, axis=0)
+        left = [each for each, does in zip(sought, acts, strict=True) if does or group_of(each) != SPRINGS]
+        if left:
+            yield MotorSystem(robot, index, left)

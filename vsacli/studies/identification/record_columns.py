@@ -11,7 +11,6 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.errors import InputError, Problem
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES, measured
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.table import read_table, split_heading
@@ -23,10 +22,6 @@ POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
 
 READINGS = (POSITION, MOTOR, TORQUE)
 """What is needed of a joint. What sensors of a simulation read, `q_measured` and so on, goes before."""
-
-FEWEST_SAMPLES = 200
-"""Numbers of a column that are worth a fit: some seconds at 50 Hz."""
-
 
 Where: TypeAlias = tuple[str, int, int | None]
 """Variable, index of the joint, and number of the motor or None."""
@@ -79,8 +74,7 @@ def recorded_columns(robot: Robot, path: str | Path) -> tuple[list[Column], tupl
     """The columns that are needed, and the names of the others.
 
     Raises:
-        InputError: there is none, a unit is one of something else, times do not ascend, or a column has
-            hardly any number.
+        InputError: there is none, a unit is one of something else, or times do not ascend.
     """
     table = read_table(path, empty_cells=True)
     wanted = [VARIABLES[name] for name in (*READINGS, CURRENT)]
@@ -92,12 +86,6 @@ def recorded_columns(robot: Robot, path: str | Path) -> tuple[list[Column], tupl
         there = np.isfinite(signal.values)
         values = signal.values[there] * _torque_of_current(robot, signal)
         columns.append(Column(signal.column, place, stamps[there], values, signal.column in united))
-    few = [column for column in columns if len(column.time) < FEWEST_SAMPLES]
-    problems = [
-        f"column {each.name!r} has {len(each.time)} numbers, {FEWEST_SAMPLES} are needed" for each in few
-    ]
-    if problems:
-        raise InputError(Problem(str(path), table.header_line, problem) for problem in problems)
     used = {column.name for column in columns}
     others = [signal.column for signal in recording.signals if signal.column not in used]
     return columns, (*others, *recording.others)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +22,21 @@ from vsacli.studies.measured.slips import slips
 ELSEWHERE = 0.5
 """Distance, over the size of the deflections, from which on they are on another branch."""
 
+FOLLOWS_BETTER = 0.25
+"""Variance of a motor about what it may follow, over that about its joint, below which it does follow it."""
+
+FOLLOWS = 0.5
+"""The same over the variance of what it follows."""
+
+ODD_GAINS: Mapping[str, float] = MappingProxyType(
+    {
+        "run against each other: one has the wrong sign": -1.0,
+        "look as if the first were in degrees, or the second marked so": 180 / math.pi,
+        "look as if the second were in degrees, or the first marked so": math.pi / 180,
+    }
+)
+"""Of a motor's motion over its joint's, by what they look like."""
+
 
 def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: Signals) -> Iterator[str]:
     """Sentences on what looks as if columns were not what their names say.
@@ -32,71 +49,90 @@ def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: S
         record: as it was read.
         signals: the same, conditioned.
     """
-    agreements, ratios = [], []
-    for index in joints:
-        for agreement, motor in (
-            *_positions(robot, index, record, signals),
-            *_torques(robot, index, record, signals),
-        ):
-            agreements.append(agreement)
-            ratio = robot.joints[index].actuator.motors[motor].gear_ratio
-            ratios.append(np.nan if ratio is None else ratio)
-    yield from slips(agreements, ratios)
-    for index in joints:
+    sprung = [index for index in joints if robot.joints[index].actuator.sprung]
+    sprung = [index for index in sprung if (TORQUE, index, MOTORS[0]) in record.columns]
+    torques = [each for index in sprung for each in _torques(robot, index, record, signals)]
+    yield from slips(*zip(*torques, strict=True)) if torques else ()
+    for index in sprung:
+        yield from _positions(robot, index, record, signals)
         yield from _branch(robot, index, signals)
 
 
-def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[tuple[Agreement, int]]:
-    """Motors behind springs beside their joint."""
-    actuator = robot.joints[index].actuator
-    follows = actuator.has(VARIABLES["phi"]) if actuator.sprung else []
-    for motor, there in enumerate(follows):
-        if there:
-            arrays = signals.q[:, index], signals.theta[:, index, motor]
-            yield _agreement(robot, index, motor, MOTOR, record, signals, *arrays), motor
+def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[str]:
+    """Motors behind springs that follow something else than their joint."""
+    stride = signals.filter.stride
+    actuator, q = robot.joints[index].actuator, signals.q[::stride]
+    for motor, follows in enumerate(actuator.has(VARIABLES["phi"])[: actuator.motor_count]):
+        theta = signals.theta[::stride, index, motor]
+        own = float(np.var(theta - q[:, index]))
+        name, joint = (
+            record.columns[place] for place in ((MOTOR, index, MOTORS[motor]), (POSITION, index, None))
+        )
+        if not follows:
+            continue
+        for words, gain in ODD_GAINS.items():
+            if _follows(theta / gain, q[:, index], own / gain**2):
+                yield f"columns {name!r} and {joint!r} {words}"
+        for other in range(q.shape[1]):
+            if other != index and _follows(theta, q[:, other], own):
+                listed = f"{record.columns[POSITION, other, None]!r}, not {joint!r}"
+                yield f"column {name!r} follows {listed}: columns look exchanged"
 
 
-def _torques(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[tuple[Agreement, int]]:
-    """Torques as measured beside those that the robot file predicts."""
-    if not robot.joints[index].actuator.sprung:
-        return
+def _follows(theta: FloatArray, q: FloatArray, own: float) -> bool:
+    """Whether a motor follows a joint, and much better than its own, about which its variance is given."""
+    about = float(np.var(theta - q))
+    return about < FOLLOWS_BETTER * own and about < FOLLOWS * float(np.var(q))
+
+
+def _torques(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[tuple[Agreement, float]]:
+    """Torques as measured beside those that the robot file predicts, and the gear ratio."""
     equations = motor_equations(robot, index, (), np.array([]), signals)
-    for motor, name in enumerate(motor_names(robot, index)):
+    joint = robot.joints[index]
+    for motor, (name, of_joint) in enumerate(
+        zip(motor_names(robot, index), joint.actuator.motors, strict=True)
+    ):
         rows = equations.group == name
-        arrays = equations.predicted[rows], equations.measured[rows]
-        yield _agreement(robot, index, motor, TORQUE, record, signals, *arrays), motor
+        computed, measured = equations.predicted[rows], equations.measured[rows]
+        yield (
+            _agreement(
+                record.columns[TORQUE, index, MOTORS[motor]],
+                (joint.name, MOTORS[motor], VARIABLES[TORQUE].quantity.unit(joint.type)),
+                signals.time[:: signals.filter.stride],
+                computed,
+                measured,
+            ),
+            math.nan if of_joint.gear_ratio is None else of_joint.gear_ratio,
+        )
 
 
 def _agreement(
-    robot: Robot,
-    index: int,
-    motor: int,
-    variable: str,
-    record: Record,
-    signals: Signals,
+    column: str,
+    whose: tuple[str, int, str],
+    time: FloatArray,
     computed: FloatArray,
     measured: FloatArray,
 ) -> Agreement:
-    joint, error = robot.joints[index], measured - computed
+    joint, motor, unit = whose
+    error = measured - computed
     offset, gain, correlation = straight_line(computed, measured)
-    worst = int(np.argmax(np.abs(error)))
-    size = float(np.sqrt(np.mean(error**2)))
+    worst, rms = int(np.argmax(np.abs(error))), float(np.sqrt(np.mean(error**2)))
     return Agreement(
-        column=record.columns.get((variable, index, MOTORS[motor]), f"{joint.name}.{POSITION}"),
-        variable=variable,
-        joint=joint.name,
-        motor=MOTORS[motor],
-        unit=VARIABLES[variable].quantity.unit(joint.type),
+        column=column,
+        variable=TORQUE,
+        joint=joint,
+        motor=motor,
+        unit=unit,
         samples=len(error),
-        rms=size,
-        share=size / float(np.sqrt(np.mean(computed**2))),
+        rms=rms,
+        share=rms / float(np.sqrt(np.mean(computed**2))),
         worst=float(error[worst]),
-        worst_time=float(signals.time[0]),
+        worst_time=float(time[worst]),
         offset=offset,
         gain=gain,
         correlation=correlation,
-        lag=np.nan,
-        time=signals.time,
+        lag=math.nan,
+        time=time,
         computed=computed,
         measured=measured,
     )
@@ -107,9 +143,9 @@ def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
     actuator = robot.joints[index].actuator
     if not actuator.commanded or actuator.opposite_preload is None:
         return
-    q, theta = (signals.filter.applied(each[:, index]) for each in (signals.q, signals.theta))
-    drivetrain = Drivetrain([actuator])
-    phi = drivetrain.deflections(q[:, None], theta).T
+    stride = signals.filter.stride
+    q, theta = signals.q[::stride, index], signals.theta[::stride, index]
+    phi = Drivetrain([actuator]).deflections(q[:, None], theta).T
     carried = actuator.carried({"q": q, "theta": theta.T, "phi": phi})
     on_branch = actuator.solve(carried.tau_e, carried.stiffness, q).deflections
     off = np.linalg.norm(on_branch - phi, axis=0) > ELSEWHERE * np.linalg.norm(phi, axis=0)

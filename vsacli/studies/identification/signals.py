@@ -100,6 +100,11 @@ class Signals(NamedTuple):
     filter: Filter
     noise: FloatArray | None = None
 
+    def during(self, samples: slice) -> Signals:
+        """Some consecutive samples of it."""
+        over_time = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta", "tau_motor")
+        return self._replace(**{name: getattr(self, name)[samples] for name in over_time})
+
 
 def conditioned(
     time: FloatArray, q: FloatArray, theta: FloatArray, tau_motor: FloatArray, bandwidth: float

@@ -134,8 +134,8 @@ def held_out(found: Solution, records: list[Signals]) -> dict[str, float]:
     """
     parts = [(records[:at] + records[at + 1 :], record) for at, record in enumerate(records)]
     if len(records) == 1:
-        before, after = split(records[0])
-        parts = [([before], after)]
+        at = len(records[0].time) * 4 // 5
+        parts = [([records[0].during(slice(at))], records[0].during(slice(at, None)))]
     residuals: dict[str, list[FloatArray]] = {}
     for fitted, left in parts:
         rows = sum(len(each.time) // each.filter.stride for each in fitted)
@@ -147,14 +147,6 @@ def held_out(found: Solution, records: list[Signals]) -> dict[str, float]:
             error = (equations.measured - equations.predicted)[rows_of]
             residuals.setdefault(str(group), []).append(error)
     return {group: rms(np.concatenate(errors)) for group, errors in residuals.items()}
-
-
-def split(signals: Signals) -> tuple[Signals, Signals]:
-    """A record in two: what a fit is made to, and its last fifth."""
-    at = len(signals.time) * 4 // 5
-    arrays = [name for name in Signals._fields if name not in {"rate", "filter", "noise"}]
-    first = signals._replace(**{name: getattr(signals, name)[:at] for name in arrays})
-    return first, signals._replace(**{name: getattr(signals, name)[at:] for name in arrays})
 
 
 def rms(values: FloatArray) -> float:
