@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     "--fit",
     metavar="WORDS",
     callback=words_of("springs,motors"),
-    help="What to find, of springs, motors, friction; or paths such as 'joints.*.actuator.spring.k'. All by "
-    "default.",
+    help="What to find, of springs, motors, friction, links; or paths such as "
+    "'joints.*.actuator.spring.k'. All by default.",
 )
 @click.option(
     "--bandwidth",
@@ -54,7 +54,7 @@ def identify(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Find springs, motors and friction of ROBOT from RECORDINGs of its motion, CSV files.
+    """Find springs, motors, friction and links of ROBOT from RECORDINGs of its motion, CSV files.
 
     Columns are named as `vsacli export` names them: elbow.q, elbow.theta_1, elbow.tau_motor_1, or
     elbow.tau_motor_shaft_1 and elbow.current_1 where the robot file has gear ratio and torque constant; a
