@@ -138,7 +138,7 @@ def held_out(found: Solution, records: list[Signals]) -> dict[str, float]:
         parts = [([records[0].during(slice(at))], records[0].during(slice(at, None)))]
     residuals: dict[str, list[FloatArray]] = {}
     for fitted, left in parts:
-        rows = sum(len(each.time) // each.filter.stride for each in fitted)
+        rows = sum(len(found.equations(each).measured) for each in fitted)
         if rows < FEWEST_ROWS * len(found.system.names):
             continue
         equations = solution(found.system, fitted).equations(left)
