@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -15,7 +16,7 @@ from vsacli.robot.joint import Limits
 from vsacli.studies.remedies.acceptance import Acceptance
 from vsacli.studies.remedies.combination import RELATIVE_CHANGE, least_change
 from vsacli.studies.remedies.combined_search import CombinedSearch
-from vsacli.studies.remedies.slow_down import smallest_slow_down
+from vsacli.studies.remedies.slow_down import LARGEST_FACTOR, smallest_slow_down
 from vsacli.studies.remedies.task import Task
 
 FAST = rest_to_rest(0.3, rate=1000)
@@ -136,3 +137,12 @@ def test_other_preload_comes_last_although_it_is_enough():
     assert last.sentence == f"change the preload of elbow to {robot.joints[2].actuator.opposite_preload}"
     assert last.size == 0.0
     assert accepted(last.robot, last.trajectory, 1e-4)
+
+
+def test_no_combination_is_slower_than_the_slowest_that_is_tried():
+    """With so much damping the stiffness that is needed falls with the speed, beyond any factor."""
+    base, *others = vsa_3r().joints
+    robot = dataclasses.replace(vsa_3r(), joints=(dataclasses.replace(base, damping=1e20), *others))
+    found = search(robot, rest_to_rest(4.0, rate=10), form=least_change).smallest()
+    assert found is not None
+    assert found.factor <= LARGEST_FACTOR

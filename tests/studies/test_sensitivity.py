@@ -143,6 +143,7 @@ BAD = {
     "a tolerance must be at most 1e+30": ["--tolerances", "1e300%"],
     "none of 2 drawn robots is one, choose smaller": ["--tolerances", "900%", "--monte-carlo", "2"],
     "'x%' is no tolerance": ["--tolerances", "x%"],
+    "a tolerance of all numbers is a share, 0.05 % or another, or a file": ["--tolerances", "0.05"],
     "give --tolerances": ["--monte-carlo", "10"],
     "bad.yaml:1: joints.*.link.mass: expected a distribution": ["--tolerances", "bad.yaml"],
     "bad.yaml:2: no number of the robot fits": ["--tolerances", "bad.yaml"],
@@ -190,6 +191,15 @@ def test_figures_show_ranking_and_bands(vsacli, tmp_path):
     assert vsacli("sensitivity", ROBOT, "coarse.yaml", "--plot", "figures").code == 4
     assert vsacli("sensitivity", ROBOT, "coarse.yaml", "--plot", "others").code == 0
     assert [path.name for path in (tmp_path / "others").iterdir()] == ["vsa_3r-coarse-ranking.png"]
+
+
+def test_without_a_feasible_step_there_is_no_torque_to_be_off(vsacli, tmp_path):
+    rest_to_rest(tmp_path / "coarse.yaml")
+    done = vsacli("sensitivity", ROBOT, "coarse.yaml", "--tolerances", "5%", "--set", "stiffness.start=10",
+                  "--set", "stiffness.end=20")  # fmt: skip
+    assert "nan" not in done.out
+    assert "base: margin -" in done.out
+    assert "lost with a probability of 100 %" in done.out
 
 
 def test_steps_that_cannot_be_done_do_not_count(vsacli, tmp_path):

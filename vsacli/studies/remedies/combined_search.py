@@ -25,6 +25,9 @@ from vsacli.studies.remedies.task import Task
 STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 """Relative strides of the scan, each up to the factor before it: fine where a slow-down is small."""
 
+FASTEST, SLOWEST = FACTOR_DENOMINATOR, LARGEST_FACTOR * FACTOR_DENOMINATOR
+"""Ends of the search, as whole multiples of 1/FACTOR_DENOMINATOR."""
+
 MOST_ROUNDS = 20
 """Rounds of adding steps that refuse what the watched ones accept; two or three are usual."""
 
@@ -122,7 +125,7 @@ class WatchedSearch:
 
     def fastest(self) -> Combination | None:
         """The combination with the least factor that scan and bisection find."""
-        refused = FACTOR_DENOMINATOR - 1
+        refused = FASTEST - 1
         for number in _scanned():
             if self._at(number) is not None:
                 break
@@ -147,7 +150,7 @@ class WatchedSearch:
             return None
         step = _stride(at)
         while step:
-            sides = {side: self._at(side) for side in (at - step, at + step) if side >= FACTOR_DENOMINATOR}
+            sides = {side: self._at(side) for side in (at - step, at + step) if SLOWEST >= side >= FASTEST}
             found, side = min(
                 ((each, side) for side, each in sides.items() if each is not None),
                 key=lambda pair: pair[0].size,
@@ -214,11 +217,11 @@ class WatchedSearch:
 
 def _scanned() -> Iterator[int]:
     """The factors at which a search looks, in units of 1/FACTOR_DENOMINATOR."""
-    number, last = FACTOR_DENOMINATOR, LARGEST_FACTOR * FACTOR_DENOMINATOR
-    while number < last:
+    number = FASTEST
+    while number < SLOWEST:
         yield number
         number += _stride(number)
-    yield last
+    yield SLOWEST
 
 
 def _stride(number: int) -> int:

@@ -145,17 +145,16 @@ class Sensitivity(Published):
 
     def _bands(self) -> Iterator[str]:
         for joint, band in self.band.items():
-            unit = self.units[joint]
-            line = (
-                f"{joint}: motor torque +- {band.torque:.3g} {unit} ({100 * band.share:.2g} % of its peak) "
-                f"at t = {band.time:.3f} s"
-            )
+            said = []
+            if math.isfinite(band.share):
+                size = f"{band.torque:.3g} {self.units[joint]} ({_percent(band.share)} of its peak)"
+                said.append(f"motor torque +- {size} at t = {band.time:.3f} s")
             if math.isfinite(band.margin):
-                line += (
-                    f"; margin {100 * band.margin:.2f} +- {100 * band.margin_deviation:.2g} % at t = "
+                said.append(
+                    f"margin {100 * band.margin:.2f} +- {_percent(band.margin_deviation)} at t = "
                     f"{band.margin_time:.3f} s, lost with a probability of {_probability(band.lost)}"
                 )
-            yield line
+            yield f"{joint}: {'; '.join(said) or 'no motor torque, since no step is feasible and regular'}"
 
     def _drawn(self) -> Iterator[str]:
         if self.monte_carlo is None:
@@ -182,4 +181,9 @@ def _margins(effect: ParameterEffect) -> str:
 
 
 def _probability(share: float) -> str:
-    return f"{100 * share:.2g} %" if share >= 1e-6 else "less than 1e-4 %"
+    return _percent(share) if share >= 1e-6 else "less than 1e-4 %"
+
+
+def _percent(share: float) -> str:
+    """With two digits, or as many as the whole number has."""
+    return f"{100 * share:.2g} %" if abs(share) < 0.995 else f"{100 * share:.0f} %"

@@ -25,6 +25,7 @@ from vsacli.studies.sensitivities.parameters import Parameter
 
 FORM = "e.g. {normal: 5 %} or {uniform: 0.001}"
 _SHARE = re.compile(r"(?P<number>.*\S)\s*%")
+_PLAIN = re.compile(r"[-+.\d]+(e[-+]?\d+)?|nan|inf", re.IGNORECASE)
 
 
 class Tolerance(NamedTuple):
@@ -75,6 +76,10 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
     """
     share = _SHARE.fullmatch(text.strip())
     if share is None:
+        if _PLAIN.fullmatch(text.strip()):
+            raise InputError.one(
+                f"a tolerance of all numbers is a share, {text.strip()} % or another, or a file"
+            )
         return _from_file(text, chosen)
     size = _number(share["number"], text) / 100
     exact = [each.quantity in SMALL_CHANGES or each.value == 0 for each in chosen]
