@@ -160,6 +160,13 @@ BAD = {
     "the unit [N] is one of something else": ("time,base.q [N]\n0,1\n1,2\n", []),
     "are the same; leave one": ("time,base.q,q1\n0,1,1\n1,2,2\n", []),
     "is like the computed signals at no shift": ("time,base.q\n" + "".join(f"{t},1\n" for t in range(9)), []),
+    "write it in the header, e.g. time[ms]": (
+        "time,base.q\n" + "".join(f"{1000 * t},{t}\n" for t in range(5)),
+        [],
+    ),
+    "2 of its rows are within, 4 are needed": ("time,base.q\n0,1\n1,2\n2,1\n", ["--begins-at", "1"]),
+    "must be a finite number of seconds": ("time,base.q\n0,1\n1,2\n2,1\n", ["--begins-at", "nan"]),
+    "at no shift in time": ("time,base.q\n" + "".join(f"{t},{t % 3}e200\n" for t in range(9)), []),
     "change --begins-at": ("time,base.q\n0,1\n1,2\n2,1\n", ["--begins-at", "50"]),
 }
 

@@ -14,7 +14,7 @@ from vsacli.documents.table import read_table
 from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import open_stored
 from vsacli.studies.measured.agreement import Agreement, straight_line
-from vsacli.studies.measured.alignment import Alignment, Pairing, align, lag_of
+from vsacli.studies.measured.alignment import FEWEST_SAMPLES, Alignment, Pairing, align, lag_of
 from vsacli.studies.measured.comparison_report import SHOWN_LAG, Comparison
 from vsacli.studies.measured.measured_columns import Measured, Recording, known_columns, recording_of
 from vsacli.studies.measured.slips import slips
@@ -22,8 +22,11 @@ from vsacli.studies.measured.slips import slips
 POSITIONS = ("q", "theta")
 """By these a recording is aligned if it has any: torques depend on the model, positions were commanded."""
 
-FEWEST_SAMPLES = 4
+FEWEST_STEPS = 4
 """Steps of a result through which a cubic spline goes."""
+
+OTHER_UNIT = 100
+"""How many times longer or shorter than the result a recording is whose times may be in another unit."""
 
 LAG_SHARE = 0.05
 """Share of the duration within which a lag is looked for."""
@@ -48,6 +51,10 @@ def compare(
             cannot be aligned, or does not overlap with the result.
         StorageError: a file cannot be read.
     """
+    if begins_at is not None and not math.isfinite(begins_at):
+        raise InputError.one(
+            f"when the result begins must be a finite number of seconds, not {begins_at:g}", recording
+        )
     if not isinstance(result, StoredResult):
         with open_stored(result) as stored:
             return compare(stored, recording, begins_at)
@@ -94,7 +101,7 @@ def _interpolated(result: StoredResult, signal: Measured) -> Callable[[FloatArra
     values = result.read(place.variable)[:, place.joint]
     values = np.asarray(values if place.motor is None else values[:, place.motor - 1], dtype=float)
     known = np.isfinite(values)
-    if known.sum() < FEWEST_SAMPLES:
+    if known.sum() < FEWEST_STEPS:
         return lambda times: np.full(np.shape(times), np.nan)
     spline = make_interp_spline(time[known], values[known], k=3)
     gaps = np.where(known, 0.0, np.nan)
@@ -116,19 +123,29 @@ def _aligned(recorded: Recording, pairings: Sequence[Pairing], path: str | Path)
     if alignment is None:
         raise InputError.one(
             "is like the computed signals at no shift in time; is it the recording of this motion? "
-            "--begins-at says when in the recording the result begins",
+            f"{_other_unit(pairings[0])}--begins-at says when in the recording the result begins",
             path,
         )
     return alignment
 
 
+def _other_unit(pairing: Pairing) -> str:
+    """That times may be in another unit than seconds, if the recording lasts so much longer or shorter."""
+    lasts = float(pairing.time[-1])
+    if 1 / OTHER_UNIT < lasts / pairing.duration < OTHER_UNIT:
+        return ""
+    lengths = f"It lasts {lasts:.4g} s and the result {pairing.duration:.4g} s"
+    return f"{lengths}: if times are in another unit, write it in the header, e.g. time[ms]; "
+
+
 def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
     """How much of the result the recording covers, s."""
     covered = min(float(time[-1]), duration) - max(float(time[0]), 0.0)
-    if not np.any((time >= 0) & (time <= duration)):
+    rows = np.count_nonzero((time >= 0) & (time <= duration))
+    if rows < FEWEST_SAMPLES:
         raise InputError.one(
-            f"lies from {time[0]:.4g} to {time[-1]:.4g} s of the result, which takes {duration:.4g} s; "
-            "change --begins-at",
+            f"lies from {time[0]:.4g} to {time[-1]:.4g} s of the result, which takes {duration:.4g} s: "
+            f"{rows} of its rows are within, {FEWEST_SAMPLES} are needed; change --begins-at",
             path,
         )
     return covered

@@ -82,6 +82,7 @@ class Way(enum.Enum):
     BY_ANY_LINE = enum.auto()
 
 
+@np.errstate(all="ignore")  # numbers too large, or too few, explain nothing
 def align(pairings: Sequence[Pairing]) -> Alignment | None:
     """The shift that explains most; None if there is none that explains half, or nothing moves."""
     moving = [pairing for pairing in pairings if _moves(pairing)]
@@ -188,6 +189,7 @@ def _explained(pairing: Pairing, shift: float, way: Way) -> float:
     return coefficient**2 if way is Way.BY_ANY_LINE else max(coefficient, 0.0) ** 2
 
 
+@np.errstate(all="ignore")  # where it is infinite or no number, as of too few samples, no lag explains it
 def lag_of(pairing: Pairing, begins_at: float, within: float) -> float:
     """How much later than the alignment a measured signal follows, s.
 
