@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from samples.command_line import REPOSITORY
 from samples.studies import GRID, HEAD, column, content, study
 
 from vsacli.cli.main import run
@@ -132,6 +133,17 @@ def test_an_interrupted_study_goes_on(vsacli: Any, grid: str, whole: Path) -> No
     assert done.err.splitlines() == [f"4 of 6 runs are in {journal.resolve()} already", "wrote study.h5"]
     assert content("study.h5") == content(whole)
     assert not journal.exists()
+
+
+def test_a_file_that_a_value_names_counts_as_its_content(own_folder: Path) -> None:
+    """Rows of springs from a table are others when the table is another one."""
+    table = (REPOSITORY / "robots" / "measured_spring.csv").read_text()
+    (own_folder / "spring.csv").write_text(table)
+    path = study(own_folder, "vary:\n  joints.*.actuator.spring: [{type: table, file: spring.csv}]\n")
+    keys = [load_study(path).key(load_study(path).point(0))]
+    (own_folder / "spring.csv").write_text(table + "# the same numbers\n")
+    keys.append(load_study(path).key(load_study(path).point(0)))
+    assert len(set(keys)) == 2
 
 
 def test_a_full_disk_costs_no_finished_row(

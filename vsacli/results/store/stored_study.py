@@ -16,7 +16,7 @@ from vsacli.results.store.damage import CheckedFile, bounded, own_dataset, repor
 from vsacli.results.store.inputs import StoredInput, read_sources
 from vsacli.results.store.study_table import FORMAT
 
-PROVENANCE = ("method", "seed", "engine", "command_line")
+PROVENANCE = ("method", "seed", "engine", "compiler", "numpy", "command_line")
 """Root attributes that say how a table was computed."""
 
 

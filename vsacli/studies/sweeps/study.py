@@ -6,12 +6,16 @@ import glob
 import hashlib
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from vsacli.base.errors import InputError
+from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.version import __version__
 from vsacli.documents.reading import read_document
 from vsacli.documents.source import Source
@@ -52,6 +56,7 @@ class Study:
         dimensions: what varies.
         design: which values each run has.
         engine: what computes, "numpy" or "c".
+        compiler: of the latter, else empty.
     """
 
     file: StudyFile
@@ -63,6 +68,7 @@ class Study:
     dimensions: tuple[Dimension, ...]
     design: Design
     engine: str
+    compiler: str
 
     @property
     def runs(self) -> int:
@@ -93,17 +99,37 @@ class Study:
     def digest(self) -> str:
         """Of all that the rows of the study depend on, beside the values of a run; in hex."""
         robot = [source.sha256 for source in self.robot.sources]
-        return _digest([__version__, self.engine, robot, [each.name for each in self.kept]])
+        kept = [each.name for each in self.kept]
+        computed_by = [__version__, np.__version__, self.engine, self.compiler]
+        return _digest([computed_by, robot, kept, [*self._named_files()]])
 
     @property
     def fingerprint(self) -> str:
         """Of the study as a whole: of all its files, and of what computes it; in hex."""
         return _digest([self.digest, [source.sha256 for source in self.sources]])
 
+    def _named_files(self) -> Iterator[str]:
+        """SHA-256 of each file that a listed value names, beside the robot or a trajectory."""
+        folders = {Path(each).parent for each in (self.robot.sources[0].path, *self.trajectories)}
+        for text in (text for each in self.dimensions for value in each.values for text in _texts_in(value)):
+            for file in sorted(folder / text for folder in folders):
+                if file.is_file():
+                    yield hashlib.sha256(file.read_bytes()).hexdigest()
+
     def key(self, point: Point) -> str:
         """Of all that a row depends on; in hex."""
         trajectory = [source.sha256 for source in self.trajectory_sources[point.trajectory]]
         return _digest([self.digest, trajectory, point.values])
+
+
+def _texts_in(value: Any) -> Iterator[str]:
+    match value:
+        case str() if len(value) <= MOST_LETTERS:
+            yield value
+        case list():
+            yield from (text for entry in value for text in _texts_in(entry))
+        case dict():
+            yield from (text for entry in value.values() for text in _texts_in(entry))
 
 
 def _digest(content: Any) -> str:
@@ -114,8 +140,9 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     """Read a study, its robot and its trajectories.
 
     Raises:
-        InputError: with every problem of the first file that has some.
+        InputError: with every problem of the first file that has some; or there is no C compiler for "c".
     """
+    compiler = _compiler(engine)
     file, source = read_document(path, StudyFile, FORMAT)
     folder = Path(source.path).parent
     read = read_robot(folder / file.robot)
@@ -130,7 +157,19 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
         raise InputError.one(str(error), source.path) from None
     entries.try_values()
     sources = tuple(each.sources for each in loaded)
-    return Study(file, source, read, robot, trajectories, sources, dimensions, design, engine)
+    return Study(file, source, read, robot, trajectories, sources, dimensions, design, engine, compiler)
+
+
+def _compiler(engine: str) -> str:
+    """What compiles the code of an engine, if anything does."""
+    if engine != "c":
+        return ""
+    from vsacli.compute.engine.compiler import CompilerError, system_compiler
+
+    try:
+        return system_compiler().name
+    except CompilerError as error:
+        raise InputError.one(f"{error}; the engine numpy needs none") from None
 
 
 def _trajectories(file: StudyFile, folder: Path, path: str) -> tuple[str, ...]:

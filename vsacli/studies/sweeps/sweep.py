@@ -126,6 +126,8 @@ def _head(study: Study, provenance: dict[str, str]) -> Head:
             "method": study.file.method,
             "seed": str(study.file.seed),
             "engine": study.engine,
+            "compiler": study.compiler,
+            "numpy": np.__version__,
             **provenance,
         },
     )
