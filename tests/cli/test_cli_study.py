@@ -95,6 +95,24 @@ def test_parts_make_the_same_table(vsacli: Any, grid: str, whole: Path) -> None:
     )
 
 
+def test_variables_over_time_are_those_of_a_run(vsacli: Any, own_folder: Path) -> None:
+    """At each third step; a run that is shorter ends with NaN, in parts that are put together as well."""
+    study(own_folder, "vary: {duration: [4, 3]}\nvariables: [tau_motor, q]\nevery: 3\n")
+    assert vsacli("study", "study.yaml", "-q").code == 0
+    assert vsacli("invdyn", "arm.yaml", "move.yaml", "--set", "duration=3", "-o", "r.h5", "-q").code == 0
+    for name in ("time", "tau_motor", "q"):
+        whole, kept = column("r.h5", name), column("study.h5", name)
+        assert kept.shape[:2] == (2, 5)  # of 13 and of 10 steps
+        np.testing.assert_array_equal(kept[1, :4], whole[::3])
+        assert np.isnan(kept[1, 4:]).all()
+    for part in (1, 2):
+        assert vsacli("study", "study.yaml", "--shard", f"{part}/2", "-q").code == 0
+    assert vsacli("study", "--merge", "study-1-of-2.h5", "study-2-of-2.h5", "-o", "whole.h5", "-q").code == 0
+    assert content("whole.h5") == content("study.h5")
+    refused = vsacli("study", str(study(own_folder, "variables: [current]\n")))
+    assert (refused.code, "variables: no joint of vsa-3r has a current" in refused.err) == (2, True)
+
+
 def test_motions_alone_are_a_study(vsacli: Any, own_folder: Path) -> None:
     path = study(own_folder, "", HEAD.replace("move.yaml", "['move*.yaml', other.yaml]"))
     for name, end in (("move_on.yaml", "1300"), ("other.yaml", "700")):
@@ -162,7 +180,7 @@ def test_a_full_disk_costs_no_finished_row(
         patch.setattr(journal_module.os, "write", write)
         full = vsacli("study", grid)
     assert full.code == 4
-    assert "No space left on device; the 1 rows in it stay" in full.err
+    assert "the disk is full; the 1 rows in it stay" in full.err
     assert not Path("study.h5").exists()
     assert vsacli("study", grid).err.startswith("1 of 6 runs are in ")
     assert content("study.h5") == content(whole)

@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from samples.command_line import REPOSITORY
+from samples.studies import DRAWN, GRID, HEAD
 
 from vsacli.base.errors import InputError
 from vsacli.base.units import ANGLE, MASS, POSITION
@@ -51,6 +52,19 @@ def test_every_robot_that_comes_along_is_valid(path: Path) -> None:
 @pytest.mark.parametrize("path", TRAJECTORIES, ids=lambda path: path.stem)
 def test_every_trajectory_that_comes_along_is_valid(path: Path) -> None:
     assert messages("trajectory", path.read_text()) == []
+
+
+def test_studies() -> None:
+    for text in (GRID, DRAWN, "vary: {a.b: {linked: c.d, factor: 2}, e: [{type: x}]}\nkeep: [margin]\n"):
+        assert messages("study", HEAD + text) == []
+    for text in (
+        "vary: {a: 3}",
+        "vary: {a: {linspce: [1, 2, 3]}}",
+        "vary: {a: []}",
+        "keep: [x]",
+        "methd: grid",
+    ):
+        assert messages("study", HEAD + text) != []
 
 
 def test_poles() -> None:

@@ -36,7 +36,7 @@ def reporting_storage_errors(path: str | Path) -> Iterator[None]:
 
 def storage_error(path: str | Path, error: OSError) -> StorageError:
     """The sentence for an operating system error met while writing `path`."""
-    return StorageError(path, f"cannot be written: {_reason(error)}; nothing was changed there")
+    return StorageError(path, f"cannot be written: {reason(error)}; nothing was changed there")
 
 
 @contextlib.contextmanager
@@ -46,7 +46,7 @@ def reporting_temporary_errors() -> Iterator[None]:
         yield
     except OSError as error:
         advice = "name another one by the environment variable TMPDIR"
-        message = f"cannot be used: {_reason(error)}; {advice}"
+        message = f"cannot be used: {reason(error)}; {advice}"
         raise StorageError("folder for temporary files", message) from error
 
 
@@ -119,7 +119,8 @@ def check_free_space(path: str | Path, size: int) -> None:
         ) from OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def _reason(error: OSError) -> str:
+def reason(error: OSError) -> str:
+    """What an operating system error says, a clause."""
     return _REASON.get(error.errno or 0, error.strerror or str(error))
 
 

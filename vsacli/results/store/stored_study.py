@@ -31,6 +31,7 @@ class StoredStudy:
         parameters: paths of what varies.
         columns: names of what is kept.
         rows: how many runs it has.
+        steps: how many steps columns over time have; 0 if there are none.
         runs: how many the study has.
         fingerprint: of the whole study.
     """
@@ -63,6 +64,7 @@ class StoredStudy:
                 )
                 self.joint_names, self.joint_types = self.texts("joint"), self.texts("joint_type")
                 self.rows = len(self._dataset("run"))
+                self.steps = len(self._dataset("step")) if "step" in self._file else 0
                 self._check()
         except BaseException:
             self._file.close()

@@ -39,7 +39,7 @@ class Column(Protocol):
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """After `run`: joint, or joint and motor."""
+        """After `run`: joint, or joint and motor, after step if it is over time."""
 
     @property
     def quantity(self) -> Quantity:
@@ -68,6 +68,7 @@ class Head(NamedTuple):
         joint_names, joint_types: base to tip.
         parameters: what varies.
         columns: what is kept.
+        steps: how many steps columns over time have, at most.
         sources: files that were read, by what they describe.
         provenance: further root attributes: what computed it, and how.
     """
@@ -80,6 +81,7 @@ class Head(NamedTuple):
     joint_types: tuple[str, ...]
     parameters: tuple[Parameter, ...]
     columns: Sequence[Column]
+    steps: int
     sources: Mapping[str, tuple[Source, ...]]
     provenance: Mapping[str, str]
 
@@ -149,7 +151,8 @@ class StudyWriter:
             self._hdf5.close()
 
     def _shape(self, column: Column) -> tuple[int, ...]:
-        return (self._rows, len(self._head.joint_names), len(MOTORS))[: 1 + len(column.dims)]
+        lengths = {"step": self._head.steps, "joint": len(self._head.joint_names), "motor": len(MOTORS)}
+        return (self._rows, *(lengths[dim] for dim in column.dims))
 
     def _create(self) -> None:
         head, file = self._head, self._file
@@ -160,18 +163,21 @@ class StudyWriter:
             "motor": file.create_dataset("motor", data=np.array(MOTORS)),
         }
         scales["motor"].attrs["long_name"] = "motor of the joint"
+        if any("step" in column.dims for column in head.columns):
+            scales["step"] = file.create_dataset("step", data=np.arange(head.steps))
+            scales["step"].attrs["long_name"] = "step that was kept, from 0"
         for name, scale in scales.items():
             scale.make_scale(name)
         self._labels("joint_type", head.joint_types, "type of the joint").dims[0].attach_scale(
             scales["joint"]
         )
         for name, long_name in TEXTS.items():
-            self._dataset(name, (self._rows,), TEXT, {"long_name": long_name}, scales)
+            self._dataset(name, (self._rows,), TEXT, {"long_name": long_name}, [scales["run"]])
         for parameter in head.parameters:
             unit = {"units": parameter.unit} if parameter.numeric and parameter.unit else {}
             attributes = {"long_name": f"value of {parameter.path}", **unit}
             dtype = "<f8" if parameter.numeric else TEXT
-            self._dataset(parameter.path, (self._rows,), dtype, attributes, scales)
+            self._dataset(parameter.path, (self._rows,), dtype, attributes, [scales["run"]])
         coordinates = " ".join([*(each.path for each in head.parameters), "trajectory"])
         for column in head.columns:
             attributes = {
@@ -179,7 +185,8 @@ class StudyWriter:
                 "long_name": column.long_name,
                 "coordinates": f"{coordinates} joint_type",
             }
-            self._dataset(column.name, self._shape(column), "<f8", attributes, scales)
+            along = [scales[dim] for dim in ("run", *column.dims)]
+            self._dataset(column.name, self._shape(column), "<f8", attributes, along)
         for name in ("verdict", "error", "key"):
             file[name].attrs["coordinates"] = coordinates
         write_sources(file.create_group("inputs", track_order=True), head.sources)
@@ -205,11 +212,11 @@ class StudyWriter:
         shape: tuple[int, ...],
         dtype: Any,
         attributes: Mapping[str, str],
-        scales: Mapping[str, Any] | None = None,
+        scales: Sequence[Any] = (),
     ) -> Any:
         dataset = self._file.create_dataset(name, shape, dtype, track_order=True)
         dataset.attrs.update(attributes)
-        for axis, scale in enumerate(list((scales or {}).values())[: len(shape)]):
+        for axis, scale in enumerate(scales):
             dataset.dims[axis].attach_scale(scale)
         return dataset
 

@@ -19,7 +19,7 @@ from typing import Self
 import numpy as np
 
 from vsacli.base.errors import StorageError
-from vsacli.base.storage import reporting_storage_errors
+from vsacli.base.storage import reason, reporting_storage_errors
 from vsacli.studies.sweeps.rows import Row
 
 SYNC_SECONDS = 1.0
@@ -110,7 +110,7 @@ class Journal:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._end)
             kept = f"the {len(self):,} rows in it stay, and the same command goes on with them"
-            raise StorageError(self.path, f"cannot be written: {error.strerror}; {kept}") from error
+            raise StorageError(self.path, f"cannot be written: {reason(error)}; {kept}") from error
         self._places[row.key] = (self._end, len(line))
         self._end += len(line)
 
@@ -121,10 +121,9 @@ class Journal:
             KeyError: it is not.
         """
         start, size = self._places[key]
-        os.lseek(self._file, start, os.SEEK_SET)
-        content = json.loads(os.read(self._file, size)[_CHECK + 1 :])
-        values = np.frombuffer(base64.b64decode(content["values"]), dtype="<f8")
-        return Row(run, key, content["verdict"], content["error"], values)
+        content = json.loads(os.pread(self._file, size, start)[_CHECK + 1 :])
+        values, curves = (np.frombuffer(base64.b64decode(content[name])) for name in _ARRAYS)
+        return Row(run, key, content["verdict"], content["error"], values, curves)
 
     def remove(self) -> None:
         """Remove the file, whose rows are kept elsewhere."""
@@ -132,13 +131,15 @@ class Journal:
             self.path.unlink(missing_ok=True)
 
 
+_ARRAYS = ("values", "curves")
+
 _CHECK = 8
 """Hexadecimal digits of a checksum."""
 
 
 def _line(row: Row) -> bytes:
-    values = base64.b64encode(row.values.astype("<f8").tobytes()).decode()
-    content = {"key": row.key, "verdict": row.verdict, "error": row.error, "values": values}
+    arrays = {name: base64.b64encode(getattr(row, name).tobytes()).decode() for name in _ARRAYS}
+    content = {"key": row.key, "verdict": row.verdict, "error": row.error, **arrays}
     text = json.dumps(content).encode()
     return b"%08x %s\n" % (zlib.crc32(text), text)
 

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import IndexArray
+from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
 from vsacli.documents.source import Source
 from vsacli.results.store.stored_study import StoredStudy
-from vsacli.results.store.study_table import TEXTS, Head, Parameter, Rows, StudyWriter
+from vsacli.results.store.study_table import TEXTS, Column, Head, Parameter, Rows, StudyWriter
 from vsacli.studies.sweeps.kept import KEPT
+from vsacli.studies.sweeps.over_time import OVER_TIME
 from vsacli.studies.sweeps.rows import FAILED
 
 MOST_NAMED = 5
@@ -40,7 +41,9 @@ def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
         parts = [stack.enter_context(StoredStudy(path)) for path in paths]
         _check_alike(parts)
         order = _order(parts)
-        with StudyWriter(file, _head(parts[0], provenance), len(order)) as writer:
+        with StudyWriter(
+            file, _head(parts[0], max(part.steps for part in parts), provenance), len(order)
+        ) as writer:
             writer.write(Rows(range(len(order)), _arrays(parts, order)))
             writer.finish()
 
@@ -77,12 +80,23 @@ def _arrays(parts: Sequence[StoredStudy], order: IndexArray) -> dict[str, Any]:
             texts = [text for part in parts for text in part.texts(name)]
             arrays[name] = [texts[row] for row in order]
         else:
-            arrays[name] = np.concatenate([part.read(name) for part in parts])[order]
+            arrays[name] = np.concatenate(_alike([part.read(name) for part in parts]))[order]
     return arrays
 
 
-def _head(part: StoredStudy, provenance: dict[str, str]) -> Head:
+def _alike(pieces: Sequence[FloatArray]) -> list[FloatArray]:
+    """Pieces of a column with as many steps as the one that has most, NaN where others have ended."""
+    if pieces[0].ndim == 1:
+        return list(pieces)
+    steps = max(piece.shape[1] for piece in pieces)
+    rest = [(0, 0)] * (pieces[0].ndim - 2)
+    ends = [[(0, 0), (0, steps - piece.shape[1]), *rest] for piece in pieces]
+    return [np.pad(piece, end, constant_values=np.nan) for piece, end in zip(pieces, ends, strict=True)]
+
+
+def _head(part: StoredStudy, steps: int, provenance: dict[str, str]) -> Head:
     sources: dict[str, tuple[Source, ...]] = {"study": (), "robot": (), "trajectory": ()}
+    columns: dict[str, Column] = {**KEPT, **OVER_TIME}
     role = "study"
     for each in part.inputs():
         role = each.role or role
@@ -103,7 +117,8 @@ def _head(part: StoredStudy, provenance: dict[str, str]) -> Head:
             )
             for path in part.parameters
         ),
-        columns=tuple(KEPT[name] for name in part.columns),
+        columns=tuple(columns[name] for name in part.columns),
+        steps=steps,
         sources=sources,
         provenance=part.provenance() | provenance,
     )

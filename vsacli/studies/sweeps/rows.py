@@ -14,6 +14,7 @@ from vsacli.base.texts import one_line
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.kept import columns
+from vsacli.studies.sweeps.over_time import Recorder
 from vsacli.studies.sweeps.study import Point, Study
 from vsacli.trajectory.changes import Divided
 from vsacli.trajectory.devices import with_devices
@@ -33,6 +34,7 @@ class Row(NamedTuple):
         verdict: of its report, or `FAILED`.
         error: why it failed, else empty.
         values: what is kept, (columns,); empty if it failed.
+        curves: what is kept over time, flat; see `Recorder`.
     """
 
     run: int
@@ -40,11 +42,12 @@ class Row(NamedTuple):
     verdict: str
     error: str
     values: FloatArray
+    curves: FloatArray
 
 
 def failed(run: int, key: str, reason: str) -> Row:
     """The row of a run that could not be computed."""
-    return Row(run, key, FAILED, one_line(reason), np.empty(0))
+    return Row(run, key, FAILED, one_line(reason), np.empty(0), np.empty(0))
 
 
 class Computer:
@@ -78,10 +81,11 @@ class Computer:
             )
         trajectory = with_devices(self._trajectory(robot, point.trajectory, changes), robot)
         computed = Run(robot, trajectory, engine=self._study.engine, threads=1)
-        for _ in computed:
-            pass
+        recorder = Recorder(self._study.over_time, self._study.file.every)
+        for block in computed:
+            recorder.add(block)
         report = computed.report()
-        return Row(run, key, report.verdict, "", columns(self._study.kept, report))
+        return Row(run, key, report.verdict, "", columns(self._study.kept, report), recorder.curves)
 
     def _trajectory(self, robot: Robot, index: int, changes: Divided) -> Trajectory:
         place, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)

@@ -16,6 +16,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.texts import MOST_LETTERS
+from vsacli.base.variables import VARIABLES
 from vsacli.base.version import __version__
 from vsacli.documents.reading import read_document
 from vsacli.documents.source import Source
@@ -25,6 +26,7 @@ from vsacli.studies.sweeps.design import Design
 from vsacli.studies.sweeps.dimensions import Dimension
 from vsacli.studies.sweeps.entries import Entries
 from vsacli.studies.sweeps.kept import KEPT, Kept
+from vsacli.studies.sweeps.over_time import OverTime, over_time
 from vsacli.studies.sweeps.study_file import FORMAT, StudyFile
 from vsacli.trajectory.changes import Divided, divided
 from vsacli.trajectory.file import load_trajectory
@@ -81,6 +83,11 @@ class Study:
         return tuple(KEPT[name] for name in dict.fromkeys(self.file.keep or KEPT))
 
     @property
+    def over_time(self) -> tuple[OverTime, ...]:
+        """What is kept of each run over time."""
+        return over_time(self.file.variables or ())
+
+    @property
     def sources(self) -> list[Source]:
         """Every file that was read, each once."""
         files = (
@@ -100,8 +107,9 @@ class Study:
         """Of all that the rows of the study depend on, beside the values of a run; in hex."""
         robot = [source.sha256 for source in self.robot.sources]
         kept = [each.name for each in self.kept]
+        curves = [self.file.every, *(each.name for each in self.over_time)]
         computed_by = [__version__, np.__version__, self.engine, self.compiler]
-        return _digest([computed_by, robot, kept, [*self._named_files()]])
+        return _digest([computed_by, robot, kept, curves, [*self._named_files()]])
 
     @property
     def fingerprint(self) -> str:
@@ -147,6 +155,9 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     folder = Path(source.path).parent
     read = read_robot(folder / file.robot)
     robot = read.robot()
+    for each in over_time(file.variables or ()):
+        if not robot.has(VARIABLES[each.name]):
+            raise InputError.one(f"variables: no joint of {robot.name} has a {each.name}", source.path)
     trajectories = _trajectories(file, folder, source.path)
     loaded = [load_trajectory(each, robot) for each in trajectories]
     entries = Entries(file, source.path, read, robot, trajectories)

@@ -20,6 +20,7 @@ from vsacli.documents.fields import (
 )
 from vsacli.documents.kinds.several import OneOrMore
 from vsacli.studies.sweeps.kept import KEPT
+from vsacli.studies.sweeps.over_time import OVER_TIME
 from vsacli.studies.sweeps.ways import Drawn, Ranged, Varied, Ways
 
 FORMAT = "vsacli-study/1"
@@ -28,6 +29,18 @@ METHODS = (GRID, "random", "latin_hypercube")
 
 _COUNT = Check(lambda number: number >= 1, "1 or more", {"minimum": 1})
 _SEED = Check(lambda number: number >= 0, "zero or more", {"minimum": 0})
+
+
+class _ColumnName(Choice):
+    """One of the scalars of a report; they are too many for a table."""
+
+    words = "name of a column"
+
+
+class _VariableName(Choice):
+    """One of the variables of results, likewise."""
+
+    words = "name of a variable"
 
 
 @dataclass(frozen=True)
@@ -49,10 +62,17 @@ class StudyFile:
     )
     seed: int = integer("of what is drawn", check=_SEED, default=0)
     keep: tuple[str, ...] | None = value(
-        Items(Choice(tuple(KEPT))),
+        Items(_ColumnName(tuple(KEPT))),
         "what is kept of each run beside its verdict; all by default",
         default=None,
     )
+
+    variables: tuple[str, ...] | None = value(
+        Items(_VariableName(tuple(OVER_TIME))),
+        "variables of results that are kept over time",
+        default=None,
+    )
+    every: int = integer("of so many steps these variables are kept at one", check=_COUNT, default=1)
 
     def __post_init__(self) -> None:
         check_fields(self, *self._problems())

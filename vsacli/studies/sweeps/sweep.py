@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from vsacli.base.outputs import Staged
 from vsacli.results.store.study_table import Head, Parameter, Rows, StudyWriter
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.kept import divided
+from vsacli.studies.sweeps.over_time import filled, steps_of
 from vsacli.studies.sweeps.rows import FAILED, Computer, Row
 from vsacli.studies.sweeps.study import Study
 from vsacli.studies.sweeps.workers import LOST, Workers
@@ -93,20 +94,20 @@ def write(
     Raises:
         StorageError: the disk is full or fails.
     """
-    with StudyWriter(file, _head(study, provenance), len(runs)) as writer:
-        for some in _batches(runs):
-            points = [(run, study.point(run)) for run in some]
-            rows = [lost[run] if run in lost else journal.row(run, study.key(point)) for run, point in points]
-            writer.write(_rows(study, rows))
+    joints = len(study.robot.joints)
+
+    def row(run: int) -> Row:
+        return lost[run] if run in lost else journal.row(run, study.key(study.point(run)))
+
+    steps = max((steps_of(row(run).curves, study.over_time, joints) for run in runs), default=0)
+    at_once = ROWS_AT_ONCE if steps == 0 else 1 + ROWS_AT_ONCE // steps
+    with StudyWriter(file, _head(study, steps, provenance), len(runs)) as writer:
+        for start in range(0, len(runs), at_once):
+            writer.write(_rows(study, [row(run) for run in runs[start : start + at_once]], steps))
         writer.finish()
 
 
-def _batches(runs: Sequence[int]) -> Iterator[Sequence[int]]:
-    for start in range(0, len(runs), ROWS_AT_ONCE):
-        yield runs[start : start + ROWS_AT_ONCE]
-
-
-def _head(study: Study, provenance: dict[str, str]) -> Head:
+def _head(study: Study, steps: int, provenance: dict[str, str]) -> Head:
     parameters = [Parameter(each.path, each.unit, each.numeric) for each in study.dimensions]
     return Head(
         study=study.file.name,
@@ -116,7 +117,8 @@ def _head(study: Study, provenance: dict[str, str]) -> Head:
         joint_names=study.robot.joint_names,
         joint_types=study.robot.joint_types,
         parameters=tuple(parameters),
-        columns=study.kept,
+        columns=(*study.kept, *study.over_time),
+        steps=steps,
         sources={
             "study": (study.source,),
             "robot": study.robot.sources,
@@ -133,7 +135,7 @@ def _head(study: Study, provenance: dict[str, str]) -> Head:
     )
 
 
-def _rows(study: Study, rows: Sequence[Row]) -> Rows:
+def _rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
     points = [study.point(row.run) for row in rows]
     arrays: dict[str, Any] = {
         "trajectory": [study.trajectories[point.trajectory] for point in points],
@@ -153,4 +155,7 @@ def _rows(study: Study, rows: Sequence[Row]) -> Rows:
     for place, row in enumerate(rows):
         if row.verdict != FAILED:
             table[place] = row.values
-    return Rows([row.run for row in rows], arrays | divided(study.kept, table, joints))
+    arrays |= divided(study.kept, table, joints)
+    if study.over_time:
+        arrays |= filled([row.curves for row in rows], study.over_time, steps, joints)
+    return Rows([row.run for row in rows], arrays)
