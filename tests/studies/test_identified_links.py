@@ -90,7 +90,8 @@ def measured(run: Result, seed: int) -> Signals:
 
 def solved(robot: Robot, signals: Signals) -> list[Solution]:
     """Motors, and last the links."""
-    motors = [solution(each, [signals]) for each in motor_systems(robot, range(len(robot.joints)), GROUPS)]
+    joints = range(len(robot.joints))
+    motors = [solution(each, [signals]) for each in motor_systems(robot, joints, GROUPS, [signals])]
     return [*motors, solution(link_system(robot, GROUPS, motors), [signals])]
 
 
