@@ -296,3 +296,20 @@ def test_only_input_errors_escape(tmp_path_factory, content):
         table = read_table(path)
         assert table.values.shape[1] == len(table.columns)
         assert np.isfinite(table.values).all()
+
+
+def test_cells_may_be_empty_where_that_is_admitted(csv):
+    path = csv("time; a ;b\n# a comment\n0; ; 1\n0.5;2;nan\n\n1;;3 # three\n")
+    with pytest.raises(InputError, match="column 'a': expected a finite number, found ''"):
+        read_table(path)
+    table = read_table(path, empty_cells=True)
+    assert np.array_equal(table.values, [[0, np.nan, 1], [0.5, 2, np.nan], [1, np.nan, 3]], equal_nan=True)
+    assert table.line_of(2) == 6
+
+
+@pytest.mark.parametrize(
+    ("row", "words"), [("1;x", "found 'x'"), ("1;inf", "found 'inf'"), ("1", "expected 2")]
+)
+def test_other_cells_stay_refused(csv, row, words):
+    with pytest.raises(InputError, match=f"table.csv:3: .*{words}"):
+        read_table(csv(f"time;a\n0;\n{row}\n"), empty_cells=True)

@@ -1,0 +1,202 @@
+"""Faults of records: each is told, with its column, and nothing is fitted in silence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from samples.excited import Excitation, Recorded, excited
+from samples.shipped import shipped_robot
+
+from vsacli import InputError, identify
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.model import Robot
+
+MOTION = Excitation(position=[0, 0, 0], reach=[0.4] * 3, stiffness=[1400] * 3, swing=[300] * 3, duration=12)
+
+
+@pytest.fixture(scope="module")
+def arm() -> Robot:
+    return shipped_robot("vsa_3r")
+
+
+@pytest.fixture(scope="module")
+def record(arm: Robot) -> Recorded:
+    return excited(arm, MOTION).noisy(seed=1)
+
+
+def changed(record: Recorded, **changes: Callable[[Any], Any]) -> Recorded:
+    """A record in which some arrays are others; changes work in place, or return what is new."""
+    arrays = {name: values.copy() for name, values in record._asdict().items()}
+    for name, change in changes.items():
+        new = change(arrays[name])
+        arrays[name] = arrays[name] if new is None else new
+    return Recorded(**arrays)
+
+
+def put(place: Any, value: Any) -> Callable[[Any], None]:
+    """A change in place: what is at a place becomes a value, or what a function makes of what is there."""
+
+    def change(values: Any) -> None:
+        values[place] = value(values[place]) if callable(value) else value
+
+    return change
+
+
+ELBOW, SHOULDER = 2, 1
+
+STOPPING = {
+    "gap": (
+        lambda record: Recorded(*(np.delete(each, np.s_[1000:1200], axis=0) for each in record)),
+        r"column 'base.q', as 14 more, has a gap of 804 ms from t = 3.996 s on.*cut the file there",
+    ),
+    "degrees": (
+        lambda record: changed(record, q=np.degrees, theta=np.degrees),
+        r"column 'elbow.theta_1' goes to [\d.]+ rad; is it in deg\? Write \[deg\] after its name",
+    ),
+    "wrapped": (
+        lambda record: changed(record, q=lambda q: (q + 3 + np.pi) % (2 * np.pi) - np.pi),
+        r"column 'elbow.q' jumps by 2 pi at t = [\d.]+ s, a wrapped angle: unwrap it",
+    ),
+    "not connected": (
+        lambda record: changed(record, theta=put(np.s_[:, SHOULDER, 0], 0.1)),
+        r"column 'shoulder.theta_1' is 0.1 throughout, while 'shoulder.q' changes: a sensor that is not",
+    ),
+    "torque of nothing": (
+        lambda record: changed(record, tau_motor=put(np.s_[:, SHOULDER, 1], 0.0)),
+        r"column 'shoulder.tau_motor_2' is 0 throughout, while 'shoulder.q' changes",
+    ),
+    "still joint": (
+        lambda record: changed(
+            record, **{name: put(np.s_[:, ELBOW], 0.25) for name in ("q", "theta", "tau_motor")}
+        ),
+        "joint elbow does not move, and tells nothing",
+    ),
+    "milliseconds": (
+        lambda record: changed(record, time=lambda time: 1000 * time),
+        r"as 14 more, has a time that looks like ms.*write time\[ms\] in the header",
+    ),
+    "a glimpse": (
+        lambda record: Recorded(*(each[:150] for each in record)),
+        "column 'base.q', as 14 more, has 150 numbers; a fit needs 200 at least",
+    ),
+}
+"""Changes of a record, and what is then said."""
+
+
+@pytest.mark.parametrize("fault", STOPPING)
+def test_what_nothing_can_be_made_of_stops_the_fit(
+    fault: str, arm: Robot, record: Recorded, tmp_path: Path
+) -> None:
+    change, words = STOPPING[fault]
+    with pytest.raises(InputError, match=words):
+        identify(arm, change(record).write(tmp_path / "record.csv", arm))
+
+
+def test_missing_columns_are_named(arm: Robot, record: Recorded, tmp_path: Path) -> None:
+    path = record.write(tmp_path / "record.csv", arm)
+    path.write_text(path.read_text().replace("elbow.tau_motor_2", "elbow.torque_2", 1))
+    with pytest.raises(InputError, match=r"joint elbow: there is no column elbow.tau_motor_2"):
+        identify(arm, path)
+
+
+def frozen_in_motion(theta: FloatArray) -> None:
+    """A hundred rows of motor 1 of the shoulder stand still where it is fastest."""
+    rows = 100
+    moved = theta[rows:, SHOULDER, 0] - theta[:-rows, SHOULDER, 0]
+    first = int(np.argmax(np.abs(moved[rows:-rows]))) + rows
+    theta[first : first + rows, SHOULDER, 0] = theta[first, SHOULDER, 0]
+
+
+DOUBTS = {
+    "torques in mN m": (
+        lambda record: changed(record, tau_motor=lambda torque: 1000 * torque),
+        "base.tau_motor_1 looks as if it is in thousandths of the unit",
+    ),
+    "a sign of a torque": (
+        lambda record: changed(record, tau_motor=put(np.s_[:, SHOULDER, 0], np.negative)),
+        "shoulder.tau_motor_1 runs the other way",
+    ),
+    "a sign of a motor": (
+        lambda record: changed(record, theta=put(np.s_[:, SHOULDER, 0], np.negative)),
+        "columns 'shoulder.theta_1' and 'shoulder.q' run against each other",
+    ),
+    "a sign of a joint": (
+        lambda record: changed(record, q=put(np.s_[:, SHOULDER], np.negative)),
+        "columns 'shoulder.theta_2' and 'shoulder.q' run against each other",
+    ),
+    "torques of other motors": (
+        lambda record: changed(record, tau_motor=lambda torque: torque[:, [2, 1, 0]]),
+        "columns look exchanged: base.tau_motor_1 is like elbow.tau_motor_1 computed",
+    ),
+    "positions of other motors": (
+        lambda record: changed(record, theta=lambda theta: theta[:, [1, 0, 2]]),
+        "column 'base.theta_1' follows 'shoulder.q', not 'base.q': columns look exchanged",
+    ),
+    "motors exchanged": (
+        lambda record: changed(
+            record,
+            **{
+                name: put(np.s_[:, ELBOW], lambda each: each[:, ::-1].copy())
+                for name in ("theta", "tau_motor")
+            },
+        ),
+        "the springs of elbow are deflected as with the preload negative: the columns of motors 1 and 2",
+    ),
+    "cut off": (
+        lambda record: changed(record, tau_motor=put(np.s_[:, 0, 0], lambda torque: np.minimum(torque, 120))),
+        r"column 'base.tau_motor_1' is cut off at 120, \d+ times, first at t = [\d.]+ s",
+    ),
+    "an outlier": (
+        lambda record: changed(record, tau_motor=put(np.s_[1500, SHOULDER, 0], 900.0)),
+        r"column 'shoulder.tau_motor_1' is off at t = 6.000 s",
+    ),
+    "frozen": (
+        lambda record: changed(record, theta=frozen_in_motion),
+        r"column 'shoulder.theta_1' is frozen at t = [\d.]+ s, for 396 ms",
+    ),
+    "repeated rows": (
+        lambda record: Recorded(
+            record.time, *(np.repeat(each[::2], 2, axis=0)[: len(record.time)] for each in record[1:])
+        ),
+        "column 'base.q', as 14 more, has each value in 2 rows",
+    ),
+}
+"""Likewise of those that only make the numbers doubtful."""
+
+
+@pytest.mark.parametrize("fault", DOUBTS)
+def test_what_looks_wrong_is_told(fault: str, arm: Robot, record: Recorded, tmp_path: Path) -> None:
+    change, words = DOUBTS[fault]
+    path = change(record).write(tmp_path / "record.csv", arm)
+    told = identify(arm, path, fit=["joints.*.actuator.spring.k"])
+    assert told.verdict == "doubtful"
+    told_of = told.records[0].doubts
+    assert any(re.search(words, doubt) for doubt in told_of), told_of
+
+
+def test_a_clean_record_is_not_doubted(arm: Robot, record: Recorded, tmp_path: Path) -> None:
+    """Nor one whose positions come from encoders with 14 bits, whose torques come at a fifth of the rate."""
+    rounded = changed(record, q=read_by_encoders, theta=read_by_encoders)
+    path = rounded.write(tmp_path / "record.csv", arm)
+    header, *rows = path.read_text().splitlines()
+    slow = ["tau" in name for name in header.split(",")]
+    cells = [
+        ["" if each and number % 5 else cell for each, cell in zip(slow, row.split(","), strict=True)]
+        for number, row in enumerate(rows)
+    ]
+    path.write_text("\n".join((header, *map(",".join, cells), "")))
+    told = identify(arm, path, fit=["springs", "motors"])
+    assert told.records[0].doubts == ()
+    assert told.verdict == "ok"
+    for number in told.numbers:
+        assert abs(number.value - number.before) < 4 * number.standard_error
+
+
+def read_by_encoders(positions: FloatArray) -> FloatArray:
+    step = 2 * np.pi / 2**14
+    return np.asarray(step * np.round(positions / step))
