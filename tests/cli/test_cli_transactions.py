@@ -19,8 +19,10 @@ import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited, installed
 from samples.disturbed import PATIENCE, Disturbance, Disturber
+from samples.excited import Excitation, excited
 from samples.marks import needs_compiler, slow_but
 
+from vsacli import load_robot
 from vsacli.base.interrupts import ENDING
 
 pytestmark = needs_compiler
@@ -30,7 +32,7 @@ URDF = REPOSITORY / "robots" / "desk_arm.urdf"
 
 @dataclass(frozen=True)
 class Task:
-    """A command line that writes, in a folder with `move.yaml`, `soft.yaml`, `given.h5` and its `given.csv`.
+    """A command line that writes, in a folder with motions, `given.h5` and its `given.csv`, and a record.
 
     Attributes:
         arguments: of `vsacli`.
@@ -67,6 +69,7 @@ TASKS = {
         )
     ),
     "optimize": Task(("optimize", ROBOT, "move.yaml", "-o", "best.yaml")),
+    "identify": Task(("identify", ROBOT, "record.csv", "-o", "fitted.yaml", "--plot", "figures")),
     "export": Task(("export", "given.h5", "-o", "torques.csv")),
     "new robot": Task(("new", "robot", "--joints", "RR", "-o", "arm.yaml")),
     "new trajectory": Task(("new", "trajectory", "--robot", ROBOT, "-o", "rise.yaml")),
@@ -190,6 +193,9 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> MakeStage:
         edited(
             REST_TO_REST, inputs / f"{name}.yaml", ("rate: 1000 ", "rate: 10 "), ("end: 1275", f"end: {end}")
         )
+    arm = load_robot(ROBOT)
+    moved = Excitation([0, 0, 0], [0.4] * 3, [1400] * 3, [300] * 3, rate=50)
+    excited(arm, moved).noisy(seed=0).write(inputs / "record.csv", arm)
     for arguments in (
         ("invdyn", ROBOT, "move.yaml", "-o", "given.h5"),
         ("export", "given.h5", "-o", "given.csv"),

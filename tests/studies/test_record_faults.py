@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.excited import Excitation, Recorded, excited
+from samples.marks import slow_but
 from samples.shipped import shipped_robot
 
 from vsacli import InputError, identify
@@ -169,7 +170,9 @@ DOUBTS = {
 """Likewise of those that only make the numbers doubtful."""
 
 
-@pytest.mark.parametrize("fault", DOUBTS)
+@pytest.mark.parametrize(
+    "fault", slow_but(("torques in mN m", "a sign of a motor", "motors exchanged", "cut off"), DOUBTS)
+)
 def test_what_looks_wrong_is_told(fault: str, arm: Robot, record: Recorded, tmp_path: Path) -> None:
     change, words = DOUBTS[fault]
     path = change(record).write(tmp_path / "record.csv", arm)

@@ -41,7 +41,10 @@ from vsacli.studies.identification.unknowns import FRICTION, GROUPS, check_fit, 
 WORDS = (*GROUPS, LINKS)
 """What users may ask for by a word."""
 
-ABOVE_NOISE, ABOVE_TORQUE = 2.0, 0.02
+OF_JOINT = ".actuator."
+"""Of paths to numbers of a joint's motors and springs, what ends where they differ."""
+
+ABOVE_NOISE, ABOVE_TORQUE = 2.0, 0.01
 """Residual over the noise, and over the torque, beyond both of which the equations do not hold: what is left
 is then no noise of the sensor, and more than a good model of friction leaves."""
 
@@ -149,7 +152,7 @@ def _aligned(signals: Signals, late: Delay) -> Signals:
 
 def _report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemReport:
     system, fit = found.system, found.fit
-    names = [system.names[number] for number in found.free]
+    names = [system.names[number].rpartition(OF_JOINT)[2] for number in found.free]
     combinations = [
         f"only {each.words(names)} can be told: {each.value:.6g} +- {each.standard_error:.2g}"
         for each in fit.inseparable
