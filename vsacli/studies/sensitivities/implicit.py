@@ -81,6 +81,7 @@ class ImplicitSolution:
         return found._replace(**derived)
 
     def _all(self, demanded: Dual | FloatArray, q: FloatArray) -> FloatArray:
+        """Its derivatives in all directions, (directions, samples)."""
         return tangent_of(demanded, self._directions, q.shape)
 
     def _slopes(self, phi: FloatArray, q: FloatArray) -> _Slopes:
