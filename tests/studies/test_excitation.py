@@ -15,7 +15,14 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.excitation import Excitation, excitation_text, plan_excitation, search
+from vsacli.studies.identification.excitation import (
+    Excitation,
+    ImpossibleError,
+    excitation_text,
+    plan_excitation,
+    predicted_errors,
+    search,
+)
 from vsacli.studies.identification.excitation.allowed import MARGIN
 
 BETWEEN = 0.01
@@ -28,18 +35,19 @@ def _short_searches() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "STARTS", 9)
         patch.setattr(search, "STEPS", 30)
+        patch.setattr(predicted_errors, "RECORDS", 1)
         yield
 
 
 @pytest.fixture(name="planned", scope="module")
 def _planned(_short_searches: None) -> Excitation:
     """Of an arm with limits of position, velocity and stiffness."""
-    return plan_excitation(shipped_robot("rp_2"), duration=10)
+    return plan_excitation(shipped_robot("rp_2"), duration=5)
 
 
 def test_it_keeps_a_margin_from_every_limit_between_steps_as_well(planned: Excitation) -> None:
     assert planned.report.verdict == "ok"
-    time = np.linspace(0, 10, 7001)  # no multiple of the steps
+    time = np.linspace(0, 5, 3501)  # no multiple of the steps
     motion = planned.trajectory.at(time)
     stiffness = motion.commanded["stiffness"]
     for index, joint in enumerate(planned.robot.joints):
@@ -81,7 +89,7 @@ def test_the_file_is_what_was_planned(planned: Excitation, tmp_path: Path) -> No
     file = tmp_path / "excitation.yaml"
     file.write_text(excitation_text(planned), encoding="utf-8")
     read = load_trajectory(file, planned.robot)
-    time = np.linspace(0, 10, 50)
+    time = np.linspace(0, 5, 50)
     one, other = read.at(time), planned.trajectory.at(time)
     for name, values in one.variables().items():
         assert np.array_equal(values, other.variables()[name], equal_nan=True), name
@@ -89,10 +97,11 @@ def test_the_file_is_what_was_planned(planned: Excitation, tmp_path: Path) -> No
     assert not read.warnings
 
 
+@pytest.mark.slow
 def test_the_same_seed_finds_the_same(planned: Excitation) -> None:
-    again = plan_excitation(planned.robot, duration=10)
+    again = plan_excitation(planned.robot, duration=5)
     assert excitation_text(again) == excitation_text(planned)
-    other = plan_excitation(planned.robot, duration=10, seed=1)
+    other = plan_excitation(planned.robot, duration=5, seed=1)
     assert excitation_text(other) != excitation_text(planned)
 
 
@@ -104,12 +113,14 @@ def scaled_condition(columns: list[FloatArray]) -> float:
 
 
 def test_its_conditions_are_those_of_the_formula_of_the_motors(planned: Excitation) -> None:
-    """tau_motor = B theta'' + D theta' + k phi + k_c phi^3 at every step."""
+    """tau_motor = B theta'' + D theta' + F_c sign(theta') + F_o + k phi + k_c phi^3 at every step."""
     run = inverse_dynamics(planned.robot, planned.trajectory)
+    moving = np.where(np.abs(run.dtheta) > 1e-10, np.sign(run.dtheta), 0.0)
     for index, name in enumerate(planned.robot.joint_names):
-        rows = [run.ddtheta, run.dtheta, run.phi, run.phi**3]
+        rows = [run.ddtheta, run.dtheta, moving, np.ones_like(moving), run.phi, run.phi**3]
         condition = scaled_condition([row[:, index] for row in rows])
-        assert planned.conditions[name] == pytest.approx(condition, rel=0.01)  # its own steps are fewer
+        ours = planned.planned.conditions[name]
+        assert ours == pytest.approx(condition, rel=0.02)  # of fewer steps, where signs weigh differently
 
 
 @pytest.mark.slow
@@ -117,18 +128,23 @@ def test_beside_the_users_own_motion_it_says_how_much_more_it_tells() -> None:
     """At constant stiffness k and k_c are hardly told apart."""
     robot, own = shipped_run("vsa_3r", "vsa_3r_excitation")
     found = plan_excitation(robot, own, duration=10)
-    assert found.own_conditions["base"] == pytest.approx(2141, abs=1)  # by the formula of the motors
+    assert found.own is not None
+    assert found.own.conditions["base"] > 1000
     assert found.condition < 30
-    assert found.gain > 1
-    assert "of the motion given" in str(found)
+    ours, theirs = (
+        {each.path: each.standard_error for each in of.numbers} for of in (found.planned, found.own)
+    )
+    assert ours["joints.base.actuator.spring.k"] < 1  # N m/rad
+    assert np.isnan(theirs["joints.base.actuator.spring.k"])
+    assert "motion given" in str(found)
 
 
 def test_what_a_robot_has_no_limit_of_is_said_with_what_was_assumed() -> None:
     found = plan_excitation(shipped_robot("measured_1r"), duration=10)
     assert found.assumptions == (
-        "no limits.position (0.785 rad from 0 rad assumed): elbow",
+        "no limits.position (0.785 rad either way from zero assumed): elbow",
         "no limits.velocity (1 rad/s assumed): elbow",
-        "no max_torque (none assumed): elbow",
+        "no max_torque of motors (none assumed): elbow",
     )
     motion = found.trajectory.at(np.linspace(0, 10, 999))
     assert np.abs(motion.q).max() < np.pi / 4
@@ -139,7 +155,7 @@ def test_a_robot_that_cannot_do_anything_is_told_why() -> None:
     robot = shipped_robot("coupled_1r")
     (joint,) = robot.joints
     weak = replace(joint, limits=Limits(position=(1.0, 1.2), stiffness=(1, 2)))
-    with pytest.raises(InputError, match="no excitation is feasible: elbow has no stiffness that carries"):
+    with pytest.raises(ImpossibleError, match="elbow has no stiffness that carries"):
         plan_excitation(Robot(name="weak", gravity=robot.gravity, joints=(weak,)), duration=10)
 
 

@@ -56,6 +56,18 @@ def variables_option(default: str) -> Callable[[Any], Any]:
     )
 
 
+def numbers(
+    _context: click.Context, _parameter: click.Parameter, written: str | None
+) -> tuple[float, ...] | None:
+    """A callback for numbers separated by commas."""
+    if written is None:
+        return None
+    try:
+        return tuple(float(word) for word in written.split(","))
+    except ValueError:
+        raise click.BadParameter("expected a number, or one for each joint, e.g. 0.01,0,-0.02") from None
+
+
 def example(command: str) -> str:
     """The end of a help text: a command line that works."""
     return f"\b\nExample:\n  {command}"

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.cli.command_parts import example, json_option, overwrite_option, robot_argument, words_of
+from vsacli.cli.command_parts import example, json_option, numbers, overwrite_option, robot_argument, words_of
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
+from vsacli.cli.identify_plan import USUAL_DURATION, plan
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     epilog=example("vsacli identify robots/vsa_3r.yaml record.csv -o fitted.yaml --plot figures"),
 )
 @robot_argument
-@click.argument("recordings", nargs=-1, required=True, metavar="RECORDING...")
+@click.argument("recordings", nargs=-1, metavar="RECORDING...")
 @click.option(
     "--fit",
     metavar="WORDS",
@@ -36,7 +37,34 @@ if TYPE_CHECKING:
     type=click.FloatRange(min=0, min_open=True),
     help="Of the filter that all signals pass; by default half as much again as the motion has.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write the robot file with the numbers found.")
+@click.option(
+    "--plan",
+    "planned",
+    is_flag=True,
+    help="Plan a trajectory to record instead, within all limits; beside one of yours, if one is given.",
+)
+@click.option(
+    "--duration",
+    metavar="S",
+    type=float,
+    help=f"Of the planned trajectory; {USUAL_DURATION:g} s by default.",
+)
+@click.option(
+    "--sensor-noise",
+    metavar="RAD[,NM]",
+    callback=numbers,
+    help="With --plan, standard deviation of measured positions, and of measured motor torques, for which "
+    "standard errors are predicted; by default 2e-5 and 0.5 % of the largest torque of each motor.",
+)
+@click.option(
+    "--seed", metavar="N", type=click.IntRange(min=0), help="Of the search of --plan; 0 by default."
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="Write the robot file with the numbers found; with --plan, the trajectory.",
+)
 @click.option(
     "--plot", "folder", metavar="FOLDER", help="Save figures of measured and predicted torques there."
 )
@@ -48,6 +76,10 @@ def identify(
     recordings: tuple[str, ...],
     fit: tuple[str, ...] | None,
     bandwidth: float | None,
+    planned: bool,
+    duration: float | None,
+    sensor_noise: tuple[float, ...] | None,
+    seed: int | None,
     output: str | None,
     folder: str | None,
     as_json: bool,
@@ -62,7 +94,28 @@ def identify(
 
     The report gives each number with its standard error, what cannot be told apart, and what the equations
     leave beside the noise, on parts of the records, too, that the fit did not see.
+
+    With --plan it says instead which motion and stiffness to record so that the numbers can be told, within
+    all limits of ROBOT and from rest to rest. What follows ROBOT is then a TRAJECTORY of yours, to compare.
     """
+    if planned:
+        _check_options({"--fit": fit, "--bandwidth": bandwidth, "--plot": folder}, "goes without --plan")
+        if len(recordings) > 1:
+            raise click.UsageError("--plan compares with one trajectory at most")
+        return plan(
+            robot,
+            recordings,
+            duration=USUAL_DURATION if duration is None else duration,
+            noise=sensor_noise,
+            seed=seed or 0,
+            output=output,
+            as_json=as_json,
+            overwrite=overwrite,
+            talk=talk,
+        )
+    _check_options({"--duration": duration, "--sensor-noise": sensor_noise, "--seed": seed}, "needs --plan")
+    if not recordings:
+        raise click.UsageError("Missing argument 'RECORDING...'; to plan a motion to record, give --plan")
     from vsacli.base.outputs import Outputs
     from vsacli.robot.file import load_robot
     from vsacli.studies.identification import WORDS, fitted_text
@@ -81,6 +134,13 @@ def identify(
     say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]
+
+
+def _check_options(given: dict[str, object], reason: str) -> None:
+    """Refuse options that are given although they have no meaning."""
+    for option, value in given.items():
+        if value is not None:
+            raise click.UsageError(f"{option} {reason}")
 
 
 def _draw(found: Identification, robot: str, folder: str, outputs: Outputs) -> None:

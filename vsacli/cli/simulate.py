@@ -20,6 +20,7 @@ from vsacli.cli.command_parts import (
     hdf5_name,
     json_option,
     load_inputs,
+    numbers,
     overwrite_option,
     robot_argument,
     run_stem,
@@ -42,17 +43,6 @@ if TYPE_CHECKING:
 
 PROGRESS_STEPS = 1000
 FEEDBACK = "feedback-linearization"
-
-
-def _numbers(
-    _context: click.Context, _parameter: click.Parameter, written: str | None
-) -> tuple[float, ...] | None:
-    if written is None:
-        return None
-    try:
-        return tuple(float(word) for word in written.split(","))
-    except ValueError:
-        raise click.BadParameter("expected a number, or one for each joint, e.g. 0.01,0,-0.02") from None
 
 
 @click.command(
@@ -81,10 +71,10 @@ def _numbers(
     "--integral", is_flag=True, help="Add integral action, which takes one more pole of each error."
 )
 @click.option(
-    "--initial-error", metavar="RAD", default="0", callback=_numbers, help="Of q, for all joints or for each."
+    "--initial-error", metavar="RAD", default="0", callback=numbers, help="Of q, for all joints or for each."
 )
 @click.option(
-    "--initial-stiffness-error", metavar="NM/RAD", default="0", callback=_numbers, help="Of the stiffness."
+    "--initial-stiffness-error", metavar="NM/RAD", default="0", callback=numbers, help="Of the stiffness."
 )
 @click.option(
     "--perturb",
@@ -96,7 +86,7 @@ def _numbers(
 @click.option(
     "--sensor-noise",
     metavar="RAD[,NM]",
-    callback=_numbers,
+    callback=numbers,
     help="Standard deviation of measured positions, and of measured motor torques, e.g. 2e-5,0.5; adds "
     "q_measured, theta_measured and tau_motor_measured to the result.",
 )

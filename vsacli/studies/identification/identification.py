@@ -79,13 +79,13 @@ def identify(
     joints = sorted({joint for record in records for joint in complete_joints(robot, record)})
     signals = [_conditioned(record, bandwidth) for record in records]
     sought = with_friction(robot, joints) if FRICTION in fit else robot
-    first = _solved(sought, joints, fit, signals)
+    first = solutions(sought, joints, fit, signals)
     if not first:
         raise InputError.one("the joints that were recorded have nothing of what is to be found")
     delays = [delay(first, each) for each in signals]
     late = any(each.matters(record.rate) for each, record in zip(delays, signals, strict=True))
     signals = [_aligned(*each) for each in zip(signals, delays, strict=True)]
-    found = _solved(sought, joints, fit, signals) if late else first
+    found = solutions(sought, joints, fit, signals) if late else first
     reports = tuple(_report(robot, each, signals) for each in found)
     links = next((found_links(robot, each) for each in found if each.system.title == LINKS), None)
     doubts = [tuple(model_doubts(robot, joints, *each)) for each in zip(records, signals, strict=True)]
@@ -118,10 +118,17 @@ def _conditioned(record: Record, bandwidth: float | None) -> Signals:
     return conditioned(record.time, record.q, record.theta, record.tau_motor, chosen)
 
 
-def _solved(
+def solutions(
     robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
 ) -> list[Solution]:
-    """Motors joint by joint, then all links, with what springs carry by those."""
+    """Solve for motors joint by joint, then for all links, with what springs carry by those.
+
+    Args:
+        robot: the robot.
+        joints: indices of those that were recorded.
+        fit: what to find, as of `identify`.
+        signals: records.
+    """
     motors = [solution(system, signals) for system in motor_systems(robot, joints, fit, signals)]
     if LINKS not in fit or _without_links(robot, joints, fit, signals):
         return motors
@@ -159,7 +166,7 @@ def _report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemRepo
     ]
     return SystemReport(
         title=system.title,
-        numbers=tuple(_numbers(found)),
+        numbers=tuple(numbers_of(found)),
         condition=fit.condition,
         combinations=tuple(combinations),
         residuals=tuple(_residuals(robot, found, signals)),
@@ -167,7 +174,8 @@ def _report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemRepo
     )
 
 
-def _numbers(found: Solution) -> Iterator[Number]:
+def numbers_of(found: Solution) -> Iterator[Number]:
+    """What was found of each number of a system."""
     system, fit = found.system, found.fit
     inseparable = {at for each in fit.inseparable for at, _ in each.terms}
     said = zip(system.names, system.units, system.sums, strict=True)

@@ -52,10 +52,11 @@ def allowed(robot: Robot, middle: FloatArray | None = None) -> Allowed:
         middle: about which joints move whose range is not known, (joints,); zero if None.
     """
     about = np.zeros(len(robot.joints)) if middle is None else middle
+    words = "zero" if middle is None else "its middle in the motion given"
     ranges = np.array([_range(joint, float(each)) for joint, each in zip(robot.joints, about, strict=True)])
     speeds = np.array([_speed(joint) for joint in robot.joints])
     lowest, highest = ranges.T
-    return Allowed(lowest, highest, (1 - MARGIN) * speeds, tuple(_assumptions(robot, about)))
+    return Allowed(lowest, highest, (1 - MARGIN) * speeds, tuple(_assumptions(robot, words)))
 
 
 def _range(joint: Joint, middle: float) -> tuple[float, float]:
@@ -76,23 +77,23 @@ def _speed(joint: Joint) -> float:
     return speed if np.isfinite(speed) else USUAL_SPEED[joint.type]
 
 
-def _assumptions(robot: Robot, middle: FloatArray) -> Iterator[str]:
-    """One sentence for all joints that lack the same."""
+def _assumptions(robot: Robot, middle: str) -> Iterator[str]:
+    """One clause for all joints that lack the same."""
     places: dict[str, list[str]] = {}
-    for joint, about in zip(robot.joints, middle.tolist(), strict=True):
-        for lacking in _lacking(joint, about):
+    for joint in robot.joints:
+        for lacking in _lacking(joint, middle):
             places.setdefault(lacking, []).append(joint.name)
     for lacking, names in places.items():
         yield f"no {lacking}: {', '.join(names)}"
 
 
-def _lacking(joint: Joint, middle: float) -> Iterator[str]:
+def _lacking(joint: Joint, middle: str) -> Iterator[str]:
     """Limits that a joint has not, each with what is assumed."""
     position, velocity = units.POSITION.unit(joint.type), units.VELOCITY.unit(joint.type)
     if not np.isfinite(joint.limits.position).all():
-        reach = f"{USUAL_REACH[joint.type]:.3g} {position} from {middle:.3g} {position} assumed"
+        reach = f"{USUAL_REACH[joint.type]:.3g} {position} either way from {middle} assumed"
         yield f"limits.position ({reach})"
     if not np.isfinite(joint.limits.velocity).all():
         yield f"limits.velocity ({USUAL_SPEED[joint.type]:g} {velocity} assumed)"
     if not all(np.isfinite(motor.max_torque) for motor in joint.actuator.motors):
-        yield "max_torque (none assumed)"
+        yield "max_torque of motors (none assumed)"

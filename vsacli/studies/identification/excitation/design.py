@@ -12,6 +12,7 @@ from vsacli.base.signals import POSITION, STIFFNESS, Signal
 from vsacli.dynamics.inverse import command_of, elastic_torques
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.allowed import MARGIN, SPREAD, USUAL_STIFFENING, Allowed
+from vsacli.studies.remedies.acceptance import ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import admissible_stiffness
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.devices import with_devices
@@ -38,10 +39,6 @@ of an amplitude beyond such samples, within `MARGIN`."""
 
 DIGITS = 4
 """Significant ones of amplitudes and offsets, as the file has them."""
-
-
-class InfeasibleDesignError(Exception):
-    """The robot has no stiffness that carries a motion."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,7 @@ class Design:
             share: 0 to 1, of the position and stiffness that the numbers ask for; 0 is nearly at rest.
 
         Raises:
-            InfeasibleDesignError: no stiffness carries the motion.
+            ImpossibleError: no stiffness carries the motion.
         """
         moved, stiffened = numbers
         position = self._position(moved, share)
@@ -142,7 +139,7 @@ class Design:
         pad = MARGIN * max(abs(each) for each in (*joint.limits.stiffness, 0.0) if np.isfinite(each))
         lowest, highest = lowest + pad, highest - pad
         if not 0 < lowest < highest < np.inf:
-            raise InfeasibleDesignError(f"{joint.name} has no stiffness that carries the motion all the time")
+            raise ImpossibleError(f"{joint.name} has no stiffness that carries the motion all the time")
         return lowest, highest
 
     def _motion(self, position: Sinusoids) -> Motion:

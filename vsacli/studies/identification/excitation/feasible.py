@@ -12,7 +12,8 @@ from vsacli.base.flags import Flag
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import compute_block
 from vsacli.studies.identification.excitation.allowed import MARGIN
-from vsacli.studies.identification.excitation.design import Design, InfeasibleDesignError
+from vsacli.studies.identification.excitation.design import Design
+from vsacli.studies.remedies.acceptance import ImpossibleError
 from vsacli.trajectory.trajectory import Trajectory
 
 BISECTIONS = 6
@@ -69,7 +70,7 @@ def watched(design: Design) -> list[Bounded]:
 def _tried(design: Design, numbers: FloatArray, share: float) -> Feasible | None:
     try:
         trajectory = design.member(numbers, share)
-    except InfeasibleDesignError:
+    except ImpossibleError:
         return None
     block = compute_block(design.robot, trajectory.at(design.grid))
     if (least_clearances(design, block) < MARGIN - ROUNDED).any():
@@ -81,7 +82,7 @@ def obstacle(design: Design, numbers: FloatArray) -> str:
     """What a member that is nearly at rest lacks to be feasible, a clause."""
     try:
         trajectory = design.member(numbers, 0.0)
-    except InfeasibleDesignError as error:
+    except ImpossibleError as error:
         return str(error)
     gaps = least_clearances(design, compute_block(design.robot, trajectory.at(design.grid)))
     quantity = watched(design)[int(gaps.argmin())]

@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import Block
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.independence import independence
+from vsacli.studies.identification.independence import Independence, in_words, independence
+from vsacli.studies.identification.inertial_parameters import names
 from vsacli.studies.identification.link_equations import LinkUnknowns, link_equations
 from vsacli.studies.identification.motor_equations import motor_equations
 from vsacli.studies.identification.signals import Filter, Signals
-from vsacli.studies.identification.unknowns import GROUPS, unknowns
+from vsacli.studies.identification.unknowns import GROUPS, unknowns, with_friction
 
 ALL_PASS = Filter(bandwidth=np.inf, sections=np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]]), stride=1, reach=0)
 """For motions without noise."""
@@ -55,10 +56,13 @@ class Information:
     Args:
         robot: the robot.
         examples: motions from which it follows what no motion tells apart, and the size of torques.
+
+    Attributes:
+        structural: what no motion tells, clauses.
     """
 
     def __init__(self, robot: Robot, examples: Sequence[Block]) -> None:
-        self._robot = robot
+        self._robot = robot = with_friction(robot, range(len(robot.joints)))
         self._motors = {
             index: chosen
             for index, joint in enumerate(robot.joints)
@@ -67,13 +71,31 @@ class Information:
         self._links = LinkUnknowns.of(robot, GROUPS)
         torques = np.concatenate([block.tau_e for block in examples])
         self._sizes = np.sqrt(np.mean(torques**2, axis=0))
-        self._kept = self._independent(examples)
+        splits = self._splits(examples)
+        self._kept = [each.kept for each in splits]
+        self.structural = tuple(self._untold(splits))
 
-    def _independent(self, examples: Sequence[Block]) -> list[IndexArray]:
-        """Of each system, the unknowns that some motion tells apart."""
+    def _splits(self, examples: Sequence[Block]) -> list[Independence]:
+        """Of each system, the unknowns that some motion tells apart, and the others."""
         systems = zip(*(self._columns(block) for block in examples), strict=True)
         together = [np.concatenate([each.slopes for each in system]) for system in systems]
-        return [independence(slopes, TOLERANCE).kept for slopes in together]
+        return [independence(slopes, TOLERANCE) for slopes in together]
+
+    def _untold(self, splits: Sequence[Independence]) -> Iterator[str]:
+        """What no motion tells, in words."""
+        paths = [list(map(str, chosen)) for chosen in self._motors.values()]
+        for own, split in zip([*paths, self._links.names], splits, strict=True):
+            if split.nothing.size:
+                yield ", ".join(own[at] for at in split.nothing)
+            for place, kept in enumerate(split.kept):
+                others = np.flatnonzero(split.shares[place])
+                if others.size:
+                    terms = [(int(split.dropped[at]), float(split.shares[place, at])) for at in others]
+                    yield f"more than {in_words([(int(kept), 1.0), *terms], own)}"
+        of_links = names(self._robot)
+        silent = np.flatnonzero(~self._links.base.shares.any(axis=0))
+        if silent.size:
+            yield ", ".join(of_links[at] for at in silent)
 
     def _columns(self, block: Block) -> Iterator[Columns]:
         """The systems of equations of a motion."""
@@ -86,17 +108,13 @@ class Information:
         sizes = np.repeat(self._sizes, len(block.time))  # joint by joint
         yield Columns(LINKS, slopes / np.where(sizes > 0, sizes, 1.0)[:, None])
 
-    def of(self, block: Block) -> float:
-        """What a motion tells: greater by 1 where standard errors are smaller by a factor e, on average.
-
-        That is the logarithm of the determinant of the information matrix, of one row on average, over twice
-        the unknowns: D-optimality, which does not depend on the units of the unknowns.
-        """
-        told = [_logarithm(slopes) for _, slopes in self._separable(block)]
-        return sum(told) / sum(map(len, self._kept))
-
     def worth(self, block: Block) -> float:
-        """What a motion tells, less what is too badly conditioned for equations that hold but roughly."""
+        """What a motion tells, less what is too badly conditioned for equations that hold but roughly.
+
+        What it tells is the logarithm of the determinant of the information matrix, of one row on average,
+        over twice the unknowns: D-optimality. It does not depend on the units of the unknowns, and is greater
+        by 1 where standard errors are smaller by a factor e, on average.
+        """
         separable = [slopes for _, slopes in self._separable(block)]
         excess = sum(max(0.0, math.log(_condition(slopes) / CONDITION)) for slopes in separable)
         return sum(map(_logarithm, separable)) / sum(map(len, self._kept)) - excess

@@ -8,16 +8,23 @@ import numpy as np
 
 from vsacli.analysis.clearances import clearances
 from vsacli.analysis.run import Run
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.variables import Block
-from vsacli.dynamics.inverse import compute_block, fitted
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.allowed import MARGIN, Allowed, allowed
 from vsacli.studies.identification.excitation.design import Design
 from vsacli.studies.identification.excitation.feasible import Feasible, feasible, obstacle, watched
 from vsacli.studies.identification.excitation.information import Information
-from vsacli.studies.identification.excitation.plan_report import ActiveLimit, Excitation
+from vsacli.studies.identification.excitation.plan_report import ActiveLimit, Excitation, Usefulness
+from vsacli.studies.identification.excitation.predicted_errors import (
+    USUAL_NOISE,
+    Noise,
+    executed,
+    predicted_errors,
+)
 from vsacli.studies.identification.excitation.search import STARTS, STEPS, Found, search
+from vsacli.studies.remedies.acceptance import ImpossibleError
 from vsacli.trajectory.trajectory import Trajectory
 
 FREQUENCIES = (0.05, 0.1, 0.2)
@@ -42,6 +49,7 @@ def plan_excitation(
     own: Trajectory | None = None,
     *,
     duration: float = 20.0,
+    noise: Noise = USUAL_NOISE,
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Excitation:
@@ -54,39 +62,39 @@ def plan_excitation(
         robot: with the numbers that are known so far.
         own: a motion to compare with, about whose middle joints move whose range is not limited.
         duration: s.
-        seed: of the search.
+        noise: of the sensors, for which standard errors are predicted.
+        seed: of the search, and of the noise.
         progress: is told how many further ones of `TRIALS` motions were tried.
 
     Raises:
-        InputError: the duration is too short, the motion does not fit the robot, or no motion is feasible.
+        InputError: the duration is too short, or the robot cannot execute its own motion.
+        ImpossibleError: no excitation is feasible.
     """
     if not SHORTEST <= duration < np.inf:
         raise InputError.one(f"an excitation lasts at least {SHORTEST:g} s, not {duration:g} s")
-    compared = None if own is None else _steps(robot, own)
-    middle = None if compared is None else (compared.q.min(axis=0) + compared.q.max(axis=0)) / 2
-    bounds = allowed(robot, middle)
+    bounds = allowed(robot, None if own is None else _middle(executed(robot, own).q))
     designs = [Design(robot, bounds, duration, each) for each in FREQUENCIES if each * duration >= 1]
     information = Information(robot, [each.block for each in _examples(designs, seed)])
     found = search(designs, lambda member: information.worth(member.block), seed, progress)
     assert found is not None, "its first starts are the examples"
-    return _excitation(found, information, compared, bounds, seed)
+    return _excitation(found, information, own, bounds, noise, seed)
+
+
+def _middle(q: FloatArray) -> FloatArray:
+    """Of the range of each joint, (joints,)."""
+    middle: FloatArray = (q.min(axis=0) + q.max(axis=0)) / 2
+    return middle
 
 
 TRIALS = STARTS + STEPS
 """Motions that a plan tries."""
 
 
-def _steps(robot: Robot, own: Trajectory) -> Block:
-    """All that inverse dynamics finds along a motion."""
-    trajectory = fitted(robot, own)
-    return compute_block(robot, trajectory.block(0, trajectory.samples))
-
-
 def _examples(designs: list[Design], seed: int) -> list[Feasible]:
     """Members of the families.
 
     Raises:
-        InputError: none is feasible.
+        ImpossibleError: none is feasible.
     """
     random = np.random.default_rng(seed)
     found: list[Feasible] = []
@@ -101,12 +109,17 @@ def _examples(designs: list[Design], seed: int) -> list[Feasible]:
         if len(found) == EXAMPLES:
             break
     if not found:
-        raise InputError.one(f"no excitation is feasible: {'; '.join(sorted(obstacles))}")
+        raise ImpossibleError(*sorted(obstacles))
     return found
 
 
 def _excitation(
-    found: Found, information: Information, own: Block | None, bounds: Allowed, seed: int
+    found: Found,
+    information: Information,
+    own: Trajectory | None,
+    bounds: Allowed,
+    noise: Noise,
+    seed: int,
 ) -> Excitation:
     """What was found, checked by a run of its own."""
     design, trajectory, block = found.design, found.feasible.trajectory, found.feasible.block
@@ -118,12 +131,24 @@ def _excitation(
         trajectory=trajectory,
         report=run.report(),
         seed=seed,
-        conditions=information.conditions(block),
-        own_conditions={} if own is None else information.conditions(own),
-        gain=np.nan if own is None else information.of(block) - information.of(own),
+        noise=str(noise),
+        planned=_usefulness(information, design.robot, trajectory, noise, seed),
+        own=None if own is None else _usefulness(information, design.robot, own, noise, seed),
+        structural=information.structural,
         active=_active(design, block),
         assumptions=bounds.assumptions,
     )
+
+
+def _usefulness(
+    information: Information, robot: Robot, trajectory: Trajectory, noise: Noise, seed: int
+) -> Usefulness:
+    """What a motion tells, with standard errors unless it is too short for them."""
+    conditions = information.conditions(executed(robot, trajectory))
+    try:
+        return Usefulness(conditions, predicted_errors(robot, trajectory, noise, seed))
+    except InputError as error:
+        return Usefulness(conditions, reason=str(error))
 
 
 def _active(design: Design, block: Block) -> tuple[ActiveLimit, ...]:

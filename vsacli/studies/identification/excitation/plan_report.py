@@ -16,6 +16,7 @@ from vsacli.base.tables import aligned
 from vsacli.base.texts import sentence
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.allowed import MARGIN
+from vsacli.studies.identification.excitation.predicted_errors import Told
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -42,6 +43,24 @@ class ActiveLimit(Published):
 
 
 @dataclass(frozen=True)
+class Usefulness(Published):
+    """What a motion tells of the numbers of a robot.
+
+    Attributes:
+        conditions: of the equations of each joint's motors and springs by name of the joint, and of `links`;
+            columns divided by their norms.
+        numbers: with the standard errors that are predicted.
+        reason: why none are predicted, a clause; empty if they are.
+    """
+
+    conditions: Mapping[str, float]
+    numbers: tuple[Told, ...] = ()
+    reason: str = ""
+
+    shape: ClassVar = {**named("conditions", "numbers"), "reason?": "reason"}
+
+
+@dataclass(frozen=True)
 class Excitation(Published):
     """A motion and a stiffness profile by which the numbers of a robot can be identified.
 
@@ -49,12 +68,11 @@ class Excitation(Published):
         robot: for which it is.
         trajectory: the motion.
         report: of inverse dynamics along it.
-        seed: of the search that found it.
-        conditions: of the equations of each joint's motors and springs by name of the joint, and of `links`;
-            columns divided by their norms.
-        own_conditions: the same along the user's own motion; empty if there is none.
-        gain: logarithm of the factor by which standard errors are smaller than with the user's own motion, on
-            average; NaN if there is none, infinite if that leaves numbers that cannot be told apart.
+        seed: of the search that found it, and of the noise.
+        noise: for which standard errors are predicted, in words.
+        planned: what it tells.
+        own: what the user's own motion tells; None if there is none.
+        structural: what no motion of the robot tells apart, sentences.
         active: bounds that keep it from being larger.
         assumptions: what was assumed where the robot has no limits.
     """
@@ -63,46 +81,72 @@ class Excitation(Published):
     trajectory: Trajectory
     report: Report = field(repr=False)
     seed: int
-    conditions: Mapping[str, float]
-    own_conditions: Mapping[str, float]
-    gain: float
+    noise: str
+    planned: Usefulness
+    own: Usefulness | None
+    structural: tuple[str, ...]
     active: tuple[ActiveLimit, ...]
     assumptions: tuple[str, ...]
 
     format: ClassVar[str] = "vsacli-excitation/1"
     shape: ClassVar = {
         "format": "format",
-        **named("seed", "conditions"),
-        "own_conditions?": "own_conditions",
-        "gain": "gain",
-        **named("active", "assumptions", "report"),
+        **named("seed", "noise", "planned"),
+        "own?": "own",
+        **named("structural", "active", "assumptions", "report"),
     }
 
     @property
     def condition(self) -> float:
         """The largest one."""
-        return max(self.conditions.values())
+        return max(self.planned.conditions.values())
 
     def __str__(self) -> str:
-        return "\n".join(self._lines())
+        return "\n".join(line.rstrip() for line in self._lines())
 
     def _lines(self) -> Iterator[str]:
         steps = f"{self.trajectory.samples} steps, {self.trajectory.duration:g} s"
-        yield f"{self.trajectory.name}: {steps}, {self.report.verdict}; seed {self.seed}"
-        yield from aligned(self._rows())
-        if not math.isnan(self.gain):
-            yield f"standard errors are {math.exp(self.gain):.3g} times smaller than with the motion given"
-        active = "; ".join(map(str, self.active)) or "no limit"
+        yield f"{self.trajectory.name}: {steps}, seed {self.seed}: {self.report.verdict.upper()}"
+        yield from aligned(self._conditions())
+        yield from aligned(self._numbers())
+        if any("*" in each.path for each in self.planned.numbers):
+            yield "* begins the name of a combination with parameters of other links."
+        yield sentence(f"+- are standard errors with noise of {self.noise}")
+        for whose, useful in (("the excitation", self.planned), ("the motion given", self.own)):
+            if useful is not None and useful.reason:
+                yield sentence(f"of {whose} none are predicted: {useful.reason}")
+        active = "; ".join(map(str, self.active)) or "none"
         yield sentence(f"limits that bind, {100 * MARGIN:g} % from their bounds: {active}")
+        yield from (sentence(f"no motion of this robot tells: {each}") for each in self.structural)
         yield from (sentence(f"note: {each}") for each in self.assumptions)
 
-    def _rows(self) -> list[tuple[str, ...]]:
-        own = self.own_conditions
-        header = ("equations of", "condition", *(["of the motion given"] if own else []))
+    def _conditions(self) -> list[tuple[str, ...]]:
+        own = None if self.own is None else self.own.conditions
+        header = ("equations of", "condition", *([] if own is None else ["motion given"]))
         return [
             header,
             *(
-                (name, f"{value:.1f}", *([f"{own[name]:.4g}"] if own else []))
-                for name, value in self.conditions.items()
+                (name, f"{value:.3g}", *([] if own is None else [f"{own[name]:.3g}"]))
+                for name, value in self.planned.conditions.items()
             ),
         ]
+
+    def _numbers(self) -> list[tuple[str, ...]]:
+        own = None if self.own is None else {each.path: each for each in self.own.numbers}
+        rows = [("number", "file", "+-", "share", *([] if own is None else ["+- motion given"]), "unit")]
+        for each in self.planned.numbers:
+            given = [] if own is None else [_error(own.get(each.path))]
+            rows.append((each.path, f"{each.value:.6g}", _error(each), _share(each), *given, each.unit))
+        return rows
+
+
+def _error(number: Told | None) -> str:
+    return "-" if number is None or math.isnan(number.standard_error) else f"{number.standard_error:.2g}"
+
+
+def _share(number: Told) -> str:
+    """Of the number, unless that is zero."""
+    if number.value == 0 or math.isnan(number.standard_error):
+        return "-"
+    share = number.standard_error / abs(number.value)
+    return f"{100 * share:.2g} %" if share < 1 else "> 100 %"

@@ -1,0 +1,81 @@
+"""`vsacli identify --plan`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say, tell
+
+if TYPE_CHECKING:
+    from vsacli.studies.identification.excitation import Noise
+
+USUAL_DURATION = 20.0
+"""s"""
+
+SHOWN_FROM = 1
+"""Motions tried from which on a progress bar is shown; each takes some 50 ms."""
+
+
+def plan(
+    robot_path: str,
+    own_paths: Sequence[str],
+    *,
+    duration: float,
+    noise: tuple[float, ...] | None,
+    seed: int,
+    output: str | None,
+    as_json: bool,
+    overwrite: bool,
+    talk: Talk,
+) -> int:
+    """Plan an excitation, beside a trajectory of the user's if there is one, and write it."""
+    from vsacli.base.outputs import Outputs
+    from vsacli.robot.file import load_robot
+    from vsacli.studies.identification.excitation import (
+        TRIALS,
+        ImpossibleError,
+        excitation_text,
+        plan_excitation,
+    )
+    from vsacli.trajectory.file import load_trajectory
+
+    sensors = _noise(noise)
+    robot = load_robot(robot_path)
+    own = load_trajectory(own_paths[0], robot) if own_paths else None
+    inputs = [*robot.sources, *(() if own is None else own.sources)]
+    with Outputs(overwrite=overwrite, inputs=[source.path for source in inputs]) as outputs:
+        file = None if output is None else outputs.file(Path(output))
+        try:
+            with talk.progress(TRIALS, shown_from=SHOWN_FROM, label="searching") as progress:
+                found = plan_excitation(
+                    robot, own, duration=duration, noise=sensors, seed=seed, progress=progress.update
+                )
+        except ImpossibleError as error:
+            tell(f"{robot.name}: no excitation is feasible: {error}")
+            return Exit.VERDICT
+        if file is not None:
+            with file.opened() as stream:
+                stream.write(excitation_text(found))
+    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    talk.wrote(outputs)
+    if output is None:
+        talk.note("the excitation was not written; name a file for it: -o excitation.yaml")
+    return EXIT_OF_VERDICT[found.report.verdict]
+
+
+def _noise(given: tuple[float, ...] | None) -> Noise:
+    """Of the sensors."""
+    from vsacli.studies.identification.excitation import USUAL_NOISE, Noise
+
+    if given is None:
+        return USUAL_NOISE
+    if len(given) > len(Noise._fields) or not all(0 <= each < float("inf") for each in given):
+        raise click.BadParameter(
+            "expected RAD or RAD,NM: one for positions, one for motor torques", param_hint="--sensor-noise"
+        )
+    return Noise(*given)
