@@ -118,7 +118,7 @@ class TrajectoryFile:
             try:
                 _uniform_times(self.lasts * self.slow_down, self.rate)
             except InputError as error:
-                yield FieldProblem(("duration",), str(error))
+                yield FieldProblem(("duration" if self.slow_down == 1 else "slow_down",), str(error))
             else:
                 yield from self.problems_over(self.lasts)
 
