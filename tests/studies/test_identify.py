@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from samples.excited import TORQUE_NOISE, Excitation, Recorded, excited
 from samples.marks import slow_but
-from samples.shipped import shipped_robot
+from samples.shipped import shipped_robot, shipped_run
 
-from vsacli import identify
+from vsacli import identify, inverse_dynamics
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.motor_system import motor_systems
 from vsacli.studies.identification.solution import solution
@@ -170,3 +170,17 @@ def test_several_records_are_fitted_together_and_each_is_predicted_by_the_others
     assert all(
         0.5 < each.held_out / each.noise < 2 for system in together.systems for each in system.residuals
     )
+
+
+def test_joints_of_all_kinds_are_read_and_those_with_springs_found(tmp_path: Path) -> None:
+    """A motor that sets springs may turn far; a rigid joint has no equations but those of links."""
+    mixed, trajectory = shipped_run("mixed_3r", "mixed_3r")
+    run = inverse_dynamics(mixed, trajectory)
+    exact = Recorded(run.time, run.q, run.theta, run.tau_motor)
+    told = identify(mixed, exact.noisy(seed=7).write(tmp_path / "mixed.csv", mixed), fit=["motors"])
+    sprung = [joint.name for joint in mixed.joints if joint.actuator.sprung]
+    assert [system.title for system in told.systems] == sprung
+    assert told.verdict in ("ok", "untold")
+    serial, motion = ROBOTS["AwAS"]
+    record = excited(serial, motion).noisy(seed=8, torque=0.05).write(tmp_path / "awas.csv", serial)
+    assert identify(serial, record, fit=["motors", "joints.*.mechanism.k"]).verdict == "ok"

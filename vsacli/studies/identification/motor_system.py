@@ -72,9 +72,9 @@ def motor_systems(
         records: of its motion.
     """
     for index in joints:
-        if not robot.joints[index].actuator.sprung:
+        sought = unknowns(robot, index, fit) if robot.joints[index].actuator.sprung else ()
+        if not sought:
             continue
-        sought = unknowns(robot, index, fit)
         values = np.array([each.value for each in sought])
         slopes = [motor_equations(robot, index, sought, values, each).slopes for each in records]
         acts = np.any(np.concatenate(slopes) != 0, axis=0)

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from vsacli.base.units import time_text
+from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.record_columns import TORQUE, Column
 from vsacli.trajectory.recorded.faults import wraps
@@ -41,7 +42,7 @@ def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
         (column.name, clause)
         for column in columns
         if column.place[0] != TORQUE
-        for clause in _position_clauses(column, robot.joints[column.place[1]].is_revolute)
+        for clause in _position_clauses(column, robot)
     )
     for index, joint in enumerate(robot.joints):
         yield from _still([column for column in columns if column.place[1] == index], joint.name)
@@ -78,13 +79,16 @@ def _stamp_clauses(column: Column) -> Iterator[str]:
         )
 
 
-def _position_clauses(column: Column, turns: bool) -> Iterator[str]:
+def _position_clauses(column: Column, robot: Robot) -> Iterator[str]:
+    _, index, motor = column.place
+    turns = robot.joints[index].is_revolute
+    follows = motor is None or robot.joints[index].actuator.has(VARIABLES["phi"])[motor - 1]
     largest = float(np.max(np.abs(column.values), initial=0.0))
     jumps = wraps(column.values) if turns else None
     if jumps is not None:
         when = time_text(float(column.time[jumps.at]))
         yield f"jumps by 2 pi at t = {when}, a wrapped angle: unwrap it"
-    elif not column.has_unit and largest > (LARGEST_ANGLE if turns else LARGEST_TRAVEL):
+    elif follows and not column.has_unit and largest > (LARGEST_ANGLE if turns else LARGEST_TRAVEL):
         wrong, right = ("deg", "rad") if turns else ("mm", "m")
         yield (
             f"goes to {largest:.4g} {right}; is it in {wrong}? Write [{wrong}] after its name in the header, "
