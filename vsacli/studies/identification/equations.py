@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +24,8 @@ class Equations(NamedTuple):
             sample. Rows of one sample, whatever their groups, may have noise in common.
         errors: what independent errors of numbers that were found before change of `measured`, each by one
             standard error, (rows, errors); None if it does not depend on any.
-        noise: what noise of the positions, once more, changes of `measured` less `predicted`, (rows,), and of
-            `slopes`, (rows, unknowns); None if it is not known. See `with_noise`.
+        noise: gives what noise of the positions, once more, changes of `measured` less `predicted`, (rows,),
+            and of `slopes`, (rows, unknowns); None if that is not known. See `with_noise`.
     """
 
     measured: FloatArray
@@ -33,7 +34,7 @@ class Equations(NamedTuple):
     group: AnyArray
     sample: IndexArray
     errors: FloatArray | None = None
-    noise: tuple[FloatArray, FloatArray] | None = None
+    noise: Callable[[], tuple[FloatArray, FloatArray]] | None = None
 
 
 def with_noise(equations: Callable[[Signals], Equations], signals: Signals) -> Equations:
@@ -46,9 +47,14 @@ def with_noise(equations: Callable[[Signals], Equations], signals: Signals) -> E
     found = equations(signals)
     if signals.noise is None:
         return found
-    again = equations(disturbed(signals))
-    residuals = (each.measured - each.predicted for each in (again, found))
-    return found._replace(noise=(next(residuals) - next(residuals), again.slopes - found.slopes))
+
+    @cache
+    def noise() -> tuple[FloatArray, FloatArray]:
+        again = equations(disturbed(signals))
+        residuals = (each.measured - each.predicted for each in (again, found))
+        return next(residuals) - next(residuals), again.slopes - found.slopes
+
+    return found._replace(noise=noise)
 
 
 class System(NamedTuple):
@@ -63,8 +69,7 @@ class System(NamedTuple):
         record: of each row, (rows,).
         sample: of each row in its record, (rows,).
         errors: of what is measured, (rows, errors).
-        residual_noise: what noise of positions changes of the residual, (rows,).
-        slope_noise: and of the slopes, (rows, unknowns).
+        noise: gives what noise of positions changes of the residual, (rows,), and of the slopes.
     """
 
     measured: FloatArray
@@ -75,8 +80,7 @@ class System(NamedTuple):
     record: IndexArray
     sample: IndexArray
     errors: FloatArray
-    residual_noise: FloatArray
-    slope_noise: FloatArray
+    noise: Callable[[], tuple[FloatArray, FloatArray]]
 
     @classmethod
     def of(cls, records: Sequence[Equations]) -> System:
@@ -89,8 +93,13 @@ class System(NamedTuple):
         errors = [
             np.zeros((len(each.measured), 0)) if each.errors is None else each.errors for each in records
         ]
-        noise = [each.noise or (0 * each.measured, 0 * each.slopes) for each in records]
-        residual_noise, slope_noise = map(np.concatenate, zip(*noise, strict=True))
+
+        @cache
+        def noise() -> tuple[FloatArray, FloatArray]:
+            known = [each.noise() if each.noise else (0 * each.measured, 0 * each.slopes) for each in records]
+            of_residual, of_slopes = map(np.concatenate, zip(*known, strict=True))
+            return of_residual, of_slopes
+
         return cls(
             measured=measured,
             residual=measured - predicted,
@@ -100,8 +109,7 @@ class System(NamedTuple):
             record=np.repeat(np.arange(len(records)), rows),
             sample=sample,
             errors=np.concatenate(errors),
-            residual_noise=residual_noise,
-            slope_noise=slope_noise,
+            noise=noise,
         )
 
     def by_group(self, of_rows: FloatArray) -> FloatArray:

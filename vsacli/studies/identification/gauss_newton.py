@@ -16,8 +16,9 @@ STEPS = 50
 HALVINGS = 20
 """Times a step is halved at most, to a millionth: if even that gains nothing, none will."""
 
-ARRIVED = 0.01
-"""Length of a step, in standard errors, that is no longer worth going on."""
+ARRIVED = 0.1
+"""Length of a step, in standard errors, that is no longer worth going on: a hundredth of their square. With
+0.01, widths of friction that are hardly told took twice the steps."""
 
 
 def gauss_newton(

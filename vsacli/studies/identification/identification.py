@@ -224,7 +224,7 @@ def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequ
     """Of a motor's torque, over all records; of what springs carry, by the noise of positions."""
     words, joint = group.split(), group.rpartition(" ")[2]
     if words[0] != "motor":
-        noise = [each.noise[0][each.group == group] for each in equations if each.noise is not None]
+        noise = [each.noise()[0][each.group == group] for each in equations if each.noise is not None]
         return rms(np.concatenate(noise)) if noise else float("nan")
     motor = int(words[1]) - 1 if words[1].isdigit() else 0
     index = robot.joint_names.index(joint)

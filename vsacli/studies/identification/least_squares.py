@@ -139,7 +139,7 @@ def _weighted(system: System, noise: FloatArray, tolerance: float) -> Step:
     from scipy.linalg import solve_triangular
 
     weight = 1 / noise[system.group]
-    split = independence(system.slopes * weight[:, None], tolerance, system.slope_noise * weight[:, None])
+    split = independence(system.slopes * weight[:, None], tolerance, system.noise()[1] * weight[:, None])
     target = split.q.T @ (system.residual * weight)
     change = np.zeros(system.slopes.shape[1])
     change[split.kept] = solve_triangular(split.r, target) / split.scale[split.kept]
@@ -202,8 +202,9 @@ def _covariance(system: System, step: Step, left: FloatArray) -> FloatArray:
     split, weight = step.split, step.weight[:, None]
     of_scores = score_covariance(system, split.q, left * step.weight)
     of_errors = split.q.T @ (system.errors * weight)
-    of_slopes = system.slope_noise[:, split.kept] / split.scale[split.kept] * weight
-    of_residual = system.residual_noise - system.slope_noise @ step.change
+    of_residual, of_slopes = system.noise()
+    of_residual = of_residual - of_slopes @ step.change
+    of_slopes = of_slopes[:, split.kept] / split.scale[split.kept] * weight
     bias = solve_triangular(split.r, of_slopes.T @ (of_residual * step.weight), trans="T")
     of_scores = of_scores + of_errors @ of_errors.T + np.outer(bias, bias)
     half = solve_triangular(split.r, of_scores)
