@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -10,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 from subjects import chain, motion, seven_joints
-from timing import medians
+from timing import cpu_seconds, medians
 
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.model import Robot
@@ -37,25 +36,15 @@ class Growth(NamedTuple):
 def measure(repeats: int) -> Growth:
     """Time chains of each length at a fixed number of samples, and the 7R arm at each number of samples."""
     arm = seven_joints()
-    chains = {
-        joints: _cpu_seconds(chain(joints), SAMPLES_OF_CHAIN, max(1, 100 // joints)) for joints in JOINTS
-    }
-    arms = {samples: _cpu_seconds(arm, samples, max(1, 2_000 // samples)) for samples in SAMPLES}
+    chains = {joints: _recursion(chain(joints), SAMPLES_OF_CHAIN, max(1, 100 // joints)) for joints in JOINTS}
+    arms = {samples: _recursion(arm, samples, max(1, 2_000 // samples)) for samples in SAMPLES}
     turns = 4 * repeats  # short ones, so that every length meets the machine's slow seconds
     return Growth(_by_number(chains, turns), _by_number(arms, repeats))
 
 
-def _cpu_seconds(robot: Robot, samples: int, rounds: int) -> Callable[[], float]:
-    """One evaluation in seconds of processor time, which other programs do not count in; mean of rounds."""
+def _recursion(robot: Robot, samples: int, rounds: int) -> Callable[[], float]:
     moving = motion(len(robot.joints), samples)
-
-    def way() -> float:
-        begin = time.process_time()
-        for _ in range(rounds):
-            link_torques(robot, *moving)
-        return (time.process_time() - begin) / rounds
-
-    return way
+    return cpu_seconds(lambda: link_torques(robot, *moving), rounds)
 
 
 def _by_number(ways: Mapping[int, Callable[[], float]], repeats: int) -> dict[int, float]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from commands import PEAK_MEMORY
 from stages import trajectory_of
 from subjects import chain, seven_joints
-from timing import Seconds, medians
+from timing import Seconds, cpu_seconds, medians
 
 from vsacli import inverse_dynamics, sensitivity
 from vsacli.studies.sensitivities.parameters import parameters
@@ -41,8 +41,8 @@ def compare(repeats: int) -> Sensitivities:
     """Time both over the same samples in turn."""
     robot, trajectory = seven_joints(), trajectory_of(SAMPLES)
     ways = {
-        INVERSE_DYNAMICS: lambda: inverse_dynamics(robot, trajectory),
-        SENSITIVITY: lambda: sensitivity(robot, trajectory),
+        INVERSE_DYNAMICS: cpu_seconds(lambda: inverse_dynamics(robot, trajectory)),
+        SENSITIVITY: cpu_seconds(lambda: sensitivity(robot, trajectory)),
     }
     memory = {joints: _peak_memory(joints) for joints in (len(robot.joints), LONG_CHAIN)}
     return Sensitivities(len(parameters(robot)), medians(ways, repeats), memory)

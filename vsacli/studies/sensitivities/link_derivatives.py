@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, by_joint
-from vsacli.compute.duals import Dual, tangents_of
+from vsacli.compute.duals import tangents_of
 from vsacli.compute.vector import Scalar
 from vsacli.dynamics.chain import Chain
 from vsacli.dynamics.elastic_torques import LinkTorques
@@ -74,11 +74,11 @@ def _mixed(plain: Chain, carrying: Chain, joint: int | None) -> Chain:
 
 
 def _derivatives(torques: Sequence[Scalar], places: Sequence[int], samples: int) -> FloatArray | None:
-    if not any(isinstance(torque, Dual) for torque in torques):
+    tangents = [tangents_of(torque) for torque in torques]
+    if not any(tangents):
         return None
     derivatives = np.zeros((len(places), len(torques), samples))
-    for order, torque in enumerate(torques):
-        tangents = tangents_of(torque)
+    for order, by_place in enumerate(tangents):
         for row, place in enumerate(places):
-            derivatives[row, order] = tangents.get(place, 0.0)
+            derivatives[row, order] = by_place.get(place, 0.0)
     return derivatives
