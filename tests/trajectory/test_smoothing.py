@@ -9,6 +9,7 @@ from samples.noisy_records import (
     COLOURS,
     FILTERED,
     MOTIONS,
+    Record,
     first_order,
     pauses,
     random_motion,
@@ -372,6 +373,25 @@ def test_a_bandwidth_says_which_lines_are_noise():
     for bandwidth, lines in ((8.0, ()), (None, (15,))):
         fit = fit_samples(of.time, shaken[None], 7, 4, SMOOTH, bandwidth=bandwidth)
         assert fit.parts[0].smoothing.lines.others == pytest.approx(lines, abs=0.1)
+
+
+@pytest.mark.parametrize("samples", [4001, 6001])
+def test_hum_of_mains_is_not_followed_where_knots_are_close_enough(samples):
+    """At 2 kHz there are four to a period, and two resolutions agree on it as on a motion."""
+    of = record(MOTIONS["velocity steps, 200 ms"], "hum of 50 Hz", 61, 2000)
+    of = Record(of.time[:samples], of.values[:samples], of.truth[:, :samples])
+    fit = fitted(of)
+    assert fit.parts[0].smoothing.lines.hum == pytest.approx([50], abs=0.1)
+    assert error(fit, of) < 0.5  # a thousand where it was followed
+
+
+def test_the_bias_is_measured_over_a_wide_band():
+    """Of this record that at the very cut-off is too small by chance: 65 % of the samples were right then."""
+    of = record(MOTIONS["random"], "zero-phase low-pass, 20 Hz", 60, 250)
+    fit = fitted(of)
+    inside = (of.time > 0.5) & (of.time < of.time[-1] - 0.5)
+    off = np.abs(fit.at(of.time, 5)[4, 0] - of.truth[1])
+    assert 0.85 < np.mean((off < 2 * np.sqrt(fit.covariance(of.time)[0, 4, 4]))[inside]) < 0.99
 
 
 def test_fitting_tells_how_far_it_is():

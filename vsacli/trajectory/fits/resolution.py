@@ -92,7 +92,12 @@ class Resolution(NamedTuple):
 
 
 def find_resolution(
-    time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
+    time: FloatArray,
+    row: FloatArray,
+    degree: int,
+    order: int,
+    known: KnownNoise,
+    below: float = np.inf,
 ) -> Resolution | None:
     """The first resolution that the next one confirms, or that of a given bandwidth.
 
@@ -105,6 +110,7 @@ def find_resolution(
         degree: of the spline.
         order: of the highest derivative that is needed.
         known: what need not be estimated, the deviation in units of the row.
+        below: a frequency in Hz that no resolution that is tried may follow.
 
     Returns:
         If none is confirmed, that with the least deviation among those close to the samples; None if there is
@@ -113,7 +119,7 @@ def find_resolution(
     if known.bandwidth is not None:
         return _given(time, row, degree, order, known)
     tried = []
-    for coarse, fine in pairwise(_models(_moments(time, row, degree), known)):
+    for coarse, fine in pairwise(_models(_moments(time, row, degree, below), known)):
         tried.append(_compared(time, row, coarse, fine, order))
         if tried[-1].accepted:
             return tried[-1]
@@ -136,12 +142,13 @@ def _given(
     return _compared(time, row, models[-1], models[-1], order)._replace(given=True)
 
 
-def _moments(time: FloatArray, row: FloatArray, degree: int) -> list[Moments]:
+def _moments(time: FloatArray, row: FloatArray, degree: int, below: float) -> list[Moments]:
     """Of the resolutions that are tried, coarse to fine."""
     samples = len(time)
     spans = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
     most = max(samples // FEWEST_SAMPLES, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
-    doublings = int(np.log2(min(most, MOST_SPANS) // spans))
+    slower = max(spans, 2 * below * float(time[-1] - time[0]))
+    doublings = int(np.log2(min(most, MOST_SPANS, slower) // spans))
     found = [Moments.of(time, row, BINS_PER_SPAN * spans * 2**doublings, degree)]
     for _ in range(doublings):
         found.append(found[-1].halved)

@@ -11,7 +11,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.calibration import calibrated, posterior_error
 from vsacli.trajectory.fits.cutoff import falls
 from vsacli.trajectory.fits.information import Posterior
-from vsacli.trajectory.fits.resolution import KnownNoise, find_resolution
+from vsacli.trajectory.fits.resolution import KnownNoise, Resolution, find_resolution
 from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding, spectral_lines
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def smoothing_spline(
         return None
     deviation = None if known.deviation is None else known.deviation / scale
     normal = known._replace(deviation=deviation)
-    found = find_resolution(time, (row - offset) / scale, degree, order, normal)
+    found = _found(time, (row - offset) / scale, degree, order, normal)
     if found is None:
         return None
     model, spline = found.model, found.model.spline
@@ -119,3 +119,16 @@ def smoothing_spline(
     spread = 0.0 if found.accepted or falls(model, order) else model.piece
     smoothing = Smoothing(deviations, relative, found.accepted, spread, lines, model.cautious, units)
     return BSpline(spline.t, scale * spline.c + offset, degree), smoothing
+
+
+def _found(
+    time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
+) -> Resolution | None:
+    """The resolution that the record asks for, and no mains hum, which a fine one follows like a motion."""
+    found = find_resolution(time, row, degree, order, known)
+    if found is None or found.given:
+        return found
+    spline = found.model.spline
+    size = float(np.sqrt(np.mean(spline(found.model.probes, nu=order) ** 2)))
+    hum = spectral_lines(time, spline(time)[:, 0], order, size).hum
+    return find_resolution(time, row, degree, order, known, min(hum)) if hum else found

@@ -1,0 +1,124 @@
+"""Print how right torques along noisy records are: `python tests/benchmarks/torques.py results.jsonl`.
+
+The tables of docs/recorded.md. Each record adds lines to the file as it is done, seeds one after the other;
+those that are there are not done again. All take an hour, `--records 1` minutes, `--records 0` no time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Iterator
+from itertools import groupby, product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # the samples of the tests
+
+from samples.noisy_records import COLOURS, MOTIONS
+from samples.recorded_torques import ARMS, Error, Outcome, outcomes
+
+FIRST_SEED = 70
+RATES = (250, 1000, 2000)
+"""Hz."""
+
+ALLOWED, FALSE = 0.1, 0.05
+"""Errors beyond which a run is wrong, and below which a doubt of it is a false alarm."""
+
+
+class Of(NamedTuple):
+    """What a record is made of."""
+
+    seed: int
+    rate: int
+    motion: str
+    colour: str
+
+
+Found = list[tuple[Of, Outcome]]
+
+
+def read(path: Path) -> Found:
+    """What was found before."""
+    lines = map(json.loads, path.read_text().splitlines() if path.exists() else [])
+    return [
+        (Of(*of), Outcome(**{**it, "torque": Error(*it["torque"]), "fourth": Error(*it["fourth"])}))
+        for of, it in lines
+    ]
+
+
+def run(path: Path, records: int) -> None:
+    """Add what is not there yet."""
+    done = {of for of, _ in read(path)}
+    seeds = range(FIRST_SEED, FIRST_SEED + records)
+    for of in (Of(*each) for each in product(seeds, RATES, MOTIONS, COLOURS)):
+        if of not in done:
+            found = outcomes(of.motion, of.colour, of.seed, of.rate)
+            lines = [json.dumps((of, each._asdict()), default=np.ndarray.item) + "\n" for each in found]
+            with path.open("a") as file:
+                file.writelines(lines)
+
+
+def percent(values: Iterable[float]) -> str:
+    """The largest; a dash if there is none."""
+    largest = max(values, default=np.nan)
+    return "-" if np.isnan(largest) else f"{100 * largest:.2g}"
+
+
+def judged(errors: list[float], doubted: list[bool]) -> str:
+    """Number, median and largest error, the largest without a doubt, doubts, and how many are false."""
+    passed = [error for error, doubt in zip(errors, doubted, strict=True) if not doubt]
+    false = sum(doubt and error < FALSE for error, doubt in zip(errors, doubted, strict=True))
+    typical = f"{100 * np.median(errors):.2g}, {percent(errors)}"
+    return f"{len(errors)} | {typical} | {percent(passed)} | {sum(doubted)} | {false}"
+
+
+def covered(errors: list[Error]) -> str:
+    """Share of the steps within two deviations, mean and least, in percent."""
+    shares = [100 * each.covered for each in errors if not np.isnan(each.covered)]
+    return f"{np.mean(shares):.0f} ({min(shares):.0f})" if shares else "-"
+
+
+def tables(found: Found) -> Iterator[str]:
+    """By motion and arm, and by colour."""
+    yield "| motion | of | records | median and largest error | without a doubt | doubted | false |"
+    yield "| --- " * 7 + "|"
+    for motion in MOTIONS:
+        of_motion = [each for of, each in found if of.motion == motion]
+        for arm in ARMS:
+            runs = [each for each in of_motion if each.arm == arm]
+            if runs:
+                doubted = [each.verdict != "ok" for each in runs]
+                yield f"| {motion} | {arm} | {judged([each.torque.size for each in runs], doubted)} |"
+        runs = of_motion[:: len(ARMS)]
+        if runs:
+            errors, warned = [each.fourth.size for each in runs], [each.warned for each in runs]
+            yield f"| {motion} | d4q | {judged(errors, warned)} |"
+    yield ""
+    yield f"| noise | d4q | {' | '.join(ARMS)} | runs wrong | runs right that are OK |"
+    yield "| --- " * (len(ARMS) + 4) + "|"
+    by_colour = sorted(found, key=lambda each: list(COLOURS).index(each[0].colour))
+    for colour, group in groupby(by_colour, key=lambda each: each[0].colour):
+        runs = [each for _, each in group]
+        errors = [[each.fourth for each in runs[:: len(ARMS)]]]
+        errors += [[each.torque for each in runs if each.arm == arm] for arm in ARMS]
+        right = [each.verdict == "ok" for each in runs if each.torque.size < FALSE]
+        wrong = sum(each.verdict == "ok" and each.torque.size > ALLOWED for each in runs)
+        yield f"| {colour} | {' | '.join(map(covered, errors))} | {wrong} | {100 * np.mean(right):.0f} % |"
+
+
+def main() -> None:
+    """Add records to a file, and print the tables of all that are in it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("results", type=Path, help="JSON lines, of each record and arm")
+    parser.add_argument("--records", type=int, default=5, help="of each motion, noise and rate")
+    given = parser.parse_args()
+    run(given.results, given.records)
+    sys.stdout.write("\n".join(tables(read(given.results))) + "\n")
+
+
+if __name__ == "__main__":
+    main()
