@@ -1,4 +1,4 @@
-"""Print how right torques along noisy records are: `python tests/benchmarks/torques.py results.jsonl`.
+"""Print how right d4q and torques of noisy records are: `python tests/benchmarks/torques.py results.jsonl`.
 
 The tables of docs/recorded.md. Each record adds lines to the file as it is done, seeds one after the other;
 those that are there are not done again. All take an hour, `--records 1` minutes, `--records 0` no time.
@@ -27,6 +27,10 @@ RATES = (250, 1000, 2000)
 
 ALLOWED, FALSE = 0.1, 0.05
 """Errors beyond which a run is wrong, and below which a doubt of it is a false alarm."""
+
+
+SMOOTH = tuple(MOTIONS)[:4]
+"""Motions without fast parts."""
 
 
 class Of(NamedTuple):
@@ -76,14 +80,33 @@ def judged(errors: list[float], doubted: list[bool]) -> str:
     return f"{len(errors)} | {typical} | {percent(passed)} | {sum(doubted)} | {false}"
 
 
+def cell(runs: list[Outcome]) -> str:
+    """Worst error of d4q, what deviations are stated, in percent, and how many are warned of."""
+    stated = [each.fourth.stated for each in runs if not np.isnan(each.fourth.stated)]
+    between = f"{100 * min(stated):.2g}-{percent(stated)}" if stated else "-"
+    warned = sum(each.warned for each in runs)
+    text = f"{percent(each.fourth.size for each in runs)} ({between})"
+    return f"{text} *w*{warned}/{len(runs)}" if warned else text
+
+
 def covered(errors: list[Error]) -> str:
     """Share of the steps within two deviations, mean and least, in percent."""
     shares = [100 * each.covered for each in errors if not np.isnan(each.covered)]
     return f"{np.mean(shares):.0f} ({min(shares):.0f})" if shares else "-"
 
 
-def tables(found: Found) -> Iterator[str]:
-    """By motion and arm, and by colour."""
+def of_derivatives(found: Found) -> Iterator[str]:
+    """Cells by noise and motion."""
+    yield f"| noise | {' | '.join(MOTIONS)} |"
+    yield "| --- " * (len(MOTIONS) + 1) + "|"
+    for colour in COLOURS:
+        of_colour = [each for each in found[:: len(ARMS)] if each[0].colour == colour]
+        runs = [[each for of, each in of_colour if of.motion == motion] for motion in MOTIONS]
+        yield f"| {colour} | {' | '.join(cell(each) if each else '' for each in runs)} |"
+
+
+def of_motions(found: Found) -> Iterator[str]:
+    """How right torques and d4q are, by motion and arm."""
     yield "| motion | of | records | median and largest error | without a doubt | doubted | false |"
     yield "| --- " * 7 + "|"
     for motion in MOTIONS:
@@ -97,15 +120,20 @@ def tables(found: Found) -> Iterator[str]:
         if runs:
             errors, warned = [each.fourth.size for each in runs], [each.warned for each in runs]
             yield f"| {motion} | d4q | {judged(errors, warned)} |"
-    yield ""
+
+
+def of_colours(found: Found) -> Iterator[str]:
+    """How right deviations and verdicts are, by noise."""
     yield f"| noise | d4q | {' | '.join(ARMS)} | runs wrong | runs right that are OK |"
     yield "| --- " * (len(ARMS) + 4) + "|"
     by_colour = sorted(found, key=lambda each: list(COLOURS).index(each[0].colour))
     for colour, group in groupby(by_colour, key=lambda each: each[0].colour):
-        runs = [each for _, each in group]
+        rows = list(group)
+        runs = [each for _, each in rows]
         errors = [[each.fourth for each in runs[:: len(ARMS)]]]
         errors += [[each.torque for each in runs if each.arm == arm] for arm in ARMS]
-        right = [each.verdict == "ok" for each in runs if each.torque.size < FALSE]
+        smooth = [each for of, each in rows if of.motion in SMOOTH]
+        right = [each.verdict == "ok" for each in smooth if each.torque.size < FALSE]
         wrong = sum(each.verdict == "ok" and each.torque.size > ALLOWED for each in runs)
         yield f"| {colour} | {' | '.join(map(covered, errors))} | {wrong} | {100 * np.mean(right):.0f} % |"
 
@@ -117,7 +145,9 @@ def main() -> None:
     parser.add_argument("--records", type=int, default=5, help="of each motion, noise and rate")
     given = parser.parse_args()
     run(given.results, given.records)
-    sys.stdout.write("\n".join(tables(read(given.results))) + "\n")
+    found = read(given.results)
+    for table in (of_derivatives, of_motions, of_colours):
+        sys.stdout.write("\n".join(table(found)) + "\n\n")
 
 
 if __name__ == "__main__":

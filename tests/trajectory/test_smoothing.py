@@ -300,7 +300,7 @@ def test_a_stiffness_with_filtered_noise():
 @pytest.mark.slow
 @pytest.mark.parametrize("colour", COLOURS)
 def test_no_record_is_wrong_in_silence(colour):
-    """A part of the table of the documentation, which tests/benchmarks/derivatives.py makes."""
+    """A part of the tables of the documentation, which tests/benchmarks/torques.py makes."""
     shown = []
     for motion in (sines, pauses, sweep):
         of = record(motion, colour, 300)

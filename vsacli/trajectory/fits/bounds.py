@@ -17,6 +17,10 @@ CAUTION = 3.2
 minimum jerk or steps of velocity within 50 and 200 ms, and twelve colours of noise, torques that were wrong
 by more than 5 % were so by up to 6.2 times as much: twice this deviation is a little more."""
 
+SMOOTH_CAUTION = 1.6
+"""The same if the spectrum of the highest derivative falls, so that it has no impulses. With steps of
+velocity within 200 ms d4q was off by 0.75 to 1.3 times what resolutions differ by."""
+
 SHORTEST_IMPULSE = 5e-4
 """Duration, s, of an impulse of the highest derivative, as where jerk jumps: the current of a motor hardly
 follows faster."""
@@ -52,7 +56,8 @@ class Unresolved:
         probes = np.linspace(*part.inside, PROBES)
         found = np.sqrt(np.mean(self._of_posterior(probes)[-1, -1]))
         size = np.sqrt(np.mean(part.spline(probes, nu=orders - 1) ** 2, axis=0))
-        self._units: FloatArray = CAUTION * known.relative * size / found
+        caution = CAUTION if known.spread else SMOOTH_CAUTION
+        self._units: FloatArray = caution * known.relative * size / found
         self._impulses: FloatArray = IMPULSES * np.sqrt(known.spread / SHORTEST_IMPULSE) * size
 
     def covariance(self, time: FloatArray) -> FloatArray:
