@@ -111,8 +111,11 @@ def _still(columns: Sequence[Column], joint: str) -> Iterator[str]:
 
 
 def _doubtful_clauses(column: Column) -> Iterator[str]:
-    yield from (clause for _, clause in column_faults(column.time, column.time, column.values))
-    if column.place[0] == TORQUE:
+    is_torque = column.place[0] == TORQUE
+    inner = slice(1, -1) if is_torque else slice(None)  # dry friction jumps where a motion begins and ends
+    time, values = column.time[inner], column.values[inner]
+    yield from (clause for _, clause in column_faults(time, time, values))
+    if is_torque:
         yield from _cut(column)
 
 

@@ -12,9 +12,10 @@ from vsacli.dynamics.inverse import compute_block, fitted
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.bandwidth import bandwidth_of
 from vsacli.studies.identification.excitation.design import RATE
-from vsacli.studies.identification.identification import WORDS, numbers_of, solutions
+from vsacli.studies.identification.identification import WORDS, solutions
 from vsacli.studies.identification.identification_report import Number
 from vsacli.studies.identification.signals import Signals, conditioned
+from vsacli.studies.identification.system_reports import numbers_of
 from vsacli.studies.identification.unknowns import with_friction
 from vsacli.trajectory.trajectory import Trajectory
 
