@@ -12,6 +12,7 @@ from samples.marks import slow_but
 from samples.shipped import shipped_robot, shipped_run
 
 from vsacli import identify, inverse_dynamics
+from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.motor_system import motor_systems
 from vsacli.studies.identification.solution import solution
@@ -170,6 +171,13 @@ def test_several_records_are_fitted_together_and_each_is_predicted_by_the_others
     assert all(
         0.5 < each.held_out / each.noise < 2 for system in together.systems for each in system.residuals
     )
+
+
+def test_a_record_counts_once_whatever_its_files_are_called(tmp_path: Path) -> None:
+    record = excited(joint(), JOINT._replace(duration=12), 5).noisy(5)
+    paths = [record.write(tmp_path / name, joint()) for name in ("one.csv", "copy.csv")]
+    with pytest.raises(InputError, match=r"copy.csv: has the same numbers as .*one.csv, given before"):
+        identify(joint(), paths, fit=["springs"])
 
 
 def test_joints_of_all_kinds_are_read_and_those_with_springs_found(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from vsacli.studies.identification.identification_report import (
 from vsacli.studies.identification.link_system import LINKS, link_system
 from vsacli.studies.identification.motor_system import motor_systems
 from vsacli.studies.identification.record_doubts import model_doubts
-from vsacli.studies.identification.records import Record, complete_joints, read_record
+from vsacli.studies.identification.records import Record, check_distinct, complete_joints, read_record
 from vsacli.studies.identification.signals import Signals, conditioned
 from vsacli.studies.identification.solution import Solution, solution
 from vsacli.studies.identification.system_reports import system_report, torques
@@ -66,6 +66,7 @@ def identify(
         raise InputError.one("identification needs a record at least")
     check_fit(robot, fit, WORDS)
     records = [read_record(robot, path) for path in paths]
+    check_distinct(records)
     complete = {joint for record in records for joint in complete_joints(robot, record)}
     joints = [joint for joint in sorted(complete) if not robot.joints[joint].damper_at("transmission")]
     signals = [_conditioned(record, bandwidth) for record in records]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -87,6 +88,19 @@ def read_record(robot: Robot, path: str | Path) -> Record:
         unused=unused,
         doubts=tuple(doubts(columns)),
     )
+
+
+def check_distinct(records: Sequence[Record]) -> None:
+    """Refuse a record that is there twice: the same noise would seem to confirm itself.
+
+    Raises:
+        InputError: two have the same numbers, whatever their files are called.
+    """
+    for before, record in combinations(records, 2):
+        pairs = (before.q, record.q), (before.theta, record.theta), (before.tau_motor, record.tau_motor)
+        if all(np.array_equal(*pair, equal_nan=True) for pair in pairs):
+            message = f"has the same numbers as {before.path}, given before; a record counts once"
+            raise InputError.one(message, record.path)
 
 
 def _grid(columns: Sequence[Column]) -> FloatArray:
