@@ -35,7 +35,7 @@ def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> 
     """Differentiate (58)-(60) by numbers of a robot.
 
     Joint by joint, since links before it move alike whatever its numbers are, and since the derivatives of
-    a whole chain by all of them would not stay in the caches: at once they took a quarter longer.
+    a whole chain by all of them would not stay in the caches: at once they took a tenth longer.
 
     Args:
         robot: the robot.
