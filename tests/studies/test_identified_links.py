@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +24,9 @@ from vsacli import (
     load_trajectory,
 )
 from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
 from vsacli.studies.identification import fitted_text
-from vsacli.studies.identification.found_links import found_links
+from vsacli.studies.identification.found_links import doubts_of, found_links
 from vsacli.studies.identification.identification_report import OK
 from vsacli.studies.identification.inertial_parameters import parameters_of
 from vsacli.studies.identification.link_system import link_system
@@ -155,16 +156,46 @@ def test_a_robot_file_with_the_links_found_reads_back_as_these(tmp_path: Path) -
             assert found_ == pytest.approx(wanted, rel=1e-5, abs=1e-6)  # seven digits
 
 
+def written(robot: Robot, run: Result, joints: Sequence[str], folder: Path, **further: FloatArray) -> Path:
+    """A record of some joints as a file, with further columns."""
+    columns = {"time": run.time}
+    for name in joints:
+        at = robot.joint_names.index(name)
+        columns[f"{name}.q"] = run.q[:, at]
+        for motor in range(2):
+            columns[f"{name}.theta_{motor + 1}"] = run.theta[:, at, motor]
+            columns[f"{name}.tau_motor_{motor + 1}"] = run.tau_motor[:, at, motor]
+    columns |= further
+    file = folder / "record.csv"
+    table = np.column_stack(tuple(columns.values()))
+    np.savetxt(file, table, delimiter=",", header=",".join(columns), comments="")
+    return file
+
+
 def test_links_are_left_out_with_a_reason(tmp_path: Path) -> None:
     robot, trajectory = motion_of("RP", tmp_path)
     run = inverse_dynamics(robot, trajectory)
-    names = ("q", "theta_1", "theta_2", "tau_motor_1", "tau_motor_2")
-    of_slide = (run.q, *(run.theta[..., at] for at in range(2)), *(run.tau_motor[..., at] for at in range(2)))
-    table = np.column_stack((run.time, *(each[:, 1] for each in of_slide)))
-    file = tmp_path / "record.csv"
-    header = ",".join(("time", *(f"slide.{name}" for name in names)))
-    np.savetxt(file, table, delimiter=",", header=header, comments="")
-    found = identify(robot, file)
-    assert [system.title for system in found.systems] == ["slide"]
-    assert "links move each other, and the positions of arm were not recorded" in found.notes
-    assert found.fitted.joints[0].link == robot.joints[0].link
+    unknown = identify(robot, written(robot, run, ["slide"], tmp_path))
+    assert [system.title for system in unknown.systems] == ["slide"]
+    assert "links move each other, and the positions of arm were not recorded" in unknown.notes
+    assert unknown.fitted.joints[0].link == robot.joints[0].link
+    file = written(robot, run, robot.joint_names, tmp_path, fx=0 * run.time)
+    pushed = identify(robot, file)
+    assert [system.title for system in pushed.systems] == ["arm", "slide"]
+    sentence = "nothing is found of links while something acts on the end effector"
+    assert pushed.notes == (f"{file}: {sentence}",)
+    with pytest.raises(InputError, match=sentence):
+        identify(robot, file, ["links"])
+
+
+def test_forces_that_no_body_exerts_are_told(tmp_path: Path) -> None:
+    """A slide that is drawn along wherever it accelerates has a negative mass, many errors below zero."""
+    robot, trajectory = motion_of("RP", tmp_path)
+    *_, links = solved(robot, measured(inverse_dynamics(robot, trajectory), seed=0))
+    place = links.system.names.index("slide.m")
+    lighter = links.fit.solution.copy()
+    lighter[place] = -0.5
+    bodies = found_links(robot, links._replace(fit=links.fit._replace(solution=lighter)))
+    assert not bodies.within
+    (sentence,) = doubts_of(bodies)
+    assert "no bodies have the base parameters found" in sentence

@@ -30,8 +30,8 @@ WEIGHT = 1e-2
 """Of the relative entropy beside squared standard errors of what was found: if bodies can have that, they do
 to less than this share of a standard error."""
 
-WITHIN = 2.0
-"""Standard errors that what was found may be off from what bodies have."""
+WITHIN = 3.0
+"""Standard errors that what was found may be off from that of bodies: of forty numbers one is beyond two."""
 
 LEAST_MASS = 1e-3
 """Mass of the body with which a link without one is compared, over that of the heaviest link."""
@@ -73,7 +73,7 @@ class ConsistentLinks(NamedTuple):
     """Links that are bodies.
 
     Attributes:
-        links: of all joints, base to tip.
+        links: of all joints, base to tip; none unless they are within errors of what was found.
         off: by how many standard errors each value that was found is off from theirs, (told,).
     """
 
@@ -98,7 +98,10 @@ def consistent_links(robot: Robot, told: Told) -> ConsistentLinks:
     root = np.asarray(np.linalg.cholesky(told.covariance + np.diag(errors**2)), dtype=np.float64)
     found = _nearest(_Problem.of(told, root, start), start)
     off = (told.shares @ found - told.values) / np.linalg.norm(root, axis=1)
-    return ConsistentLinks(tuple(map(link_of, found.reshape(-1, len(SYMBOLS)))), off)
+    nearest = ConsistentLinks((), off)
+    if not nearest.within:
+        return nearest  # they are next to no bodies: of the smallest mass, or flat
+    return nearest._replace(links=tuple(map(link_of, found.reshape(-1, len(SYMBOLS)))))
 
 
 def pseudo_inertia(parameters: FloatArray) -> FloatArray:
@@ -211,7 +214,10 @@ def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
     for _ in range(STEPS):
         gradient, hessian = problem.slopes(s, weight)
         scale: FloatArray = 1 / np.sqrt(np.diagonal(hessian))
-        step: FloatArray = -scale * np.linalg.solve(hessian * np.outer(scale, scale), scale * gradient)
+        try:
+            step: FloatArray = -scale * np.linalg.solve(hessian * np.outer(scale, scale), scale * gradient)
+        except np.linalg.LinAlgError:
+            break  # next to no bodies, and far from what was found
         decrement = math.sqrt(max(-float(gradient @ step), 0.0))
         if decrement <= ARRIVED:
             break

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vsacli.base.errors import InputError
+from vsacli.base.wrench import wrench_columns
 from vsacli.robot.model import Robot, check_robot
 from vsacli.studies.identification.bandwidth import bandwidth_of, bounds
 from vsacli.studies.identification.consistent_links import ConsistentLinks
@@ -25,7 +26,7 @@ from vsacli.studies.identification.identification_report import (
     Residual,
     SystemReport,
 )
-from vsacli.studies.identification.link_system import LINKS, link_system
+from vsacli.studies.identification.link_system import LINKS, link_system, without_links
 from vsacli.studies.identification.motor_system import motor_systems
 from vsacli.studies.identification.record_doubts import model_doubts
 from vsacli.studies.identification.records import Record, check_distinct, complete_joints, read_record
@@ -36,6 +37,11 @@ from vsacli.studies.identification.unknowns import FRICTION, GROUPS, check_fit, 
 
 WORDS = (*GROUPS, LINKS)
 """What users may ask for by a word."""
+
+FORCES = wrench_columns("wrench")
+"""Columns of what acts on the end effector."""
+
+PUSHED = "nothing is found of links while something acts on the end effector"
 
 ABOVE_NOISE, ABOVE_TORQUE = 2.0, 0.01
 """Residual over the noise, and over the torque, beyond both of which the equations do not hold: what is left
@@ -70,11 +76,14 @@ def identify(
     complete = {joint for record in records for joint in complete_joints(robot, record)}
     joints = [joint for joint in sorted(complete) if not robot.joints[joint].damper_at("transmission")]
     signals = [_conditioned(record, bandwidth) for record in records]
+    pushed = [each.path for each in records if LINKS in fit and not set(each.unused).isdisjoint(FORCES)]
+    fit = [word for word in fit if word != LINKS or not pushed]
     sought = with_friction(robot, joints) if FRICTION in fit else robot
     first = solutions(sought, joints, fit, signals)
+    notes = [*_notes(robot, joints, fit, signals), *(f"{path}: {PUSHED}" for path in pushed)]
     if not first:
-        reasons = "; ".join(_notes(robot, joints, fit, signals))
         nothing = "the joints that were recorded have nothing of what is to be found"
+        reasons = "; ".join(notes)
         raise InputError.one(f"{nothing}{reasons and f' ({reasons})'}")
     delays = [delay(first, each) for each in signals]
     late = any(each.matters(record.rate) for each, record in zip(delays, signals, strict=True))
@@ -89,7 +98,7 @@ def identify(
         verdict=_verdict(reports, used, links),
         records=used,
         systems=reports,
-        notes=(*_notes(robot, joints, fit, signals), *(() if links is None else doubts_of(links))),
+        notes=(*notes, *(() if links is None else doubts_of(links))),
         fitted=_fitted(robot, sought, reports, links),
         torques=tuple(torques(robot, found, records, signals)),
     )
@@ -124,26 +133,9 @@ def solutions(
         signals: records.
     """
     motors = [solution(system, signals) for system in motor_systems(robot, joints, fit, signals)]
-    if LINKS not in fit or _without_links(robot, joints, fit, signals):
+    if LINKS not in fit or without_links(robot, joints, fit, signals):
         return motors
     return [*motors, solution(link_system(robot, fit, motors), signals)]
-
-
-def _without_links(
-    robot: Robot, joints: Sequence[int], fit: Sequence[str], signals: Sequence[Signals]
-) -> str:
-    """Why nothing is found of the links, a sentence; empty if there is no reason."""
-    unknown = [np.isnan(each).any() for each in np.concatenate([record.q for record in signals]).T]
-    if any(unknown):
-        names = ", ".join(name for name, lacking in zip(robot.joint_names, unknown, strict=True) if lacking)
-        return f"links move each other, and the positions of {names} were not recorded"
-    if any(joint.damper for joint in robot.joints):
-        return "nothing is found of links while there are dampers, whose damping was not recorded"
-    rows = len(joints) * sum(len(each.time) // each.filter.stride for each in signals)
-    count = len(link_system(robot, fit, ()).names)
-    if rows <= count:
-        return f"{rows} equations are too few for the {count} numbers of the links; record for longer"
-    return ""
 
 
 def _aligned(signals: Signals, late: Delay) -> Signals:
@@ -192,7 +184,7 @@ def _notes(
         yield f"nothing was recorded of {', '.join(left)}"
     if damped:
         yield f"nothing is found of {', '.join(damped)}: what the damper beside the springs took is not known"
-    if LINKS in fit and (reason := _without_links(robot, joints, fit, signals)):
+    if LINKS in fit and (reason := without_links(robot, joints, fit, signals)):
         yield reason
 
 

@@ -109,3 +109,25 @@ def _found(numbers: Sequence[Parameter], motors: Solution) -> tuple[list[Paramet
     values = motors.predicting[springs]
     present = (numbers[at]._replace(value=float(value)) for at, value in zip(springs, values, strict=True))
     return list(present), axes * np.sqrt(np.maximum(powers, 0.0))
+
+
+def without_links(robot: Robot, joints: Sequence[int], fit: Sequence[str], records: Sequence[Signals]) -> str:
+    """Why nothing is found of the links, a sentence; empty if there is no reason.
+
+    Args:
+        robot: the robot.
+        joints: indices of those that were recorded.
+        fit: as of `link_system`.
+        records: of its motion.
+    """
+    positions = np.concatenate([each.q for each in records])
+    unknown = [name for name, q in zip(robot.joint_names, positions.T, strict=True) if np.isnan(q).any()]
+    if unknown:
+        return f"links move each other, and the positions of {', '.join(unknown)} were not recorded"
+    if any(joint.damper for joint in robot.joints):
+        return "nothing is found of links while there are dampers, whose damping was not recorded"
+    rows = len(joints) * sum(len(each.time) // each.filter.stride for each in records)
+    count = len(link_system(robot, fit, ()).names)
+    if rows <= count:
+        return f"{rows} equations are too few for the {count} numbers of the links; record for longer"
+    return ""

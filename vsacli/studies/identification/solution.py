@@ -114,12 +114,12 @@ def _equations(system: SystemOfEquations, records: Sequence[Signals], values: Fl
 
 
 def _bound(system: SystemOfEquations, number: int, value: float, error: float) -> Bound | None:
-    """What to set a number to; None if it may be what it came out as.
+    """What to set a number to; None if it may be what it came out as, or cannot be told and so stays.
 
     That is what the file says if the record does not contradict it.
     """
     nearest, before = system.admissible(number, value), float(system.before[number])
-    if nearest == value:
+    if nearest == value or math.isnan(error):
         return None
     if abs(value - before) <= CERTAIN * error:
         return Bound(before, error)

@@ -23,9 +23,7 @@ from vsacli.studies.identification.records import Record
 from vsacli.studies.identification.signals import Signals
 from vsacli.studies.identification.solution import Solution, held_out, rms
 from vsacli.studies.identification.torque_noise import torque_noise
-
-OF_JOINT = ".actuator."
-"""Of paths to numbers of a joint's motors and springs, what ends where they differ."""
+from vsacli.studies.sensitivities.parameters import JOINTS
 
 SMOOTH_CURVES = 8
 """Rows of figures to one of the equations, whose curves have corners."""
@@ -34,7 +32,8 @@ SMOOTH_CURVES = 8
 def system_report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemReport:
     """What a system told, and how well it holds."""
     system, fit = found.system, found.fit
-    names = [system.names[number].rpartition(OF_JOINT)[2] for number in found.free]
+    of_joint = f"{JOINTS}.{system.title}.actuator."
+    names = [system.names[number].removeprefix(of_joint) for number in found.free]
     combinations = [
         f"only {each.words(names)} can be told: {each.value:.6g} +- {each.standard_error:.2g}"
         for each in fit.inseparable
