@@ -84,6 +84,10 @@ def test_parts_make_the_same_table(vsacli: Any, grid: str, whole: Path) -> None:
     assert vsacli("study", "--merge", *parts, "-o", "whole.h5", "-q").code == 0
     assert content("whole.h5") == content(whole)
     assert vsacli("validate", "whole.h5", grid).code == 0
+    shown = vsacli("info", "whole.h5").out
+    assert shown.startswith("springs: 6 runs of vsa-3r: 4 ok, 2 infeasible\n")
+    assert f"\n{PATHS[0]}: 380 to 440 N m/rad, 3 values\n" in shown
+    assert vsacli("info", "whole.h5", "--field", "verdicts.ok").out == "4\n"
     lacking = vsacli("study", "--merge", *parts[:2], "-o", "lacking.h5")
     assert (lacking.code, lacking.err) == (2, "2 of 6 runs are in none of the files: 1, 4\n")
     Path(grid).write_text(Path(grid).read_text().replace("1000", "1100"))
@@ -148,7 +152,7 @@ def test_an_interrupted_study_goes_on(vsacli: Any, grid: str, whole: Path) -> No
         compute(load_study(grid), range(5), rows, 1, lambda _: None)
     journal.write_bytes(journal.read_bytes()[:-9])
     done = vsacli("study", grid)
-    assert done.err.splitlines() == [f"4 of 6 runs are in {journal.resolve()} already", "wrote study.h5"]
+    assert done.err.splitlines() == [f"4 of 6 runs are in {journal} already", "wrote study.h5"]
     assert content("study.h5") == content(whole)
     assert not journal.exists()
 

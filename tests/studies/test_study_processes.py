@@ -77,7 +77,7 @@ def test_a_study_that_is_killed_goes_on_to_the_same_table(tmp_path: Path) -> Non
         kept = journal.read_bytes().count(b"\n")
         assert not (tmp_path / "study.h5").exists()
     done = run(tmp_path)
-    assert f"{kept} of 60 runs are in {journal} already" in done.stderr
+    assert f"{kept} of 60 runs are in {journal.name} already" in done.stderr
     assert done.returncode == 0
     assert content(tmp_path / "study.h5") == content(tmp_path / "whole.h5")
     assert sorted(path.name for path in tmp_path.glob(".*")) == []

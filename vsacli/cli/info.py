@@ -50,7 +50,8 @@ def info(
     """Show what a FILE holds: a robot, a trajectory, a result or a simulation.
 
     Of a robot, Denavit-Hartenberg rows, links, actuators, reach, static load and reachable stiffness; of a
-    trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report.
+    trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report; of the table
+    of a study, what it found, provenance and what varies.
 
     With --cache, show where compiled code is kept and how much of it, and what interrupted commands have
     left, or others are still writing, in the folder FILE, by default this one, and in that for temporary

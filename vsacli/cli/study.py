@@ -98,8 +98,8 @@ def study(
     stem = Path(files[0]).stem + (f"-{part.number}-of-{part.parts}" if shard else "")
     path = Path(f"{stem}.h5" if output is None else output)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in found.sources]) as outputs:
-        target = outputs.check(path)
-        with Journal(target.with_name(f"{target.name}.journal")) as journal:
+        outputs.check(path)
+        with Journal(path.with_name(f"{path.name}.journal")) as journal:
             file = outputs.file(path)
             lost = _computed(found, part, journal, file, processes, talk)
             summary, failed = _shown(file, as_json)
@@ -107,8 +107,8 @@ def study(
     talk.wrote(outputs)
     if lost:
         talk.note(
-            f"{lost} runs were lost with their processes; all others are in {journal.path}, and the same "
-            "command with --overwrite tries these again"
+            f"runs lost with their processes: {lost}; all others are in {journal.path}, and the same command "
+            "with --overwrite tries these again"
         )
     else:
         journal.remove()

@@ -16,6 +16,7 @@ from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.documents.paths import find
 from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.info.robot_info import describe_robot
+from vsacli.files.info.study_info import describe_study
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import open_stored
@@ -44,8 +45,10 @@ def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
         case FileKind.RESULT | FileKind.SIMULATION:
             with open_stored(path) as result:
                 return describe_result(result)
+        case FileKind.STUDY_TABLE:
+            return describe_study(path)
         case kind:
-            expected = "a robot, a trajectory, a result or a simulation"
+            expected = "a robot, a trajectory, a result, a simulation or the table of a study"
             raise InputError.one(f"is a file of the kind {kind.value}; expected {expected}", path)
 
 

@@ -12,6 +12,7 @@ from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
 from vsacli.base.units import DAMPING, POSITION, STIFFNESS, TORQUE
 from vsacli.documents.changes import written
+from vsacli.files.info.study_info import KIND, study_lines
 
 Description = Mapping[str, Any]
 
@@ -220,4 +221,5 @@ _RENDERERS: dict[str, Callable[[Description], Iterator[str]]] = {
     "result": _result,
     "simulation": _result,
     "cache": _cache,
+    KIND: study_lines,
 }

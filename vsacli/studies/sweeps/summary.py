@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vsacli.base.json_records import Published, named
+from vsacli.base.json_records import Stored, named
 from vsacli.results.store.stored_study import StoredStudy
 from vsacli.studies.sweeps.rows import FAILED
 
@@ -16,8 +16,12 @@ MOST_ERRORS = 3
 """Failed runs that the text names."""
 
 
+MOST_NUMBERS = 3
+"""That vary and are shown with a run; of more, the table tells."""
+
+
 @dataclass(frozen=True)
-class Failure(Published):
+class Failure(Stored):
     """A run that could not be computed: its number, and why."""
 
     run: int
@@ -25,7 +29,7 @@ class Failure(Published):
 
 
 @dataclass(frozen=True)
-class Extreme(Published):
+class Extreme(Stored):
     """The run in which the margin of a joint is smallest.
 
     Attributes:
@@ -42,7 +46,7 @@ class Extreme(Published):
 
 
 @dataclass(frozen=True)
-class StudySummary(Published):
+class StudySummary(Stored):
     """What a study found.
 
     Attributes:
@@ -84,7 +88,8 @@ class StudySummary(Published):
         counts = ", ".join(f"{count:,} {verdict}" for verdict, count in self.verdicts.items())
         lines = [f"{self.study}: {self.runs:,} runs of {self.robot}: {counts or 'none'}"]
         for each in self.worst:
-            at = ", ".join(f"{path} = {value}" for path, value in each.at.items())
+            few = each.at if len(each.at) <= MOST_NUMBERS else {}
+            at = ", ".join(f"{path} = {value}" for path, value in few.items())
             where = f"in run {each.run}{f' ({at})' if at else ''}"
             lines.append(f"{each.joint}: smallest margin {100 * each.margin:.3g} % {where}")
         lines += [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
