@@ -121,7 +121,8 @@ class Journal:
             KeyError: it is not.
         """
         start, size = self._places[key]
-        content = json.loads(os.pread(self._file, size, start)[_CHECK + 1 :])
+        os.lseek(self._file, start, os.SEEK_SET)
+        content = json.loads(os.read(self._file, size)[_CHECK + 1 :])
         values, curves = (np.frombuffer(base64.b64decode(content[name])) for name in _ARRAYS)
         return Row(run, key, content["verdict"], content["error"], values, curves)
 

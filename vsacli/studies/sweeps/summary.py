@@ -92,6 +92,11 @@ class StudySummary(Stored):
             at = ", ".join(f"{path} = {value}" for path, value in few.items())
             where = f"in run {each.run}{f' ({at})' if at else ''}"
             lines.append(f"{each.joint}: smallest margin {100 * each.margin:.3g} % {where}")
+        without = sum(self.verdicts.get(verdict, 0) for verdict in ("infeasible", "singular"))
+        if without:
+            lines.append(
+                f"infeasible or singular steps in {without:,} runs; peaks and energies there are NaN"
+            )
         lines += [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
         if len(self.failures) > MOST_ERRORS:
             lines.append(f"and {len(self.failures) - MOST_ERRORS:,} more failed, see error in the table")
@@ -113,7 +118,7 @@ def _worst(table: StoredStudy) -> list[Extreme]:
 def _shown(table: StoredStudy, row: int) -> dict[str, str]:
     """What a row has of what is not the same in all."""
     shown = {}
-    for path in table.parameters:
+    for path in (*table.parameters, "trajectory"):
         is_text = table.parameter_is_text(path)
         values = table.texts(path) if is_text else table.read(path).tolist()
         if len(set(values)) > 1:
