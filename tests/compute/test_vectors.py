@@ -12,7 +12,7 @@ from vsacli.compute.vector import Vector, cross
 A, B = Vector(Fraction(2), Fraction(3), Fraction(5)), Vector(Fraction(7), Fraction(-11), Fraction(13))
 
 
-@pytest.mark.parametrize("direction", product((0, 1, Fraction(-3, 4)), repeat=3))
+@pytest.mark.parametrize("direction", list(product((0, 1, Fraction(-3, 4)), repeat=3)))
 def test_of_a_product_along_a_direction_only_what_counts_is_computed(direction):
     along = Vector(*direction)
     found = cross(A, B, along=along)
