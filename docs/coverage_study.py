@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -66,10 +67,12 @@ def errors() -> Iterator[dict[str, float]]:
     for seed in range(RECORDS):
         rng = np.random.default_rng(seed)
         q, stiffness = sines(time, "q", 5, rng), sines(time, "stiffness", 3, rng)
-        derivatives = dict(zip(DERIVATIVES, (*q[1:], *stiffness), strict=True))
+        derivatives: dict[str, Any] = dict(zip(DERIVATIVES, (*q[1:], *stiffness), strict=True))
         run = inverse_dynamics(robot, Trajectory.from_samples(time, q[0], **derivatives))
-        read = [exact + NOISE[name] * rng.normal(size=exact.shape) for name, exact in measured(run).items()]
-        signals = conditioned(time, *read, bandwidth=BANDWIDTH)
+        q_read, theta, torque = (
+            exact + NOISE[name] * rng.normal(size=exact.shape) for name, exact in measured(run).items()
+        )
+        signals = conditioned(time, q_read, theta, torque, BANDWIDTH)
         (system,) = motor_systems(robot, [0], GROUPS, [signals])
         fit = solution(system, [signals]).fit
         off = (fit.values - system.before) / fit.standard_errors
