@@ -33,6 +33,7 @@ from vsacli.studies.identification.link_system import link_system
 from vsacli.studies.identification.motor_system import motor_systems
 from vsacli.studies.identification.signals import Signals, conditioned
 from vsacli.studies.identification.solution import Solution, solution
+from vsacli.studies.identification.system_reports import numbers_of
 from vsacli.studies.identification.unknowns import GROUPS
 
 SEEDS = 20
@@ -103,16 +104,12 @@ def errors_of_base(links: Solution) -> FloatArray:
 
 
 def fitted(robot: Robot, found: list[Solution]) -> Robot:
-    """The robot with all that was found."""
-    numbers = {
-        name: float(value)
-        for each in found
-        for name, value, total in zip(each.system.names, each.predicting, each.system.sums, strict=True)
-        if not total
-    }
+    """The robot with all that was told."""
+    numbers = (number for each in found for number in numbers_of(each))
+    told = {each.path: each.value for each in numbers if each.told and not each.sum}
     bodies = found_links(robot, found[-1])
     assert bodies.within
-    robot = robot.replace(numbers)
+    robot = robot.replace(told)
     joints = map(lambda joint, link: dataclasses.replace(joint, link=link), robot.joints, bodies.links)
     return dataclasses.replace(robot, joints=tuple(joints))
 
