@@ -33,7 +33,7 @@ from vsacli.studies.identification.records import Record, check_distinct, comple
 from vsacli.studies.identification.signals import Signals, conditioned
 from vsacli.studies.identification.solution import Solution, solution
 from vsacli.studies.identification.system_reports import system_report, torques
-from vsacli.studies.identification.unknowns import FRICTION, GROUPS, check_fit, with_friction
+from vsacli.studies.identification.unknowns import FRICTION, GROUPS, SPRINGS, check_fit, with_friction
 
 WORDS = (*GROUPS, LINKS)
 """What users may ask for by a word."""
@@ -186,6 +186,8 @@ def _notes(
         yield f"nothing is found of {', '.join(damped)}: what the damper beside the springs took is not known"
     if LINKS in fit and (reason := without_links(robot, joints, fit, signals)):
         yield reason
+    elif LINKS in fit and SPRINGS not in fit and any(each.sprung for each in robot.actuators):
+        yield "links are found by springs as in the file, which are taken for exact"
 
 
 def _fitted(
