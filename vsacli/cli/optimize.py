@@ -30,7 +30,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 
 @click.command(
     "optimize",
-    short_help="Find the stiffness with which a motion costs least.",
+    short_help="Find the cheapest stiffness of a motion, or its fastest timing.",
     epilog=example(
         "vsacli optimize robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --minimize torque -o best.yaml"
     ),
@@ -40,17 +40,15 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 @set_option
 @click.option(
     "--minimize",
-    type=click.Choice(["torque", "energy", "copper", "peak"]),
+    type=click.Choice(["torque", "energy", "copper", "peak", "time"]),
     default="torque",
     show_default=True,
-    help="Rms of motor torques, energy that the motors spend, heat in their windings, peak of motor torques.",
+    help="Rms of motor torques, energy that motors spend, heat of their windings, peak of torques, duration.",
 )
 @click.option(
     "--vary",
-    type=click.Choice(["stiffness"]),
-    default="stiffness",
-    show_default=True,
-    help="What may change.",
+    type=click.Choice(["stiffness", "timing", "both"]),
+    help="What may change: by default the stiffness, for time the timing.",
 )
 @click.option(
     "--margin",
@@ -73,7 +71,7 @@ def optimize(
     trajectory: str,
     changes: tuple[str, ...],
     minimize: str,
-    vary: str,
+    vary: str | None,
     margin: float | None,
     output: str | None,
     seed: int,
@@ -81,7 +79,7 @@ def optimize(
     overwrite: bool,
     talk: Talk,
 ) -> Exit:
-    """Find the stiffness with which ROBOT executes the motion of TRAJECTORY at the least cost.
+    """Find the stiffness with which ROBOT executes TRAJECTORY at the least cost, or the fastest timing.
 
     Every step keeps the margin and all limits. What is found is a local optimum; the report says from how
     many starts the search came to it.
@@ -89,19 +87,19 @@ def optimize(
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.optimisation import SEARCHES, chosen_joints
     from vsacli.studies.optimisation import optimize as optimized
+    from vsacli.studies.optimisation import searches
     from vsacli.studies.remedies import Remedy, check_fixed_target, write_fixed
 
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
             check_fixed_target(output, outputs)
-        searches = SEARCHES * len(chosen_joints(inputs.robot))
-        with talk.progress(searches, shown_from=0, label="searching") as progress:
+        steps = searches(inputs.robot, minimize)
+        with talk.progress(steps, shown_from=0, label="searching") as progress:
             found = optimized(
                 *inputs,
                 minimize,
-                vary,
+                vary or ("timing" if minimize == "time" else "stiffness"),
                 margin=NEAR_SINGULAR_MARGIN if margin is None else margin,
                 seed=seed,
                 progress=progress.update,

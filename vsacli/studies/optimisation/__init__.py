@@ -1,6 +1,6 @@
-"""What is best among all that is possible: the stiffness with which a motion costs least."""
+"""What is best among all that is possible: the cheapest stiffness, the fastest timing."""
 
-from vsacli.studies.optimisation.optimise import SEARCHES, chosen_joints, optimize
+from vsacli.studies.optimisation.optimise import optimize, searches
 from vsacli.studies.optimisation.optimum import Optimum
 
-__all__ = ["SEARCHES", "Optimum", "chosen_joints", "optimize"]
+__all__ = ["Optimum", "optimize", "searches"]

@@ -51,7 +51,7 @@ class FixedMotion:
     @property
     def bound_names(self) -> list[str]:
         """What the first bounds are of, in words; those behind are of levels."""
-        limits = [check.flag.quantity_of(check.motor) for check in self._limits for _ in _finite_ends(check)]
+        limits = [check.flag.quantity_of(check.motor) for check in self._limits for _ in finite_ends(check)]
         return ["lower end of the corridor", "upper end of the corridor", *limits]
 
     @property
@@ -84,12 +84,12 @@ class FixedMotion:
         """How far the motors are beyond their limits, relative to these."""
         of_joint: Mapping[str, Any] = driven.arrays()
         for check in self._limits:
-            for sign, bound in _finite_ends(check):
+            for sign, bound in finite_ends(check):
                 size = abs(bound) or 1.0
                 yield sign * (check.values(of_joint) - bound) / size + CLEARANCE
 
 
-def _finite_ends(check: LimitCheck) -> Iterator[tuple[float, float]]:
+def finite_ends(check: LimitCheck) -> Iterator[tuple[float, float]]:
     """The ends of a range that bound anything, each with the direction that is outside."""
     yield from ((sign, end) for sign, end in zip((-1.0, 1.0), check.range, strict=True) if np.isfinite(end))
 

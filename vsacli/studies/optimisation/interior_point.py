@@ -8,7 +8,7 @@ its problem is solved well enough (Waechter & Biegler, Mathematical Programming 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
@@ -31,8 +31,11 @@ CENTRED = 10.0
 SAFEGUARD = 1e5
 """Factor by which products may be off at all: Waechter's equation 16, with less freedom."""
 
-FOUND = 1e-5
-"""What may be left to gain, gap and Newton step together, at a minimum."""
+FOUND = 100.0
+"""Multiples of the last gap that may be left to gain, gap and Newton step together, at a minimum."""
+
+PATIENCE, STALLED = 8, 1e-5
+"""Steps that together lower the cost by less than this share of it, after which bounds are too curved."""
 
 TO_BOUNDARY = 0.995
 """Share of the way to where a bound or a multiplier vanishes that a step may go."""
@@ -84,23 +87,20 @@ class Minimum:
     Attributes:
         unknowns: (unknowns,).
         cost: there.
-        left: about how much is left to gain near by.
+        found: whether the conditions for a minimum hold, as well as was asked for.
     """
 
     unknowns: FloatArray = field(repr=False)
     cost: float
-    left: float
-
-    @property
-    def found(self) -> bool:
-        """Whether the conditions for a minimum hold."""
-        return self.left <= FOUND
+    found: bool
 
 
 def minimise(
     problem: Problem,
     start: FloatArray,
     gap: float = FIRST_GAP,
+    last: float = LAST_GAP,
+    stalled: float = STALLED,
     enough: Callable[[FloatArray], bool] = lambda _: False,
 ) -> Minimum:
     """Search from a start that keeps all bounds, none of them exactly.
@@ -109,27 +109,37 @@ def minimise(
         problem: cost and bounds of the order of one.
         start: (unknowns,).
         gap: what bounds may raise the cost by at the first barrier; `WARM_GAP` near a minimum.
+        last: the same at the last barrier.
+        stalled: share of the cost that some steps together must gain for the search to go on.
         enough: whether unknowns are good enough to end the search.
     """
     point, unknowns = problem.at(start), start
     count = max(len(point.bounds), 1)
     multipliers = gap / count / -point.bounds
+    costs = [point.cost]
     for _ in range(MOST_STEPS):
         newton = _Newton(point, multipliers)
         step = newton.step(gap / count)
-        while gap > LAST_GAP and step.gain <= NEARLY_SOLVED * gap and newton.centred(gap / count):
-            gap = max(min(0.2 * gap, gap**1.5), LAST_GAP)
+        while gap > last and step.gain <= NEARLY_SOLVED * gap and newton.centred(gap / count):
+            gap = max(min(0.2 * gap, gap**1.5), last)
             step = newton.step(gap / count)
-        ended = gap <= LAST_GAP and step.gain <= NEARLY_SOLVED * gap and newton.centred(gap / count)
-        share = (
-            None if ended or enough(unknowns) else _line_search(problem, point, unknowns, step, gap / count)
-        )
+        solved = gap <= last and step.gain <= NEARLY_SOLVED * gap and newton.centred(gap / count)
+        if solved or enough(unknowns) or _stalled(costs, stalled):
+            break
+        share = _line_search(problem, point, unknowns, step, gap / count)
         if share is None:
             break
         unknowns = unknowns + share * step.unknowns
         point = problem.at(unknowns)
         multipliers = _moved(multipliers, step.multipliers, gap / count / -point.bounds)
-    return Minimum(unknowns, point.cost, gap + step.gain)
+        costs.append(point.cost)
+    return Minimum(unknowns, point.cost, gap + step.gain <= FOUND * last)
+
+
+def _stalled(costs: Sequence[float], share: float) -> bool:
+    """Whether the last steps changed hardly anything."""
+    recent = costs[-PATIENCE - 1 :]
+    return len(recent) > PATIENCE and max(recent) - min(recent) < share * abs(recent[-1])
 
 
 class _Step(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from vsacli.dynamics.inverse import fitted
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.optimisation.criteria import CRITERIA, Criterion
-from vsacli.studies.optimisation.optimum import JointOptimum, Optimum
+from vsacli.studies.optimisation.optimum import JointOptimum, Optimum, TimingOptimum
 from vsacli.studies.optimisation.periods import periods, rests
+from vsacli.studies.optimisation.retimed import retimed
 from vsacli.studies.optimisation.spline_space import SplineSpace
 from vsacli.studies.optimisation.stiffness import Profile, StiffnessSearch
+from vsacli.studies.optimisation.timing import TimingSearch
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
@@ -30,6 +33,12 @@ from vsacli.studies.remedies.motions import Load
 from vsacli.studies.remedies.suggestions import Remedy
 from vsacli.studies.remedies.task import STEPS, Task
 from vsacli.trajectory.trajectory import Trajectory
+
+TIME, TIMING, BOTH = "time", "timing", "both"
+"""What is minimised, and what varies, where it is not the stiffness alone."""
+
+SLOWER, BETWEEN = (1.0, 1.0003, 1.001, 1.003), 10
+"""Factors of a slow-down after which a run confirms a pace, and one with so many times the steps."""
 
 SEARCHES = 10
 """Searches of a joint: a constant, some starts, finer and finer splines; not all of them may be needed."""
@@ -48,38 +57,119 @@ def optimize(
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Optimum:
-    """The stiffness profile with which a cost is least, within corridor and limits, for a motion as it is.
+    """The stiffness with which a motion costs least, or its fastest timing, within all limits.
 
-    The profile is four times continuously differentiable. Its first two derivatives vanish at both ends,
-    unless the motion repeats itself: then so does the profile. What is found is a local optimum.
+    A stiffness profile is four times continuously differentiable. Its first two derivatives vanish at both
+    ends, unless the motion repeats itself: then so does the profile. A timing passes the same path at another
+    pace. What is found is a local optimum.
 
     Args:
         robot: the robot.
         trajectory: for this robot.
         minimize: "torque" (rms of the motor torques), "energy" (that the motors spend), "copper" (heat in
-            their windings) or "peak" (of the motor torques), of each joint by itself.
-        vary: "stiffness".
+            their windings) or "peak" (of the motor torques), of each joint by itself; or "time".
+        vary: "stiffness"; for "time" it is "timing", or "both".
         margin: min(sigma - lower, upper - sigma)/sigma that every step shall have.
         seed: of the starts that are drawn.
-        progress: is told how many further searches are done, `SEARCHES` a joint.
+        progress: is told how many further searches are done, of those that `searches` tells.
 
     Raises:
-        InputError: the trajectory is not for the robot, or something that is needed is not given.
+        InputError: the trajectory is not for the robot, something that is needed is not given, or the two
+            words do not go together.
     """
     trajectory = fitted(robot, trajectory)
     check_near_singular(margin)
     refuse_damped_transmissions(robot, trajectory, "optimisations")
+    if minimize == TIME:
+        varied = varied_with_timing(robot, trajectory, vary)
+        what = Optimum(robot, trajectory.name, minimize, "duration", vary, margin)
+        return _fastest(what, trajectory, varied, seed, progress)
+    if vary != STIFFNESS.key:
+        raise InputError.one(f"{vary!r} varies for the sake of time; minimise {TIME!r}, or vary 'stiffness'")
     criterion = checked_criterion(robot, minimize)
-    what = (robot, trajectory.name, minimize, criterion.words, vary, margin)
+    what = Optimum(robot, trajectory.name, minimize, criterion.words, vary, margin)
+    return _cheapest(what, trajectory, criterion, seed, progress)
+
+
+def searches(robot: Robot, minimize: str) -> int:
+    """How many searches an optimisation may take."""
+    return SEARCHES if minimize == TIME else SEARCHES * len(chosen_joints(robot))
+
+
+def _cheapest(
+    what: Optimum,
+    trajectory: Trajectory,
+    criterion: Criterion,
+    seed: int,
+    progress: Callable[[int], object],
+) -> Optimum:
+    """The best stiffness of all joints, confirmed by a run."""
     for factor in STRICTER:
-        search = _Search(Acceptance(robot, factor * margin), trajectory, criterion, seed, progress)
+        search = _Search(Acceptance(what.robot, factor * what.margin), trajectory, criterion, seed, progress)
         try:
             joints, best = search.best()
         except ImpossibleError as error:
-            return Optimum(*what, {}, error.reasons)
-        if Task(Acceptance(robot, margin), trajectory).confirms(Remedy(0.0, robot, best)):
-            return Optimum(*what, joints, trajectory=best)
-    return Optimum(*what, {}, ("what keeps every limit at the steps exceeds one between them",))
+            return replace(what, reasons=error.reasons)
+        if _confirmed(what, best):
+            return replace(what, joints=joints, trajectory=best)
+    return replace(what, reasons=("what keeps every limit at the steps exceeds one between them",))
+
+
+def _fastest(
+    what: Optimum,
+    trajectory: Trajectory,
+    varied: Sequence[int],
+    seed: int,
+    progress: Callable[[int], object],
+) -> Optimum:
+    """The fastest pace, confirmed by a run, and by one with ten times as many steps."""
+    bar = _Countdown(progress)
+    search = TimingSearch(what.robot, trajectory, what.margin, varied, seed, bar.count)
+    try:
+        found = search.fastest()
+    except ImpossibleError as error:
+        return replace(what, reasons=error.reasons)
+    bar.finish()
+    name = as_name(f"{trajectory.name}-{TIME}")
+    for factor in SLOWER:
+        best, between = (
+            retimed(trajectory, found.slower(factor), found.stiffness, name, refined)
+            for refined in (1, BETWEEN)
+        )
+        if _confirmed(what, best) and _confirmed(what, between):
+            optimum = TimingOptimum(
+                before=trajectory.duration,
+                uniform=found.uniform,
+                after=best.duration,
+                found=found.found,
+                starts=found.starts,
+                agreeing=found.agreeing,
+                bounding=found.bounding,
+            )
+            return replace(what, timing=optimum, trajectory=best)
+    return replace(what, reasons=("what keeps every limit at some instants exceeds one between them",))
+
+
+def _confirmed(what: Optimum, trajectory: Trajectory) -> bool:
+    """Whether a run keeps margin and limits."""
+    task = Task(Acceptance(what.robot, what.margin), trajectory)
+    return task.confirms(Remedy(0.0, what.robot, trajectory))
+
+
+def varied_with_timing(robot: Robot, trajectory: Trajectory, vary: str) -> list[int]:
+    """The joints whose stiffness varies with the timing, by index.
+
+    Raises:
+        InputError: the timing of the motion cannot vary, or it is not what varies.
+    """
+    if vary not in (TIMING, BOTH):
+        raise InputError.one(f"time is what {TIMING!r} varies for, or {BOTH!r}, not {vary!r}")
+    if not rests(trajectory):
+        raise InputError.one(
+            f"{trajectory.name} begins or ends in motion, and another timing would change how fast; vary the "
+            "stiffness, or let it begin and end at rest, sinusoids by a ramp"
+        )
+    return chosen_joints(robot) if vary == BOTH else []
 
 
 def chosen_joints(robot: Robot) -> list[int]:

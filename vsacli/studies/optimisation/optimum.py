@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -42,17 +42,50 @@ class JointOptimum(Published):
 
 
 @dataclass(frozen=True)
+class TimingOptimum(Published):
+    """The fastest pace that was found along the path of a motion.
+
+    Attributes:
+        before: duration as commanded, s.
+        uniform: of the fastest motion that is slowed down or sped up as a whole, s; NaN if there is none.
+        after: of the best, s.
+        found: whether the conditions for a local optimum hold, to about a thousandth of the duration.
+        starts: with how many paces the search began.
+        agreeing: from how many of them it came to this optimum.
+        bounding: share of the path along each bound, by joint and name of the bound.
+    """
+
+    before: float
+    uniform: float
+    after: float
+    found: bool
+    starts: int
+    agreeing: int
+    bounding: dict[str, dict[str, float]]
+
+    def lines(self) -> Iterator[str]:
+        """The durations, and for each joint what holds it back."""
+        yield f"as commanded {self.before:.4g} s"
+        if not math.isnan(self.uniform):
+            yield f"fastest when slowed down or sped up as a whole {self.uniform:.4g} s"
+        than = "" if math.isnan(self.uniform) else f", {100 * (1 - self.after / self.uniform):.1f} % less"
+        yield f"{_search(self)}: {self.after:.4g} s{than}"
+        yield from (f"{name}: {_along(shares, 'path')}" for name, shares in self.bounding.items())
+
+
+@dataclass(frozen=True)
 class Optimum(Published):
     """The trajectory with which a cost is least, as far as was searched.
 
     Attributes:
         robot: the robot.
         asked: name of the trajectory that was to be improved.
-        minimised: what is least: torque, energy, copper or peak.
+        minimised: what is least: torque, energy, copper, peak or time.
         words: the same in words.
         varied: what was varied.
         margin: that every step has.
-        joints: by name; empty if nothing was found.
+        joints: by name; empty if nothing was found, and where the timing varies.
+        timing: None if it does not vary, or nothing was found.
         reasons: why nothing was found, in clauses.
         trajectory: the best; None if nothing was found.
     """
@@ -63,7 +96,8 @@ class Optimum(Published):
     words: str
     varied: str
     margin: float
-    joints: dict[str, JointOptimum]
+    joints: dict[str, JointOptimum] = field(default_factory=dict)
+    timing: TimingOptimum | None = None
     reasons: tuple[str, ...] = ()
     trajectory: Trajectory | None = field(default=None, repr=False)
 
@@ -74,6 +108,7 @@ class Optimum(Published):
         "trajectory": "asked",
         "possible": "possible",
         **named("minimised", "varied", "margin", "joints"),
+        "timing?": "timing",
         "reasons?": "reasons",
     }
 
@@ -97,8 +132,13 @@ class Optimum(Published):
             yield from (f"- {reason}" for reason in self.reasons)
             return
         yield title
+        if self.timing is not None:
+            yield from self.timing.lines()
+            return
         yield from aligned(list(self._rows()))
-        yield from (f"{name}: {_bounds(each)}; {_search(each)}" for name, each in self.joints.items())
+        yield from (
+            f"{name}: {_along(each.bounding, 'time')}; {_search(each)}" for name, each in self.joints.items()
+        )
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         yield ("joint", "as commanded", "best constant", "local optimum", "change")
@@ -115,14 +155,15 @@ def _change(before: float, after: float) -> str:
     return "-" if not before > 0 else f"{100 * (after / before - 1):+.1f} %"
 
 
-def _bounds(joint: JointOptimum) -> str:
+def _along(bounding: Mapping[str, float], whole: str) -> str:
+    """Along which bounds a joint runs, and for which share."""
     along = [
-        f"the {name} {'all' if share > FULL else f'{100 * share:.2g} %'} of the time"
-        for name, share in joint.bounding.items()
+        f"the {name} {'all' if share > FULL else f'{100 * share:.2g} %'} of the {whole}"
+        for name, share in bounding.items()
     ]
     return "inside all bounds" if not along else f"along {', '.join(along)}"
 
 
-def _search(joint: JointOptimum) -> str:
-    ended = "local optimum" if joint.found else "no local optimum, the search ended before"
-    return f"{ended}, from {joint.agreeing} of {joint.starts} starts"
+def _search(optimum: JointOptimum | TimingOptimum) -> str:
+    ended = "local optimum" if optimum.found else "no local optimum, the search ended before"
+    return f"{ended}, from {optimum.agreeing} of {optimum.starts} starts"

@@ -19,10 +19,13 @@ from vsacli.studies.optimisation.interior_point import minimise
 DIFFERENCE = 1e-6
 """Steps in the scale of a row by which exact gradients are differenced: half of the digits are left."""
 
+LEAST_CLEARANCE = 1e-5
+"""By which all bounds shall be kept at a start: the way out of a corner is long."""
+
 LEAST_RELIEF = 1e-3
 """By which bounds, relative to them, are kept at a start, if they can be."""
 
-PULLS = (0.0, 1e-3, 1e-2, 0.1, 0.3, 1.0)
+PULLS = (0.0, 1e-3, 1e-2, 0.1, 0.3, 0.6, 1.0)
 """Shares of the way to a place inside, one of which leads inside."""
 
 TETHER = 1e-3
@@ -110,6 +113,7 @@ class _Expanded:
 
     def __init__(self, group: Group, unknowns: FloatArray) -> None:
         self.group, self.rows = group, group.rows(unknowns)
+        self._curved: FloatArray | None = None
         self.integrands, bounds = group.sampled(self.rows, group.instants)
         self.bounds = bounds._replace(gradients=np.where(group.there[:, None], bounds.gradients, 0.0))
 
@@ -129,7 +133,9 @@ class _Expanded:
 
     def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
         """See `Point.newton_matrix`; (own unknowns, own unknowns)."""
-        curved = self._curvature(self._of_all(multipliers))
+        if self._curved is None:  # asked for again where this is not positive definite
+            self._curved = self._curvature(self._of_all(multipliers))
+        curved = self._curved
         if convex:
             values, vectors = np.linalg.eigh(curved)
             curved = np.einsum("iab,ib,icb->iac", vectors, np.maximum(values, 0.0), vectors)
@@ -234,11 +240,16 @@ def interior(
 
     On the way to a place inside, if one is known; else the largest bound is lowered until it is negative.
     """
+    kept = None
     for share in PULLS:
         pulled = wanted if inside is None else wanted + share * (inside - wanted)
         _, bounds = problem.values(pulled)
-        if np.isfinite(bounds).all() and bounds.max(initial=-1.0) < 0:
-            return pulled
+        nearest = bounds.max(initial=-1.0) if np.isfinite(bounds).all() else np.inf
+        kept = pulled if nearest < 0 else kept
+        if nearest < -LEAST_CLEARANCE:
+            break
+    if kept is not None:
+        return kept
     if not np.isfinite(bounds).all():
         return None
     relieved = SeparableProblem([_relieved(group, pulled) for group in problem.groups])

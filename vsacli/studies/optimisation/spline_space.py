@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 DEGREE = 5
 
@@ -16,7 +20,7 @@ FLAT_ENDS = 2
 
 @dataclass(frozen=True, eq=False)
 class SplineSpace:
-    """The splines over a span that begin and end at rest, or repeat, or are constant.
+    """Splines over a span, all of them or those that begin and end at rest, or repeat, or are constant.
 
     Attributes:
         knots: (coefficients + 6,), s.
@@ -38,6 +42,12 @@ class SplineSpace:
         coefficients = pieces + DEGREE
         shape_of = np.clip(np.arange(coefficients) - FLAT_ENDS, 0, coefficients - 1 - 2 * FLAT_ENDS)
         return cls(knots, np.eye(shape_of[-1] + 1)[shape_of])
+
+    @classmethod
+    def free(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
+        """Splines of so many equal pieces, whatever they do at the ends."""
+        knots = cls.at_rest(span, pieces).knots
+        return cls(knots, np.eye(pieces + DEGREE))
 
     @classmethod
     def periodic(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
@@ -64,10 +74,14 @@ class SplineSpace:
 
     def basis(self, time: FloatArray, orders: int) -> FloatArray:
         """The shapes and their derivatives, (orders, instants, shapes)."""
+        every = self.spline(np.eye(self.size))
+        return np.stack([every(time, nu=order) for order in range(orders)])
+
+    def spline(self, amounts: FloatArray) -> BSpline[np.float64]:
+        """The spline of so much of each shape, (shapes, ...)."""
         from scipy.interpolate import BSpline
 
-        spline = BSpline(self.knots, self.shapes, DEGREE)
-        return np.stack([spline(time, nu=order) for order in range(orders)])
+        return BSpline(self.knots, self.shapes @ amounts, DEGREE)
 
     def fitted(self, time: FloatArray, values: FloatArray) -> FloatArray:
         """The amounts of the shapes with which they come nearest to values, (shapes,)."""

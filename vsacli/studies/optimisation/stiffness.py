@@ -171,7 +171,7 @@ class StiffnessSearch:
         every = np.arange(len(self._load.time))
         driven = self._whole.driven(space.basis(self._load.time, STIFFNESS.orders) @ amounts, every)
         size = self._criterion.size(self._joint, driven, self._load.time)
-        self._whole.scale = Scale(size, self._span[1] - self._span[0])
+        self._whole.scale = Scale(size, self._span[1] - self._span[0], self._criterion.smoothings[0])
 
     def _attempt(
         self, space: SplineSpace, pieces: int, start: FloatArray, nearby: _Attempt | None = None

@@ -1,0 +1,99 @@
+"""The fastest pace along a path: the chain rule, what is refused, and the paper's arm within 110 N m."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy
+from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
+
+from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
+from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, Speeds
+from vsacli.studies.optimisation.retimed import retimed
+from vsacli.studies.optimisation.spline_space import SplineSpace
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return load_robot(ROBOT)
+
+
+@pytest.fixture(scope="module")
+def motion(arm):
+    return load_trajectory(REST_TO_REST, arm)
+
+
+def test_rates_along_a_path_are_those_of_the_composition():
+    """Of sin(s) with s = t + t^2: the pace dt/ds and its derivatives by s, and what SymPy differentiates."""
+    t, s = sympy.symbols("t s", positive=True)
+    at = 0.7
+    time_of_s = (sympy.sqrt(1 + 4 * s) - 1) / 2
+    pace = [float(sympy.diff(time_of_s, s, order + 1).subs(s, at + at**2)) for order in range(PACE_ORDERS)]
+    by_s = [float(sympy.diff(sympy.sin(s), s, order).subs(s, at + at**2)) for order in range(5)]
+    rates = Speeds.of(pace).rates(by_s)
+    expected = [float(sympy.diff(sympy.sin(t + t**2), t, order).subs(t, at)) for order in range(5)]
+    np.testing.assert_allclose(rates, expected, rtol=1e-12)
+
+
+def test_a_pace_that_is_the_same_everywhere_stretches(motion):
+    space = SplineSpace.free((0.0, motion.duration), 4)
+    slower = retimed(motion, space.spline(np.full(space.size, 1.5)), {}, "slower")
+    there, expected = slower.block(0, slower.samples), motion.stretched(1.5).at(slower.times.block(0, 10**6))
+    for name, rows in expected.variables().items():
+        np.testing.assert_allclose(there.variables()[name], rows, rtol=1e-9, atol=1e-9)
+    assert slower.samples == motion.stretched(1.5).samples
+
+
+def test_what_has_no_timing_to_choose_is_refused(arm, motion):
+    moving = load_trajectory(REPOSITORY / "trajectories" / "rest_to_rest.yaml", arm)
+    with pytest.raises(InputError, match="time is what 'timing' varies for, or 'both', not 'stiffness'"):
+        optimize(arm, motion, "time", "stiffness")
+    with pytest.raises(InputError, match="'both' varies for the sake of time"):
+        optimize(arm, moving, "torque", "both")
+
+
+def test_a_motion_that_begins_on_its_way_keeps_its_timing(arm, tmp_path):
+    path = tmp_path / "swing.yaml"
+    path.write_text(
+        "format: vsacli-trajectory/1\nname: swing\nduration: 1\n"
+        "stiffness: {type: constant, value: 1000}\n"
+        "position: {type: sinusoids, frequency: 1, offset: 0, sine: [0.1]}\n"
+    )
+    with pytest.raises(InputError, match=r"swing begins or ends in motion.*sinusoids by a ramp"):
+        optimize(arm, load_trajectory(path, arm), "time", "timing")
+
+
+@pytest.mark.slow
+def test_the_papers_arm_is_faster_than_any_uniform_motion_and_keeps_its_torques_between_the_steps(
+    arm, motion
+):
+    limited = arm.replace({f"joints.{joint}.actuator.motor.max_torque": 110.0 for joint in range(3)})
+    found = optimize(limited, motion, "time", "timing")
+    assert found.timing.after < 0.9 * found.timing.uniform
+    assert (found.timing.agreeing, found.timing.starts) == (3, 3)
+    # The fastest uniform motion by itself: at its limit, and a little faster it is beyond.
+    for factor, kept in ((1.0001, True), (0.999, False)):
+        uniform = motion.stretched(factor * found.timing.uniform / motion.duration)
+        assert (inverse_dynamics(limited, uniform).report.verdict == "ok") == kept
+    fine = found.trajectory
+    between = np.linspace(0, fine.duration, 10 * (fine.samples - 1) + 1)
+    result = inverse_dynamics(arm, _sampled(fine, between))
+    # Between the steps the trajectory is a spline through them, good to 1e-6 of its fourth derivative.
+    assert np.abs(result.tau_motor).max() < 110 * 1.0001
+    assert min(joint.margin for joint in result.report.joints) >= 0.01
+
+
+def _sampled(trajectory, time):
+    from vsacli import Trajectory
+
+    motion = trajectory.at(trajectory.start + time)
+    rates = {name: getattr(motion, name) for name in ("dq", "ddq", "d3q", "d4q")}
+    return Trajectory.from_samples(
+        time,
+        motion.q,
+        motion.commanded["stiffness"],
+        **rates,
+        dstiffness=motion.commanded["dstiffness"],
+        ddstiffness=motion.commanded["ddstiffness"],
+        fit="interpolate",
+    )

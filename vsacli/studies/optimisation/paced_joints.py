@@ -1,0 +1,114 @@
+"""Bounds of joints along a path, as functions of the pace, and of their stiffness if that varies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.base.signals import STIFFNESS
+from vsacli.compute.duals import Dual
+from vsacli.dynamics.drive import Drive, driven_by
+from vsacli.dynamics.limits import limit_checks
+from vsacli.robot.joint import Joint
+from vsacli.studies.optimisation.fixed_motion import CLEARANCE, finite_ends
+from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, PacedMotion
+from vsacli.studies.sensitivities.implicit import ImplicitSolution
+from vsacli.studies.sensitivities.parameters import apart
+
+FASTEST = 0.02
+"""Least pace: fifty times as fast as commanded, more than which the units are more likely to be wrong."""
+
+NOT_OF_THE_PACE = ("q", "stiffness", "damping")
+"""Variables with limits that no pace changes."""
+
+
+class Pace:
+    """The `Functions` of the pace itself: time, and bounds on it.
+
+    Args:
+        held: where the motion rests on its way, (instants,): it shall not rest for a shorter time.
+        duration: by which time is scaled, s.
+    """
+
+    def __init__(self, held: BoolArray, duration: float) -> None:
+        self._held, self._duration = held, duration
+
+    def __call__(
+        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
+    ) -> tuple[list[Any], list[Any]]:
+        """Time, and how far the pace is below what it may be."""
+        least = np.where(self._held[instants], 1.0, FASTEST)
+        return [rows[0] / self._duration], [least - rows[0]]
+
+
+class PacedJoint:
+    """The `Functions` of the pace with its derivatives, and of a stiffness with its own if that varies.
+
+    Args:
+        motion: of all joints.
+        index: of the joint.
+        near_singular: the margin.
+    """
+
+    def __init__(self, motion: PacedMotion, index: int, near_singular: float) -> None:
+        self._motion, self._index, self._near_singular = motion, index, near_singular
+        self._joint = motion.robot.joints[index]
+        self._carrying = _made_to_carry(self._joint)
+        self._checks = [check for check in limit_checks(self._joint) if check.variable not in NOT_OF_THE_PACE]
+        self._chosen = STIFFNESS.key in self._joint.actuator.commanded
+
+    @property
+    def bounds(self) -> int:
+        """Number of bounds."""
+        return len(self.bound_names)
+
+    @property
+    def bound_names(self) -> list[str]:
+        """What each bound is of, in words."""
+        ends = ["lower end of the corridor", "upper end of the corridor"] if self._chosen else []
+        return ends + [
+            check.flag.quantity_of(check.motor) for check in self._checks for _ in finite_ends(check)
+        ]
+
+    def __call__(
+        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
+    ) -> tuple[list[Any], list[Any]]:
+        """No cost, and the bounds; see `Functions`."""
+        pace, stiffness = list(rows[:PACE_ORDERS]), list(rows[PACE_ORDERS:])
+        with np.errstate(all="ignore"):  # a step of the search may leave the corridor
+            command = self._motion.commands(pace, instants)[self._index]
+            if len(stiffness):
+                rates = self._motion.stiffness_rates(pace, stiffness)
+                asked = dict(zip(STIFFNESS.names, rates, strict=True))
+                command = command._replace(commanded={**command.commanded, **asked})
+            joint = self._carrying if isinstance(pace[0], Dual) else self._joint
+            driven = driven_by(joint, command, self._near_singular)
+            bounds = [*self._corridor(driven), *self._limits({**command.arrays(), **driven.arrays()})]
+        return [], bounds
+
+    def _corridor(self, driven: Drive) -> Iterator[Any]:
+        if self._chosen:
+            margin = self._near_singular
+            yield driven.stiffness_lower / ((1 - margin) * driven.stiffness) - 1 + CLEARANCE
+            unbounded = np.isinf(driven.stiffness_upper)
+            upper = np.where(unbounded, 1.0, driven.stiffness_upper) / ((1 + margin) * driven.stiffness)
+            yield np.where(unbounded, -1.0, 1 + CLEARANCE - upper)
+
+    def _limits(self, of_joint: Any) -> Iterator[Any]:
+        for check in self._checks:
+            for sign, bound in finite_ends(check):
+                size = abs(bound) or 1.0
+                yield sign * (check.values(of_joint) - bound) / size + CLEARANCE
+
+
+def _made_to_carry(joint: Joint) -> Joint:
+    """The joint with an actuator whose corridor and deflections carry derivatives, too."""
+    carrying = apart(joint)
+    directions = PACE_ORDERS + STIFFNESS.orders + joint.actuator.motor_count
+    if joint.actuator.sprung:
+        implicit = ImplicitSolution(joint.actuator, carrying.actuator, directions)
+        object.__setattr__(carrying.actuator, "solve", implicit.solve)
+    return carrying

@@ -1,0 +1,324 @@
+"""The pace along a path, and the stiffness if that varies, too, with which a motion takes the least time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray, evenly
+from vsacli.base.signals import STIFFNESS
+from vsacli.robot.model import Robot
+from vsacli.studies.optimisation.criteria import trapezoidal
+from vsacli.studies.optimisation.fixed_motion import CLEARANCE
+from vsacli.studies.optimisation.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimise
+from vsacli.studies.optimisation.paced_joints import FASTEST, Pace, PacedJoint
+from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, PacedMotion
+from vsacli.studies.optimisation.separable import Group, SeparableProblem, interior
+from vsacli.studies.optimisation.spline_space import SplineSpace
+from vsacli.studies.remedies.acceptance import ImpossibleError
+from vsacli.studies.remedies.nearest_spline import peaks
+from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+PIECES = (12, 24)
+"""Pieces of the splines, first with several starts, then finer."""
+
+INSTANTS_PER_PIECE = 12
+"""Instants of a piece at which bounds are kept, at least."""
+
+LOOKED_AT, FEW = 1000, 100
+"""Instants at which bounds are looked at to see where they are missed, and in a first look, at most."""
+
+SLOWEST, STRIDE = 1000.0, 1.1
+"""Factors of uniform slow-downs that are looked at: each so much larger than the one before."""
+
+HALVINGS = 16
+"""Halvings of the last stride: to 1e-6 of the factor."""
+
+SLACK = 1.02
+"""How much slower than the fastest uniform motion a search begins."""
+
+STIFFER = (1.0, 0.8, 1.5, 2.2)
+"""Multiples of the commanded stiffness to begin with, if it may vary."""
+
+DRAWN, LEVELS = 2, 6
+"""Paces that are drawn to begin with, and levels between which each of them is interpolated."""
+
+SLOWER = (0.0, 1e-5, 1e-4, 3e-4)
+"""By how much a motion may be slowed down so that it keeps all bounds between instants as well."""
+
+LAST_TIMING_GAP = 1e-4
+"""What bounds may raise the time by at the end, relative to a uniform motion: near them steps are short."""
+
+STALLED_TIMING = 3e-4
+"""Share of the time that some steps together must gain."""
+
+MOST_ROUNDS = 6
+"""Rounds of adding instants at which bounds are missed."""
+
+SAME_COST = 1e-2
+"""Relative difference of times up to which two starts came to the same optimum."""
+
+ACTIVE = 1e-3
+"""How near a bound, relative to it, a motion runs along it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pacing:
+    """A pace along the path of a trajectory.
+
+    Attributes:
+        pace: over the path, a spline whose argument is s.
+        stiffness: of each joint where it varies, by index, likewise.
+        duration: with that pace, s.
+        uniform: of the fastest motion that is passed uniformly slower or faster, s; NaN if there is none.
+        found: whether the conditions for a local optimum hold.
+        starts: from how many the search began.
+        agreeing: from how many it came to this optimum.
+        bounding: share of the path along each bound, by joint and name of the bound.
+    """
+
+    pace: BSpline[np.float64] = field(repr=False)
+    stiffness: dict[int, BSpline[np.float64]] = field(repr=False)
+    duration: float
+    uniform: float
+    found: bool
+    starts: int
+    agreeing: int
+    bounding: dict[str, dict[str, float]]
+
+    def slower(self, factor: float) -> BSpline[np.float64]:
+        """The pace, slower by a factor."""
+        from scipy.interpolate import BSpline
+
+        return BSpline(self.pace.t, factor * self.pace.c, self.pace.k)
+
+
+class _Spaces(NamedTuple):
+    """Splines of the pace, and of the stiffness of joints by index; their unknowns stand in this order."""
+
+    pace: SplineSpace
+    stiffness: dict[int, SplineSpace]
+
+    @classmethod
+    def of(cls, span: tuple[float, float], pieces: int, varied: Sequence[int]) -> _Spaces:
+        """With so many pieces each."""
+        at_rest = SplineSpace.at_rest(span, pieces)
+        return cls(SplineSpace.free(span, pieces), dict.fromkeys(varied, at_rest))
+
+    def parts(self) -> dict[int | None, tuple[SplineSpace, IndexArray]]:
+        """Space and places of unknowns, of the pace, None, and of joints."""
+        spaces: dict[int | None, SplineSpace] = {None: self.pace}
+        spaces.update(self.stiffness.items())
+        ends = np.cumsum([space.size for space in spaces.values()])
+        places = np.split(np.arange(ends[-1]), ends[:-1])
+        return {key: (space, own) for (key, space), own in zip(spaces.items(), places, strict=True)}
+
+    def fitted(self, s: FloatArray, pace: FloatArray, stiffness: Mapping[int, FloatArray]) -> FloatArray:
+        """Unknowns of what comes nearest to a pace and to stiffness, each (instants,)."""
+        wanted: dict[int | None, FloatArray] = {None: pace}
+        wanted.update(stiffness.items())
+        return np.concatenate([space.fitted(s, wanted[key]) for key, (space, _) in self.parts().items()])
+
+
+class TimingSearch:
+    """A search for the fastest pace along the path of a trajectory from rest to rest.
+
+    Args:
+        robot: the robot.
+        trajectory: the path.
+        near_singular: the margin that is kept.
+        varied: the joints whose stiffness varies as well, by index.
+        seed: of the starts that are drawn.
+        progress: called after each search.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        trajectory: Trajectory,
+        near_singular: float,
+        varied: Sequence[int],
+        seed: int,
+        progress: Callable[[], None],
+    ) -> None:
+        self._robot, self._varied, self._seed, self._progress = robot, varied, seed, progress
+        self._span = (0.0, trajectory.duration)
+        self._s = np.linspace(*self._span, min(2 * trajectory.samples - 1, LOOKED_AT))
+        self._motion = PacedMotion(robot, trajectory, self._s)
+        self._joints = [PacedJoint(self._motion, index, near_singular) for index in range(len(robot.joints))]
+        self._scale = trajectory.duration
+
+    def fastest(self) -> Pacing:
+        """The fastest pace that is found.
+
+        Raises:
+            ImpossibleError: none was found.
+        """
+        spaces = _Spaces.of(self._span, PIECES[0], self._varied)
+        uniform, begun = self._starts(spaces)
+        self._scale = uniform if math.isfinite(uniform) else self._scale
+        attempts = [self._attempt(spaces, PIECES[0], *start) for start in begun]
+        kept = [attempt for attempt in attempts if attempt is not None]
+        if not kept:
+            raise ImpossibleError("no pace that was tried keeps every limit, however slow")
+        best = min(kept, key=lambda minimum: minimum.cost)
+        agreeing = sum(minimum.cost <= (1 + SAME_COST) * best.cost for minimum in kept)
+        for pieces in PIECES[1:]:
+            finer = _Spaces.of(self._span, pieces, self._varied)
+            slower = self._in(finer, spaces, best.unknowns)
+            refined = self._attempt(finer, pieces, slower, slower)
+            if refined is None or refined.cost > best.cost:
+                break
+            spaces, best = finer, refined
+        return self._pacing(spaces, best, uniform, len(begun), agreeing)
+
+    def _starts(self, spaces: _Spaces) -> tuple[float, list[tuple[FloatArray, FloatArray]]]:
+        """The duration of the fastest uniform motion, and unknowns to begin with, each with some inside."""
+        asked = {joint: self._motion.stiffness(joint) for joint in self._varied}
+        begun, uniform = [], math.nan
+        generator = np.random.default_rng(self._seed)
+        places = np.linspace(*self._span, LEVELS)
+        for multiple in STIFFER if self._varied else STIFFER[:1]:
+            stiffness = {joint: multiple * row for joint, row in asked.items()}
+            factor = self._uniform(spaces, stiffness)
+            if factor is None:
+                continue
+            if multiple == 1:
+                uniform = factor * self._span[1]
+            inside = spaces.fitted(self._s, np.full_like(self._s, SLACK * factor), stiffness)
+            begun.append((inside, inside))
+            for _ in range(DRAWN if multiple == 1 else 0):
+                drawn = np.interp(self._s, places, generator.uniform(SLACK, 2.0, LEVELS))
+                begun.append((spaces.fitted(self._s, factor * drawn, stiffness), inside))
+        return uniform, begun
+
+    def _uniform(self, spaces: _Spaces, stiffness: Mapping[int, FloatArray]) -> float | None:
+        """The least pace that is the same everywhere and keeps all bounds; None if none does."""
+        few = self._groups(spaces, evenly(len(self._s), FEW))
+        every = self._groups(spaces, np.arange(len(self._s)))
+
+        def kept(groups: Sequence[Group], factor: float) -> bool:
+            unknowns = spaces.fitted(self._s, np.full_like(self._s, factor), stiffness)
+            _, bounds = SeparableProblem(groups).values(unknowns)
+            return bool(np.all(bounds < 0))
+
+        factor = FASTEST
+        while not (kept(few, SLACK * factor) and kept(every, factor) and kept(every, SLACK * factor)):
+            factor *= STRIDE
+            if factor > SLOWEST:
+                return None
+        refused = factor / STRIDE
+        for _ in range(HALVINGS):
+            middle = math.sqrt(refused * factor)
+            refused, factor = (refused, middle) if kept(every, middle) else (middle, factor)
+        return factor
+
+    def _in(self, finer: _Spaces, spaces: _Spaces, unknowns: FloatArray) -> FloatArray:
+        """The same in finer spaces, and a little slower, since the way out of a corner is long."""
+        rows = {
+            key: space.basis(self._s, 1)[0] @ unknowns[own] for key, (space, own) in spaces.parts().items()
+        }
+        pace = SLACK * rows.pop(None)
+        return finer.fitted(self._s, pace, {key: row for key, row in rows.items() if key is not None})
+
+    def _attempt(
+        self,
+        spaces: _Spaces,
+        pieces: int,
+        wanted: FloatArray,
+        inside: FloatArray,
+    ) -> Minimum | None:
+        """Search from what is wanted, with as many instants as it takes; None if nothing keeps all bounds."""
+        instants = evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
+        every, gap = self._groups(spaces, np.arange(len(self._s))), FIRST_GAP
+        for _ in range(MOST_ROUNDS):
+            problem = SeparableProblem(self._groups(spaces, instants))
+            begun = interior(problem, wanted, inside)
+            if begun is None:
+                return None
+            found, gap = minimise(problem, begun, gap, LAST_TIMING_GAP, STALLED_TIMING), WARM_GAP
+            self._progress()
+            kept = self._barely_slower(spaces, every, found)
+            if kept is not None:
+                return kept
+            bounds = [row for group in every for row in group.bounds(group.rows(found.unknowns))]
+            worst = np.concatenate([peaks(row - CLEARANCE) for row in bounds])
+            instants, wanted = np.union1d(instants, worst), found.unknowns
+        return None
+
+    def _barely_slower(self, spaces: _Spaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
+        """The same so little slower that all bounds are kept at every instant; None if that takes more."""
+        _, own = spaces.parts()[None]
+        for share in SLOWER:
+            unknowns = found.unknowns.copy()
+            unknowns[own] *= 1 + share
+            cost, bounds = SeparableProblem(every).values(unknowns)
+            if np.all(bounds <= CLEARANCE):
+                return replace(found, unknowns=unknowns, cost=cost)
+        return None
+
+    def _groups(self, spaces: _Spaces, instants: IndexArray) -> list[Group]:
+        """Time with the bounds of the pace, and the bounds of each joint, at some instants."""
+        parts, s = spaces.parts(), self._s[instants]
+        space, own = parts[None]
+        pace, sizes = space.basis(s, PACE_ORDERS), space.piece ** -np.arange(PACE_ORDERS, dtype=np.float64)
+        there = np.ones((1, len(s)), dtype=bool)
+        weights = trapezoidal(s)[None]
+        of_pace = Pace(self._motion.resting, self._scale)
+        groups = [Group(of_pace, instants, pace[:1], own, weights, there, sizes[:1])]
+        for index, joint in enumerate(self._joints):
+            basis, places, scales = pace, own, sizes
+            if index in spaces.stiffness:
+                of_joint, further = parts[index]
+                basis = block(pace, of_joint.basis(s, STIFFNESS.orders))
+                size = float(np.median(self._motion.stiffness(index)))
+                rates = size * of_joint.piece ** -np.arange(STIFFNESS.orders, dtype=np.float64)
+                places, scales = np.append(own, further), np.append(sizes, rates)
+            there = np.ones((len(joint.bound_names), len(s)), dtype=bool)
+            groups.append(Group(joint, instants, basis, places, np.zeros((0, len(s))), there, scales))
+        return groups
+
+    def _pacing(self, spaces: _Spaces, best: Minimum, uniform: float, starts: int, agreeing: int) -> Pacing:
+        parts = spaces.parts()
+        splines = {key: space.spline(best.unknowns[own]) for key, (space, own) in parts.items()}
+        pace = splines[None]
+        return Pacing(
+            pace=pace,
+            stiffness={key: spline for key, spline in splines.items() if key is not None},
+            duration=float(pace.integrate(*self._span)),
+            uniform=uniform,
+            found=best.found,
+            starts=starts,
+            agreeing=agreeing,
+            bounding=self._bounding(spaces, best.unknowns),
+        )
+
+    def _bounding(self, spaces: _Spaces, unknowns: FloatArray) -> dict[str, dict[str, float]]:
+        """Share of the path along each bound."""
+        _, *groups = self._groups(spaces, np.arange(len(self._s)))
+        found: dict[str, dict[str, float]] = {}
+        for joint, functions, group in zip(self._robot.joints, self._joints, groups, strict=True):
+            along = np.mean(group.bounds(group.rows(unknowns)) > -ACTIVE, axis=1)
+            shares: dict[str, float] = {}
+            for name, share in zip(functions.bound_names, along.tolist(), strict=True):
+                if share:
+                    shares[name] = shares.get(name, 0.0) + share
+            if shares:
+                found[joint.name] = shares
+        return found
+
+
+def block(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Two bases of rows with unknowns of their own as one, (rows, instants, unknowns)."""
+    rows, instants = len(first) + len(second), first.shape[1]
+    joined = np.zeros((rows, instants, first.shape[2] + second.shape[2]))
+    joined[: len(first), :, : first.shape[2]] = first
+    joined[len(first) :, :, first.shape[2] :] = second
+    return joined
