@@ -88,6 +88,8 @@ def test_parts_make_the_same_table(vsacli: Any, grid: str, whole: Path) -> None:
     assert shown.startswith("springs: 6 runs of vsa-3r: 4 ok, 2 infeasible\n")
     assert f"\n{PATHS[0]}: 380 to 440 N m/rad, 3 values\n" in shown
     assert vsacli("info", "whole.h5", "--field", "verdicts.ok").out == "4\n"
+    assert vsacli("info", "whole.h5", "--extract", "again").code == 0
+    assert {each.name for each in Path("again").iterdir()} == {"study.yaml", "arm.yaml", "move.yaml"}
     lacking = vsacli("study", "--merge", *parts[:2], "-o", "lacking.h5")
     assert (lacking.code, lacking.err) == (2, "2 of 6 runs are in none of the files: 1, 4\n")
     Path(grid).write_text(Path(grid).read_text().replace("1000", "1100"))

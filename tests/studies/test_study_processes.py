@@ -26,9 +26,9 @@ def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.slow
 def test_the_table_is_the_same_for_any_number_of_processes(tmp_path: Path) -> None:
     study(tmp_path, DRAWN)
-    for count in (1, 2, 3):
+    for count in (1, 2):
         assert run(tmp_path, "--processes", f"{count}", "-o", f"{count}.h5").returncode == 0
-    assert content(tmp_path / "1.h5") == content(tmp_path / "2.h5") == content(tmp_path / "3.h5")
+    assert content(tmp_path / "1.h5") == content(tmp_path / "2.h5")
 
 
 @pytest.mark.slow
@@ -65,7 +65,7 @@ def test_rows_that_were_lost_are_tried_again(tmp_path: Path, monkeypatch: pytest
 @pytest.mark.slow
 def test_a_study_that_is_killed_goes_on_to_the_same_table(tmp_path: Path) -> None:
     """Three times, at any moment, with all its processes."""
-    study(tmp_path, DRAWN.replace("samples: 6", "samples: 60"))
+    study(tmp_path, DRAWN.replace("samples: 6", "samples: 30"))
     assert run(tmp_path, "-o", "whole.h5", "--processes", "1").returncode == 0
     journal, kept = tmp_path / "study.h5.journal", 0
     for _ in range(3):
@@ -77,7 +77,7 @@ def test_a_study_that_is_killed_goes_on_to_the_same_table(tmp_path: Path) -> Non
         kept = journal.read_bytes().count(b"\n")
         assert not (tmp_path / "study.h5").exists()
     done = run(tmp_path)
-    assert f"{kept} of 60 runs are in {journal.name} already" in done.stderr
+    assert f"{kept} of 30 runs are in {journal.name} already" in done.stderr
     assert done.returncode == 0
     assert content(tmp_path / "study.h5") == content(tmp_path / "whole.h5")
     assert sorted(path.name for path in tmp_path.glob(".*")) == []

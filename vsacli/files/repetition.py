@@ -18,8 +18,10 @@ from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.base.streams import reading_copies
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Tell, unheard
+from vsacli.results.store import study_table
 from vsacli.results.store.inputs import StoredInput
-from vsacli.results.store.reader import StoredResult
+from vsacli.results.store.reader import StoredResult, stored_format
+from vsacli.results.store.stored_study import StoredStudy
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
 
@@ -136,12 +138,13 @@ class Extracted(NamedTuple):
 
 
 def extract(path: str | Path) -> Extracted:
-    """The inputs of a result.
+    """The inputs of a result, or of the table of a study.
 
     Raises:
-        InputError: it is no result, or does not hold one of them.
+        InputError: it is neither, or does not hold one of them.
     """
-    with StoredResult.open(path) as result:
+    stored = StoredStudy(path) if stored_format(path) == study_table.FORMAT else StoredResult.open(path)
+    with stored as result:
         inputs = result.inputs()
     missing = [each.path for each in inputs if each.content is None]
     if missing or not inputs:
