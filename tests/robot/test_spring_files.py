@@ -245,14 +245,20 @@ def test_table_is_among_the_inputs_of_the_result(vsacli, rig: Path):
     assert hashlib.sha256(content).hexdigest() in map(str, table.values())
 
 
+ROUGH = f"{DEFLECTIONS[3]:g},{1.001 * TORQUES[3]:.12g}"
+"""A row that the curve misses."""
+
+
 def test_misfit_is_a_warning_that_names_the_joint(vsacli, rig: Path):
+    (rig.parent / "spring.csv").write_text(rows(row_3=ROUGH))
     (warning,) = load_robot(rig).warnings
     assert warning.startswith(f"spring of joint swing: the curve through {rig.parent / 'spring.csv'} misses")
     assert "spring of joint swing: the curve through" in vsacli("check-feasibility", rig, "still.yaml").out
 
 
 def test_misfit_of_either_side_is_told(rig: Path):
-    (rig.parent / "other.csv").write_text(rows())
+    for name in ("spring.csv", "other.csv"):
+        (rig.parent / name).write_text(rows(row_3=ROUGH))
     both = "[{type: table, file: spring.csv}, {type: table, file: other.csv}]"
     rig.write_text(ROBOT.replace("SPRING", both))
     assert [Path(warning.split()[7]).name for warning in load_robot(rig).warnings] == [
@@ -265,5 +271,6 @@ def test_misfit_of_either_side_is_told(rig: Path):
 def test_shared_table_is_one_source(rig: Path):
     joint = ROBOT.split("joints:\n")[1]
     rig.write_text((ROBOT + joint.replace("swing", "turn")).replace("SPRING", TABLE))
+    (rig.parent / "spring.csv").write_text(rows(row_3=ROUGH))
     robot = load_robot(rig)
     assert len(robot.joints) == len(robot.warnings) == len(robot.sources) == 2
