@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from samples.studies import study
+from samples.command_line import edited
+from samples.studies import HEAD, study
 
+from vsacli.base.errors import InputError
 from vsacli.studies.sweeps import load_study
 
 ELBOW = "joints.elbow.link.mass"
@@ -72,6 +74,17 @@ vary:
     masses = np.floor(10 * (np.array([point[ELBOW] for point in points]) - 2))
     np.testing.assert_array_equal(np.sort(masses), np.arange(40))
     assert sorted(point["duration"] for point in points) == [each for each in "2345" for _ in range(10)]
+
+
+def test_what_is_drawn_about_a_value_of_trajectories_has_one(tmp_path: Path) -> None:
+    text = "method: random\nsamples: 2\nvary: {duration: {normal: 5 %}}\n"
+    path = study(tmp_path, text, HEAD.replace("move.yaml", "'m*.yaml'"))
+    (tmp_path / "more.yaml").write_text((tmp_path / "move.yaml").read_text())
+    found = load_study(path)
+    assert [found.point(run).values for run in (0, 1)] == [found.point(run).values for run in (2, 3)]
+    edited(tmp_path / "move.yaml", tmp_path / "more.yaml", ("duration: 4.0", "duration: 3.0"))
+    with pytest.raises(InputError, match=r"study.yaml:7: duration: .*differs between trajectories"):
+        load_study(path)
 
 
 def test_draws_depend_on_the_seed_alone(tmp_path: Path) -> None:

@@ -151,7 +151,11 @@ def _distributed(
         raise InputError.one(
             f"no number of robot or trajectory fits{did_you_mean(path, [each.path for each in numbers])}"
         )
-    for each in fitting:
+    for each in dict.fromkeys(fitting):
+        if any(other.path == each.path and other.value != each.value for other in fitting):
+            raise InputError.one(
+                f"{each.path} is not the same in all trajectories; list its values, or a range"
+            )
         tolerance = distribution(node, each.value, each.unit)
         if tolerance.size == 0:
             raise InputError.one(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import signal
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -126,7 +125,6 @@ def _work(connection: Connection, path: str, engine: str, fingerprint: str) -> N
     signal.signal(
         signal.SIGINT, signal.SIG_IGN
     )  # it goes to all processes of a terminal, and one ends the others
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     try:
         study = load_study(path, engine)
         if study.fingerprint != fingerprint:
