@@ -192,3 +192,27 @@ def test_joints_of_all_kinds_are_read_and_those_with_springs_found(tmp_path: Pat
     serial, motion = ROBOTS["AwAS"]
     record = excited(serial, motion).noisy(seed=8, torque=0.05).write(tmp_path / "awas.csv", serial)
     assert identify(serial, record, fit=["motors", "joints.*.mechanism.k"]).verdict == "ok"
+
+
+def test_a_wrong_zero_is_told_from_a_biased_torque(tmp_path: Path) -> None:
+    exact = excited(joint(), JOINT)
+    turned, biased = (
+        exact._replace(theta=exact.theta.copy()),
+        exact._replace(tau_motor=exact.tau_motor.copy()),
+    )
+    turned.theta[:, 0, 1] += 0.02
+    biased.tau_motor[:, 0, 0] -= 4
+    expected = {
+        ("motor 2 of base: a position off by", "as by a wrong zero of its encoder"): (turned, 0.02),
+        ("motor 1 of base: a torque off by", "would explain most"): (biased, -4.0),
+    }
+    for (start, end), (record, size) in expected.items():
+        path = record.noisy(seed=9).write(tmp_path / "record.csv", joint())
+        told = identify(joint(), path, fit=["springs", "motors"])
+        assert told.verdict == "misfit"
+        (note,) = told.notes
+        assert note.startswith(start)
+        assert end in note
+        off, _, error = note.removeprefix(start).split()[:3]
+        # of springs that are not linear, an error is found to first order
+        assert abs(float(off) - size) < 3 * float(error)

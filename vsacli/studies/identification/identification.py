@@ -28,6 +28,7 @@ from vsacli.studies.identification.identification_report import (
 )
 from vsacli.studies.identification.link_system import LINKS, link_system, without_links
 from vsacli.studies.identification.motor_system import motor_systems
+from vsacli.studies.identification.offsets import offsets
 from vsacli.studies.identification.record_doubts import model_doubts
 from vsacli.studies.identification.records import Record, check_distinct, complete_joints, read_record
 from vsacli.studies.identification.signals import Signals, conditioned
@@ -98,7 +99,11 @@ def identify(
         verdict=_verdict(reports, used, links),
         records=used,
         systems=reports,
-        notes=(*notes, *(() if links is None else doubts_of(links))),
+        notes=(
+            *notes,
+            *(() if links is None else doubts_of(links)),
+            *_explanations(robot, found, reports, signals),
+        ),
         fitted=_fitted(robot, sought, reports, links),
         torques=tuple(torques(robot, found, records, signals)),
     )
@@ -188,6 +193,15 @@ def _notes(
         yield reason
     elif LINKS in fit and SPRINGS not in fit and any(each.sprung for each in robot.actuators):
         yield "links are found by springs as in the file, which are taken for exact"
+
+
+def _explanations(
+    robot: Robot, found: Sequence[Solution], reports: Sequence[SystemReport], signals: Sequence[Signals]
+) -> Iterator[str]:
+    """What would explain what equations of motors leave, where that is too much."""
+    for system, report in zip(found, reports, strict=True):
+        if system.system.title in robot.joint_names and any(map(_fails, report.residuals)):
+            yield from offsets(robot, system, signals)
 
 
 def _fitted(
