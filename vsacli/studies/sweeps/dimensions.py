@@ -153,9 +153,7 @@ def _distributed(
         )
     for each in dict.fromkeys(fitting):
         if any(other.path == each.path and other.value != each.value for other in fitting):
-            raise InputError.one(
-                f"{each.path} is not the same in all trajectories; list its values, or a range"
-            )
+            raise InputError.one(f"{each.path} differs between trajectories; list its values, or a range")
         tolerance = distribution(node, each.value, each.unit)
         if tolerance.size == 0:
             raise InputError.one(
