@@ -6,6 +6,7 @@ from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from vsacli.studies.identification import Identification, identify
+    from vsacli.studies.identification.excitation import Excitation, excitation_text, plan_excitation
     from vsacli.studies.measured import Comparison, compare
     from vsacli.studies.optimisation import Optimum, optimize
     from vsacli.studies.remedies import suggest
@@ -13,12 +14,15 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Comparison",
+    "Excitation",
     "Identification",
     "Optimum",
     "Sensitivity",
     "compare",
+    "excitation_text",
     "identify",
     "optimize",
+    "plan_excitation",
     "sensitivity",
     "suggest",
 ]

@@ -49,7 +49,7 @@ def plan_excitation(
     own: Trajectory | None = None,
     *,
     duration: float = 20.0,
-    noise: Noise = USUAL_NOISE,
+    noise: tuple[float, float | None] = USUAL_NOISE,
     seed: int = 0,
     progress: Callable[[int], object] = lambda _: None,
 ) -> Excitation:
@@ -62,7 +62,9 @@ def plan_excitation(
         robot: with the numbers that are known so far.
         own: a motion to compare with, about whose middle joints move whose range is not limited.
         duration: s.
-        noise: of the sensors, for which standard errors are predicted.
+        noise: standard deviations of what sensors read, for which standard errors are predicted: of positions
+            of joints and motors, rad (m), and of motor torques, N m (N), joint side of the gears; None is
+            0.5 % of the largest torque of each motor.
         seed: of the search, and of the noise.
         progress: is told how many further ones of `TRIALS` motions were tried.
 
@@ -77,7 +79,7 @@ def plan_excitation(
     information = Information(robot, [each.block for each in _examples(designs, seed)])
     found = search(designs, lambda member: information.worth(member.block), seed, progress)
     assert found is not None, "its first starts are the examples"
-    return _excitation(found, information, own, bounds, noise, seed)
+    return _excitation(found, information, own, bounds, Noise(*noise), seed)
 
 
 def _middle(q: FloatArray) -> FloatArray:
