@@ -17,7 +17,7 @@ from vsacli.trajectory import file as trajectory_file
 
 
 def excitation_text(excitation: Excitation) -> str:
-    """The text of the file."""
+    """The trajectory file of a planned excitation, as text."""
     trajectory = excitation.trajectory
     profiles = {POSITION.key: trajectory.position}
     profiles |= {
