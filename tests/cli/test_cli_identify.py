@@ -65,6 +65,7 @@ def test_the_file_written_is_that_of_the_robot_found(vsacli: Command, record: Pa
         assert comment in text
 
 
+@pytest.mark.slow
 def test_figures_and_report(vsacli: Command, record: Path) -> None:
     found = vsacli("identify", ROBOT, record, *SPRINGS, "--plot", "figures")
     assert [path.name for path in Path("figures").iterdir()] == ["vsa_3r-1-record.png"]
@@ -73,6 +74,7 @@ def test_figures_and_report(vsacli: Command, record: Path) -> None:
     assert "filtered to " in found.out
 
 
+@pytest.mark.slow
 def test_what_cannot_be_told_is_exit_code_3(vsacli: Command, own_folder: Path) -> None:
     arm = load_robot(ROBOT)
     record = excited(arm, MOTION._replace(swing=[0] * 3)).noisy(seed=1).write(own_folder / "record.csv", arm)

@@ -83,7 +83,7 @@ def found(robot: Robot, record: Recorded) -> dict[str, tuple[float, float, float
     return told
 
 
-@pytest.mark.parametrize("name", slow_but(["3R"], ROBOTS))
+@pytest.mark.parametrize("name", slow_but(["AwAS"], ROBOTS))
 def test_springs_and_motors_come_out(name: str) -> None:
     robot, motion = ROBOTS[name]
     told = found(robot, excited(robot, motion).noisy(seed=1))
@@ -156,6 +156,7 @@ def test_late_torques_are_told_and_mended(tmp_path: Path) -> None:
     assert not any(number.changed for number in told.numbers if ".spring." in number.path)
 
 
+@pytest.mark.slow
 def test_several_records_are_fitted_together_and_each_is_predicted_by_the_others(tmp_path: Path) -> None:
     records = [
         excited(joint(), JOINT._replace(duration=12), seed)
@@ -180,6 +181,7 @@ def test_a_record_counts_once_whatever_its_files_are_called(tmp_path: Path) -> N
         identify(joint(), paths, fit=["springs"])
 
 
+@pytest.mark.slow
 def test_joints_of_all_kinds_are_read_and_those_with_springs_found(tmp_path: Path) -> None:
     """A motor that sets springs may turn far; a rigid joint has no equations but those of links."""
     mixed, trajectory = shipped_run("mixed_3r", "mixed_3r")
