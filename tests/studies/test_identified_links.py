@@ -195,4 +195,4 @@ def test_forces_that_no_body_exerts_are_told(tmp_path: Path) -> None:
     bodies = found_links(robot, links._replace(fit=links.fit._replace(solution=lighter)))
     assert not bodies.within
     (sentence,) = doubts_of(bodies)
-    assert "no bodies have the base parameters found" in sentence
+    assert "no bodies near the links of the file have the base parameters found" in sentence

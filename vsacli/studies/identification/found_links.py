@@ -42,6 +42,7 @@ def doubts_of(links: ConsistentLinks) -> Iterator[str]:
     if not links.within:
         off = np.abs(links.off).max()
         yield (
-            f"no bodies have the base parameters found: of the nearest ones some are {off:.2g} standard "
-            f"errors off, more than {WITHIN:g}, so the links stay as in the file; do forces act on the arm?"
+            "no bodies near the links of the file have the base parameters found: "
+            f"some are {off:.2g} standard errors off, more than {WITHIN:g}, so the links stay as they are; "
+            "do forces act on the arm?"
         )

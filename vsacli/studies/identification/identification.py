@@ -208,7 +208,7 @@ def _fitted(
     robot: Robot, sought: Robot, systems: Sequence[SystemReport], links: ConsistentLinks | None
 ) -> Robot:
     fitted = sought.replace({each.path: each.value for each in to_write(robot, systems)})
-    if links is None or not links.within:
+    if links is None or not links.links:
         return fitted
     joints = map(lambda joint, link: dataclasses.replace(joint, link=link), fitted.joints, links.links)
     return dataclasses.replace(fitted, joints=tuple(joints))
