@@ -30,7 +30,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 
 @click.command(
     "optimize",
-    short_help="Find the cheapest stiffness of a motion, or its fastest timing.",
+    short_help="Find the cheapest stiffness, or the fastest timing.",
     epilog=example(
         "vsacli optimize robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --minimize torque -o best.yaml"
     ),
