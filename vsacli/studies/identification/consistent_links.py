@@ -28,7 +28,7 @@ from vsacli.studies.identification.inertial_parameters import (
 
 WEIGHT = 1.0
 """Of the relative entropy beside half the squared standard errors of what was found: where a record tells
-little, links are rather an error off than far from the file's. With 0.01, short records left links of 141 kg."""
+little, links are rather an error off than far from the file's. With 0.01 a link came out with 141 kg."""
 
 WITHIN = 3.0
 """Standard errors that what was found may be off from that of bodies: of forty numbers one is beyond two."""
