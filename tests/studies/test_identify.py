@@ -218,3 +218,26 @@ def test_a_wrong_zero_is_told_from_a_biased_torque(tmp_path: Path) -> None:
         off, _, error = note.removeprefix(start).split()[:3]
         # of springs that are not linear, an error is found to first order
         assert abs(float(off) - size) < 3 * float(error)
+
+
+@pytest.mark.parametrize("torque", ["torques of shafts", "currents"])
+def test_records_may_be_of_the_other_side_of_the_gear(torque: str, tmp_path: Path) -> None:
+    ratio, constant = -50, 0.1
+    motor = {"inertia": 3.2 / ratio**2, "damping": 1e-4, "gear_ratio": ratio, "torque_constant": constant}
+    geared = joint({"joints.base.actuator.motor": motor})
+    record = excited(geared, JOINT).noisy(seed=10)
+    columns = {"time": record.time, "base.q [deg]": np.degrees(record.q[:, 0])}
+    for number in (1, 2):
+        columns[f"base.theta_shaft_{number}"] = ratio * record.theta[:, 0, number - 1]
+        on_shaft = record.tau_motor[:, 0, number - 1] / ratio
+        if torque == "currents":
+            columns[f"base.current_{number}"] = on_shaft / constant
+        else:
+            columns[f"base.tau_motor_shaft_{number} [mN m]"] = 1000 * on_shaft
+    path, header = tmp_path / "record.csv", ",".join(columns)
+    np.savetxt(path, np.column_stack(list(columns.values())), delimiter=",", header=header, comments="")
+    told = identify(geared, path, fit=["springs", "motors"])
+    assert told.verdict == "ok"
+    assert {number.path.rpartition(".")[2] for number in told.numbers} == {"inertia", "damping", "k", "k_c"}
+    for number in told.numbers:
+        assert abs(number.value - number.before) < 4 * number.standard_error
