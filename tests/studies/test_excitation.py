@@ -144,6 +144,7 @@ def test_what_a_robot_has_no_limit_of_is_said_with_what_was_assumed() -> None:
     assert found.assumptions == (
         "no limits.position (0.785 rad either way from zero assumed): elbow",
         "no limits.velocity (1 rad/s assumed): elbow",
+        "no limits.stiffness (at most 2 times the least assumed where springs set no end): elbow",
         "no max_torque of motors (none assumed): elbow",
     )
     motion = found.trajectory.at(np.linspace(0, 10, 999))

@@ -9,6 +9,7 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
@@ -95,5 +96,8 @@ def _lacking(joint: Joint, middle: str) -> Iterator[str]:
         yield f"limits.position ({reach})"
     if not np.isfinite(joint.limits.velocity).all():
         yield f"limits.velocity ({USUAL_SPEED[joint.type]:g} {velocity} assumed)"
+    if STIFFNESS.key in joint.actuator.commanded and not np.isfinite(joint.limits.stiffness[1]):
+        most = f"at most {USUAL_STIFFENING:g} times the least assumed where springs set no end"
+        yield f"limits.stiffness ({most})"
     if not all(np.isfinite(motor.max_torque) for motor in joint.actuator.motors):
         yield "max_torque of motors (none assumed)"
