@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, ROBOT, edited
+from samples.marks import slow
 
 from vsacli.documents.changes import read_changes
 from vsacli.robot.file import load_robot
@@ -82,7 +83,7 @@ def test_what_is_read_is_the_changed_file(own_folder: Path, motion: Path, case: 
     ("command", "told"),
     [
         ("check-feasibility", "rest-to-rest: 31 steps, 0.3 s"),
-        ("simulate", "rest-to-rest: feedforward, 0.3 s"),
+        slow("simulate", "rest-to-rest: feedforward, 0.3 s"),
         ("sensitivity --json", '"path": "joints.elbow.link.mass",\n   "value": 5.25,'),
     ],
 )
@@ -118,6 +119,7 @@ def test_paths_lead_into_the_file_as_it_is_written(own_folder: Path) -> None:
     assert load_robot(PANDA, {"joints.0.dh.d": 0.4}) == load_robot("high.yaml") != load_robot(PANDA)
 
 
+@pytest.mark.slow
 def test_a_file_in_a_value_lies_beside_the_document(vsacli: Any) -> None:
     Path("arms").mkdir()
     for name in ("measured_1r.yaml", "measured_spring.csv"):
@@ -180,6 +182,7 @@ def test_sides_that_differ_need_a_word_for_one(vsacli: Any, motion: Path) -> Non
     assert "its two sides differ; say which by 0, 1 or *" in refused.err
 
 
+@pytest.mark.slow
 def test_a_table_has_nothing_to_set(vsacli: Any, motion: Path) -> None:
     assert vsacli("invdyn", ROBOT, motion, "-o", "r.h5", "-q").code == 0
     assert vsacli("export", "r.h5", "--variables", "q,stiffness", "-o", "m.csv", "-q").code == 0

@@ -65,6 +65,7 @@ def test_a_row_is_what_a_run_with_its_values_says(vsacli: Any, grid: str) -> Non
                 assert (peak.tolist(), spent) == (joint["peak"]["tau_motor"], joint["energy"]["spent"])
 
 
+@pytest.mark.slow
 def test_what_varies_is_a_coordinate_of_run(whole: Path) -> None:
     xarray = pytest.importorskip("xarray")
     with xarray.open_dataset(whole, engine="h5netcdf") as table:
@@ -101,6 +102,7 @@ def test_parts_make_the_same_table(vsacli: Any, grid: str, whole: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_variables_over_time_are_those_of_a_run(vsacli: Any, own_folder: Path) -> None:
     """At each third step; a run that is shorter ends with NaN, in parts that are put together as well."""
     study(own_folder, "vary: {duration: [4, 3]}\nvariables: [tau_motor, q]\nevery: 3\n")
@@ -119,6 +121,7 @@ def test_variables_over_time_are_those_of_a_run(vsacli: Any, own_folder: Path) -
     assert (refused.code, "variables: no joint of vsa-3r has a current" in refused.err) == (2, True)
 
 
+@pytest.mark.slow
 def test_motions_alone_are_a_study(vsacli: Any, own_folder: Path) -> None:
     path = study(own_folder, "", HEAD.replace("move.yaml", "['move*.yaml', other.yaml]"))
     for name, end in (("move_on.yaml", "1300"), ("other.yaml", "700")):

@@ -74,12 +74,14 @@ def test_shares_fall_from_all_runs_at_their_margins(table: StoredStudy) -> None:
     assert labels == ["one: 66.7 % (35.4 to 87.9 %)", "two: 66.7 % (35.4 to 87.9 %)"]  # of 6 in 9 (Wilson)
 
 
+@pytest.mark.slow
 def test_figures_are_files(vsacli: Any, path: Path) -> None:
     done = vsacli("plot", path, path.parent / "study.h5", "--format", "svg", "-q")
     assert (done.code, [each.name for each in Path().glob("*.svg")]) == (0, ["study-study-compare.svg"])
     assert vsacli("plot", path, path.parent / "study.yaml").code == 2
 
 
+@pytest.mark.slow
 def test_nothing_to_draw(own_folder: Path) -> None:
     study(own_folder, "keep: [peak_tau_e]\n")
     assert run(["study", "study.yaml", "-q"]) == 0
