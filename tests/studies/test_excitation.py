@@ -85,6 +85,15 @@ def test_joints_and_motors_begin_and_end_at_rest(planned: Excitation) -> None:
         assert np.abs(rate[[0, -1]]).max() < 1e-9 * np.abs(rate).max()
 
 
+def test_its_json_names_what_it_says(planned: Excitation) -> None:
+    found = planned.as_json()
+    first = found["planned"]["numbers"][0]
+    assert first["path"] == "joints.arm.actuator.motor.inertia"
+    assert first["value"] == 2.5
+    assert 0 < first["standard_error"] < 0.025
+    assert set(found) >= {"format", "seed", "noise", "structural", "active", "assumptions", "report"}
+
+
 def test_the_file_is_what_was_planned(planned: Excitation, tmp_path: Path) -> None:
     file = tmp_path / "excitation.yaml"
     file.write_text(excitation_text(planned), encoding="utf-8")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.errors import InputError
+from vsacli.base.json_records import Published
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import compute_block, fitted
 from vsacli.robot.model import Robot
@@ -50,7 +52,8 @@ class Noise(NamedTuple):
 USUAL_NOISE = Noise()
 
 
-class Told(NamedTuple):
+@dataclass(frozen=True)
+class Told(Published):
     """A number that an identification looks for.
 
     Attributes:
