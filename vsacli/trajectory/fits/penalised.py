@@ -30,10 +30,6 @@ KINK = 1e3
 """Ratio of penalties of neighbouring segments from which on motion starts or stops there. In a sweep the
 ratio is some 20, at the ends of pauses 10^9."""
 
-KINK_VARIANCE = 5.0
-"""Factor of the variance there, where one difference of coefficients carries what the penalty spreads over a
-segment. On 200 records from rest to rest errors were up to 2.2 deviations, root mean square."""
-
 ENDS = 0.05
 """Share of the record at each end that does not count for deviations and comparisons."""
 

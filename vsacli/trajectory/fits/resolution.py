@@ -11,7 +11,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins
 from vsacli.trajectory.fits.moments import Moments
-from vsacli.trajectory.fits.penalised import KINK_VARIANCE, Model
+from vsacli.trajectory.fits.penalised import Model
 from vsacli.trajectory.fits.search import most_likely
 
 FIRST_SPANS, FIRST_SPANS_SHORT = 32, 4
@@ -30,6 +30,10 @@ noise does not explain it, the next is taken. With a fifth of this, filtered noi
 CONFIRMED = 1.0
 """Deviations by which that derivative may change then. With more, half the knots were accepted of motions
 from rest to rest, and the true error was beyond two deviations in up to 30 % of the samples."""
+
+KINK_CAUTION = 5.0
+"""Factor of the variance where motion starts or stops when resolutions are compared: errors are up to 2.2
+deviations there, root mean square."""
 
 ACCEPTED = 0.25
 """Largest relative deviation of the highest derivative with which a resolution is accepted. Motions whose
@@ -183,7 +187,7 @@ def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, ord
 
 def _deviation(model: Model, order: int) -> float:
     """Of a derivative by the posterior, away from the ends; `calibration` has a better one."""
-    factor = np.where(model.kinks, KINK_VARIANCE, 1.0)
+    factor = np.where(model.kinks, KINK_CAUTION, 1.0)
     return float(np.sqrt(_mean_variance(model, factor * model.variances(order, model.cautious))))
 
 
