@@ -114,7 +114,7 @@ def of_motions(found: Found) -> Iterator[str]:
         for arm in ARMS:
             runs = [each for each in of_motion if each.arm == arm]
             if runs:
-                doubted = [each.verdict != "ok" for each in runs]
+                doubted = [each.verdict == "doubtful" for each in runs]
                 yield f"| {motion} | {arm} | {judged([each.torque.size for each in runs], doubted)} |"
         runs = of_motion[:: len(ARMS)]
         if runs:
@@ -124,7 +124,7 @@ def of_motions(found: Found) -> Iterator[str]:
 
 def of_colours(found: Found) -> Iterator[str]:
     """How right deviations and verdicts are, by noise."""
-    yield f"| noise | d4q | {' | '.join(ARMS)} | runs wrong | runs right that are OK |"
+    yield f"| noise | d4q | {' | '.join(ARMS)} | wrong, no doubt | right, no doubt |"
     yield "| --- " * (len(ARMS) + 4) + "|"
     by_colour = sorted(found, key=lambda each: list(COLOURS).index(each[0].colour))
     for colour, group in groupby(by_colour, key=lambda each: each[0].colour):
@@ -133,8 +133,8 @@ def of_colours(found: Found) -> Iterator[str]:
         errors = [[each.fourth for each in runs[:: len(ARMS)]]]
         errors += [[each.torque for each in runs if each.arm == arm] for arm in ARMS]
         smooth = [each for of, each in rows if of.motion in SMOOTH]
-        right = [each.verdict == "ok" for each in smooth if each.torque.size < FALSE]
-        wrong = sum(each.verdict == "ok" and each.torque.size > ALLOWED for each in runs)
+        right = [each.verdict != "doubtful" for each in smooth if each.torque.size < FALSE]
+        wrong = sum(each.verdict != "doubtful" and each.torque.size > ALLOWED for each in runs)
         yield f"| {colour} | {' | '.join(map(covered, errors))} | {wrong} | {100 * np.mean(right):.0f} % |"
 
 
