@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,18 +13,17 @@ from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
 from vsacli.robot.model import Robot
 from vsacli.studies.optimisation.criteria import trapezoidal
-from vsacli.studies.optimisation.fixed_motion import CLEARANCE
 from vsacli.studies.optimisation.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimise
-from vsacli.studies.optimisation.paced_joints import FASTEST, Pace, PacedJoint
+from vsacli.studies.optimisation.paced_joints import CLEARANCE, FASTEST, Pace, PacedJoint
 from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, PacedMotion
+from vsacli.studies.optimisation.paced_splines import PacedSpaces, Pacing, joined_rows
 from vsacli.studies.optimisation.separable import Group, SeparableProblem, interior
-from vsacli.studies.optimisation.spline_space import SplineSpace
 from vsacli.studies.remedies.acceptance import ImpossibleError
 from vsacli.studies.remedies.nearest_spline import peaks
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
+    pass
 
 PIECES = (12, 24)
 """Pieces of the splines, first with several starts, then finer."""
@@ -32,8 +31,12 @@ PIECES = (12, 24)
 INSTANTS_PER_PIECE = 12
 """Instants of a piece at which bounds are kept, at least."""
 
-LOOKED_AT, FEW = 1000, 100
+LOOKED_AT, FEW = 4000, 100
 """Instants at which bounds are looked at to see where they are missed, and in a first look, at most."""
+
+NEAR_END, TOWARDS_END = (1e-5, 0.05), 150
+"""Shares of the path between which further instants towards each end are, and how many: where an arm with
+a hardening spring started, torques between even instants were 8e-4 larger than at them."""
 
 SLOWEST, STRIDE = 1000.0, 1.1
 """Factors of uniform slow-downs that are looked at: each so much larger than the one before."""
@@ -69,64 +72,6 @@ ACTIVE = 1e-3
 """How near a bound, relative to it, a motion runs along it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pacing:
-    """A pace along the path of a trajectory.
-
-    Attributes:
-        pace: over the path, a spline whose argument is s.
-        stiffness: of each joint where it varies, by index, likewise.
-        duration: with that pace, s.
-        uniform: of the fastest motion that is passed uniformly slower or faster, s; NaN if there is none.
-        found: whether the conditions for a local optimum hold.
-        starts: from how many the search began.
-        agreeing: from how many it came to this optimum.
-        bounding: share of the path along each bound, by joint and name of the bound.
-    """
-
-    pace: BSpline[np.float64] = field(repr=False)
-    stiffness: dict[int, BSpline[np.float64]] = field(repr=False)
-    duration: float
-    uniform: float
-    found: bool
-    starts: int
-    agreeing: int
-    bounding: dict[str, dict[str, float]]
-
-    def slower(self, factor: float) -> BSpline[np.float64]:
-        """The pace, slower by a factor."""
-        from scipy.interpolate import BSpline
-
-        return BSpline(self.pace.t, factor * self.pace.c, self.pace.k)
-
-
-class _Spaces(NamedTuple):
-    """Splines of the pace, and of the stiffness of joints by index; their unknowns stand in this order."""
-
-    pace: SplineSpace
-    stiffness: dict[int, SplineSpace]
-
-    @classmethod
-    def of(cls, span: tuple[float, float], pieces: int, varied: Sequence[int]) -> _Spaces:
-        """With so many pieces each."""
-        at_rest = SplineSpace.at_rest(span, pieces)
-        return cls(SplineSpace.free(span, pieces), dict.fromkeys(varied, at_rest))
-
-    def parts(self) -> dict[int | None, tuple[SplineSpace, IndexArray]]:
-        """Space and places of unknowns, of the pace, None, and of joints."""
-        spaces: dict[int | None, SplineSpace] = {None: self.pace}
-        spaces.update(self.stiffness.items())
-        ends = np.cumsum([space.size for space in spaces.values()])
-        places = np.split(np.arange(ends[-1]), ends[:-1])
-        return {key: (space, own) for (key, space), own in zip(spaces.items(), places, strict=True)}
-
-    def fitted(self, s: FloatArray, pace: FloatArray, stiffness: Mapping[int, FloatArray]) -> FloatArray:
-        """Unknowns of what comes nearest to a pace and to stiffness, each (instants,)."""
-        wanted: dict[int | None, FloatArray] = {None: pace}
-        wanted.update(stiffness.items())
-        return np.concatenate([space.fitted(s, wanted[key]) for key, (space, _) in self.parts().items()])
-
-
 class TimingSearch:
     """A search for the fastest pace along the path of a trajectory from rest to rest.
 
@@ -150,7 +95,7 @@ class TimingSearch:
     ) -> None:
         self._robot, self._varied, self._seed, self._progress = robot, varied, seed, progress
         self._span = (0.0, trajectory.duration)
-        self._s = np.linspace(*self._span, min(2 * trajectory.samples - 1, LOOKED_AT))
+        self._s = _instants(trajectory)
         self._motion = PacedMotion(robot, trajectory, self._s)
         self._joints = [PacedJoint(self._motion, index, near_singular) for index in range(len(robot.joints))]
         self._scale = trajectory.duration
@@ -161,7 +106,7 @@ class TimingSearch:
         Raises:
             ImpossibleError: none was found.
         """
-        spaces = _Spaces.of(self._span, PIECES[0], self._varied)
+        spaces = PacedSpaces.of(self._span, PIECES[0], self._varied)
         uniform, begun = self._starts(spaces)
         self._scale = uniform if math.isfinite(uniform) else self._scale
         attempts = [self._attempt(spaces, PIECES[0], *start) for start in begun]
@@ -171,7 +116,7 @@ class TimingSearch:
         best = min(kept, key=lambda minimum: minimum.cost)
         agreeing = sum(minimum.cost <= (1 + SAME_COST) * best.cost for minimum in kept)
         for pieces in PIECES[1:]:
-            finer = _Spaces.of(self._span, pieces, self._varied)
+            finer = PacedSpaces.of(self._span, pieces, self._varied)
             slower = self._in(finer, spaces, best.unknowns)
             refined = self._attempt(finer, pieces, slower, slower)
             if refined is None or refined.cost > best.cost:
@@ -179,7 +124,7 @@ class TimingSearch:
             spaces, best = finer, refined
         return self._pacing(spaces, best, uniform, len(begun), agreeing)
 
-    def _starts(self, spaces: _Spaces) -> tuple[float, list[tuple[FloatArray, FloatArray]]]:
+    def _starts(self, spaces: PacedSpaces) -> tuple[float, list[tuple[FloatArray, FloatArray]]]:
         """The duration of the fastest uniform motion, and unknowns to begin with, each with some inside."""
         asked = {joint: self._motion.stiffness(joint) for joint in self._varied}
         begun, uniform = [], math.nan
@@ -199,7 +144,7 @@ class TimingSearch:
                 begun.append((spaces.fitted(self._s, factor * drawn, stiffness), inside))
         return uniform, begun
 
-    def _uniform(self, spaces: _Spaces, stiffness: Mapping[int, FloatArray]) -> float | None:
+    def _uniform(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
         """The least pace that is the same everywhere and keeps all bounds; None if none does."""
         few = self._groups(spaces, evenly(len(self._s), FEW))
         every = self._groups(spaces, np.arange(len(self._s)))
@@ -220,7 +165,7 @@ class TimingSearch:
             refused, factor = (refused, middle) if kept(every, middle) else (middle, factor)
         return factor
 
-    def _in(self, finer: _Spaces, spaces: _Spaces, unknowns: FloatArray) -> FloatArray:
+    def _in(self, finer: PacedSpaces, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
         """The same in finer spaces, and a little slower, since the way out of a corner is long."""
         rows = {
             key: space.basis(self._s, 1)[0] @ unknowns[own] for key, (space, own) in spaces.parts().items()
@@ -230,7 +175,7 @@ class TimingSearch:
 
     def _attempt(
         self,
-        spaces: _Spaces,
+        spaces: PacedSpaces,
         pieces: int,
         wanted: FloatArray,
         inside: FloatArray,
@@ -249,22 +194,22 @@ class TimingSearch:
             if kept is not None:
                 return kept
             bounds = [row for group in every for row in group.bounds(group.rows(found.unknowns))]
-            worst = np.concatenate([peaks(row - CLEARANCE) for row in bounds])
+            worst = np.concatenate([peaks(row - CLEARANCE / 2) for row in bounds])
             instants, wanted = np.union1d(instants, worst), found.unknowns
         return None
 
-    def _barely_slower(self, spaces: _Spaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
+    def _barely_slower(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
         """The same so little slower that all bounds are kept at every instant; None if that takes more."""
         _, own = spaces.parts()[None]
         for share in SLOWER:
             unknowns = found.unknowns.copy()
             unknowns[own] *= 1 + share
             cost, bounds = SeparableProblem(every).values(unknowns)
-            if np.all(bounds <= CLEARANCE):
+            if np.all(bounds <= CLEARANCE / 2):
                 return replace(found, unknowns=unknowns, cost=cost)
         return None
 
-    def _groups(self, spaces: _Spaces, instants: IndexArray) -> list[Group]:
+    def _groups(self, spaces: PacedSpaces, instants: IndexArray) -> list[Group]:
         """Time with the bounds of the pace, and the bounds of each joint, at some instants."""
         parts, s = spaces.parts(), self._s[instants]
         space, own = parts[None]
@@ -277,7 +222,7 @@ class TimingSearch:
             basis, places, scales = pace, own, sizes
             if index in spaces.stiffness:
                 of_joint, further = parts[index]
-                basis = block(pace, of_joint.basis(s, STIFFNESS.orders))
+                basis = joined_rows(pace, of_joint.basis(s, STIFFNESS.orders))
                 size = float(np.median(self._motion.stiffness(index)))
                 rates = size * of_joint.piece ** -np.arange(STIFFNESS.orders, dtype=np.float64)
                 places, scales = np.append(own, further), np.append(sizes, rates)
@@ -285,7 +230,9 @@ class TimingSearch:
             groups.append(Group(joint, instants, basis, places, np.zeros((0, len(s))), there, scales))
         return groups
 
-    def _pacing(self, spaces: _Spaces, best: Minimum, uniform: float, starts: int, agreeing: int) -> Pacing:
+    def _pacing(
+        self, spaces: PacedSpaces, best: Minimum, uniform: float, starts: int, agreeing: int
+    ) -> Pacing:
         parts = spaces.parts()
         splines = {key: space.spline(best.unknowns[own]) for key, (space, own) in parts.items()}
         pace = splines[None]
@@ -300,7 +247,7 @@ class TimingSearch:
             bounding=self._bounding(spaces, best.unknowns),
         )
 
-    def _bounding(self, spaces: _Spaces, unknowns: FloatArray) -> dict[str, dict[str, float]]:
+    def _bounding(self, spaces: PacedSpaces, unknowns: FloatArray) -> dict[str, dict[str, float]]:
         """Share of the path along each bound."""
         _, *groups = self._groups(spaces, np.arange(len(self._s)))
         found: dict[str, dict[str, float]] = {}
@@ -315,10 +262,11 @@ class TimingSearch:
         return found
 
 
-def block(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Two bases of rows with unknowns of their own as one, (rows, instants, unknowns)."""
-    rows, instants = len(first) + len(second), first.shape[1]
-    joined = np.zeros((rows, instants, first.shape[2] + second.shape[2]))
-    joined[: len(first), :, : first.shape[2]] = first
-    joined[len(first) :, :, first.shape[2] :] = second
-    return joined
+def _instants(trajectory: Trajectory) -> FloatArray:
+    """Where bounds are looked at, s: evenly, and more and more densely towards both ends.
+
+    A motion that begins at rest has hardly begun where its pace, which may be high there, is past its worst.
+    """
+    even = np.linspace(0.0, 1.0, min(2 * trajectory.samples - 1, LOOKED_AT))
+    towards = np.geomspace(*NEAR_END, TOWARDS_END)
+    return trajectory.duration * np.unique(np.concatenate([even, towards, 1 - towards]))
