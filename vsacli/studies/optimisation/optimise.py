@@ -37,8 +37,8 @@ from vsacli.trajectory.trajectory import Trajectory
 TIME, TIMING, BOTH = "time", "timing", "both"
 """What is minimised, and what varies, where it is not the stiffness alone."""
 
-SLOWER, BETWEEN = (1.0, 1.0003, 1.001, 1.003), 10
-"""Factors of a slow-down after which a run confirms a pace, and one with so many times the steps."""
+BETWEEN = 10
+"""Times the steps of a run that confirms a pace between them."""
 
 SEARCHES = 10
 """Searches of a joint: a constant, some starts, finer and finer splines; not all of them may be needed."""
@@ -131,23 +131,21 @@ def _fastest(
         return replace(what, reasons=error.reasons)
     bar.finish()
     name = as_name(f"{trajectory.name}-{TIME}")
-    for factor in SLOWER:
-        best, between = (
-            retimed(trajectory, found.slower(factor), found.stiffness, name, refined)
-            for refined in (1, BETWEEN)
-        )
-        if _confirmed(what, best) and _confirmed(what, between):
-            optimum = TimingOptimum(
-                before=trajectory.duration,
-                uniform=found.uniform,
-                after=best.duration,
-                found=found.found,
-                starts=found.starts,
-                agreeing=found.agreeing,
-                bounding=found.bounding,
-            )
-            return replace(what, timing=optimum, trajectory=best)
-    return replace(what, reasons=("what keeps every limit at some instants exceeds one between them",))
+    best, between = (
+        retimed(trajectory, found.pace, found.stiffness, name, refined) for refined in (1, BETWEEN)
+    )
+    if not (_confirmed(what, best) and _confirmed(what, between)):
+        return replace(what, reasons=("what keeps every limit at some instants exceeds one between them",))
+    optimum = TimingOptimum(
+        before=trajectory.duration,
+        uniform=found.uniform,
+        after=best.duration,
+        found=found.found,
+        starts=found.starts,
+        agreeing=found.agreeing,
+        bounding=found.bounding,
+    )
+    return replace(what, timing=optimum, trajectory=best)
 
 
 def _confirmed(what: Optimum, trajectory: Trajectory) -> bool:

@@ -12,6 +12,9 @@ from vsacli.base.tables import aligned
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
+VARIED = {"stiffness": "stiffness", "timing": "timing", "both": "timing and stiffness"}
+"""What varies, in words."""
+
 FULL = 0.995
 """Share of the time that is all of it, as it is printed."""
 
@@ -126,7 +129,7 @@ class Optimum(Published):
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        title = f"{self.robot_name}, {self.asked}: {self.words} by another {self.varied}"
+        title = f"{self.robot_name}, {self.asked}: {self.words} by another {VARIED[self.varied]}"
         if not self.possible:
             yield f"{title}: nothing feasible was found"
             yield from (f"- {reason}" for reason in self.reasons)

@@ -39,12 +39,6 @@ class Pacing:
     agreeing: int
     bounding: dict[str, dict[str, float]]
 
-    def slower(self, factor: float) -> BSpline[np.float64]:
-        """The pace, slower by a factor."""
-        from scipy.interpolate import BSpline
-
-        return BSpline(self.pace.t, factor * self.pace.c, self.pace.k)
-
 
 class PacedSpaces(NamedTuple):
     """Splines of the pace, and of the stiffness of joints by index; their unknowns stand in this order."""
