@@ -16,8 +16,8 @@ from vsacli import identify
 from vsacli.studies.identification.excitation import Noise, plan_excitation, predicted_errors, search
 from vsacli.studies.identification.excitation.predicted_errors import executed, noisy_record
 from vsacli.studies.identification.identification import WORDS, solutions
+from vsacli.studies.identification.motors.unknowns import with_friction
 from vsacli.studies.identification.system_reports import numbers_of
-from vsacli.studies.identification.unknowns import with_friction
 from vsacli.studies.sensitivities.parameters import parameters
 
 POSITION_NOISE, TORQUE_SHARE = 2e-5, 0.003

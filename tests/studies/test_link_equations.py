@@ -7,9 +7,9 @@ import pytest
 from samples.computed_signals import computed_signals
 from samples.marks import slow_but
 
-from vsacli.studies.identification.least_squares import least_squares
-from vsacli.studies.identification.link_equations import Given, LinkUnknowns, link_equations
-from vsacli.studies.identification.unknowns import FRICTION, MOTORS, SPRINGS, unknowns
+from vsacli.studies.identification.estimation.least_squares import least_squares
+from vsacli.studies.identification.links.link_equations import Given, LinkUnknowns, link_equations
+from vsacli.studies.identification.motors.unknowns import FRICTION, MOTORS, SPRINGS, unknowns
 
 RUNS = {
     "coupled_1r": "coupled_1r",

@@ -7,8 +7,8 @@ import pytest
 from samples.computed_signals import computed_signals
 from samples.marks import slow_but
 
-from vsacli.studies.identification.motor_equations import motor_equations, motor_names
-from vsacli.studies.identification.unknowns import unknowns
+from vsacli.studies.identification.motors.motor_equations import motor_equations, motor_names
+from vsacli.studies.identification.motors.unknowns import unknowns
 
 RUNS = {
     "vsa_3r": "rest_to_rest",

@@ -11,11 +11,8 @@ import numpy as np
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import wrench_columns
 from vsacli.robot.model import Robot, check_robot
-from vsacli.studies.identification.bandwidth import bandwidth_of, bounds
-from vsacli.studies.identification.consistent_links import ConsistentLinks
-from vsacli.studies.identification.delays import Delay, delay, without_delay
+from vsacli.studies.identification.estimation.solution import Solution, solution
 from vsacli.studies.identification.fitted_file import to_write
-from vsacli.studies.identification.found_links import doubts_of, found_links
 from vsacli.studies.identification.identification_report import (
     DOUBTFUL,
     MISFIT,
@@ -26,15 +23,18 @@ from vsacli.studies.identification.identification_report import (
     Residual,
     SystemReport,
 )
-from vsacli.studies.identification.link_system import LINKS, link_system, without_links
-from vsacli.studies.identification.motor_system import motor_systems
+from vsacli.studies.identification.links.consistent_links import ConsistentLinks
+from vsacli.studies.identification.links.found_links import doubts_of, found_links
+from vsacli.studies.identification.links.link_system import LINKS, link_system, without_links
+from vsacli.studies.identification.motors.motor_system import motor_systems
+from vsacli.studies.identification.motors.unknowns import FRICTION, GROUPS, SPRINGS, check_fit, with_friction
 from vsacli.studies.identification.offsets import offsets
-from vsacli.studies.identification.record_doubts import model_doubts
-from vsacli.studies.identification.records import Record, check_distinct, complete_joints, read_record
-from vsacli.studies.identification.signals import Signals, conditioned
-from vsacli.studies.identification.solution import Solution, solution
+from vsacli.studies.identification.records.bandwidth import bandwidth_of, bounds
+from vsacli.studies.identification.records.delays import Delay, delay, without_delay
+from vsacli.studies.identification.records.record_doubts import model_doubts
+from vsacli.studies.identification.records.records import Record, check_distinct, complete_joints, read_record
+from vsacli.studies.identification.records.signals import Signals, conditioned
 from vsacli.studies.identification.system_reports import system_report, torques
-from vsacli.studies.identification.unknowns import FRICTION, GROUPS, SPRINGS, check_fit, with_friction
 
 WORDS = (*GROUPS, LINKS)
 """What users may ask for by a word."""

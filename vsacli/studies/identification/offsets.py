@@ -10,12 +10,12 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.equations import Equations
-from vsacli.studies.identification.least_squares import least_squares
-from vsacli.studies.identification.motor_equations import motor_names
-from vsacli.studies.identification.record_columns import MOTOR, TORQUE
-from vsacli.studies.identification.signals import Signals
-from vsacli.studies.identification.solution import Solution, rms
+from vsacli.studies.identification.estimation.equations import Equations
+from vsacli.studies.identification.estimation.least_squares import least_squares
+from vsacli.studies.identification.estimation.solution import Solution, rms
+from vsacli.studies.identification.motors.motor_equations import motor_names
+from vsacli.studies.identification.records.record_columns import MOTOR, TORQUE
+from vsacli.studies.identification.records.signals import Signals
 
 STEP = 1e-4
 """Change of a position, rad (m), by which torques are differentiated over it."""

@@ -10,19 +10,19 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.equations import Equations
+from vsacli.studies.identification.estimation.equations import Equations
+from vsacli.studies.identification.estimation.solution import Solution, held_out, rms
 from vsacli.studies.identification.identification_report import (
     Number,
     Residual,
     SystemReport,
     Torques,
 )
-from vsacli.studies.identification.motor_equations import motor_names
-from vsacli.studies.identification.record_columns import TORQUE
-from vsacli.studies.identification.records import Record
-from vsacli.studies.identification.signals import Signals
-from vsacli.studies.identification.solution import Solution, held_out, rms
-from vsacli.studies.identification.torque_noise import torque_noise
+from vsacli.studies.identification.motors.motor_equations import motor_names
+from vsacli.studies.identification.records.record_columns import TORQUE
+from vsacli.studies.identification.records.records import Record
+from vsacli.studies.identification.records.signals import Signals
+from vsacli.studies.identification.records.torque_noise import torque_noise
 from vsacli.studies.sensitivities.parameters import JOINTS
 
 SMOOTH_CURVES = 8

@@ -11,12 +11,12 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import Block
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.independence import Independence, in_words, independence
-from vsacli.studies.identification.inertial_parameters import names
-from vsacli.studies.identification.link_equations import LinkUnknowns, link_equations
-from vsacli.studies.identification.motor_equations import motor_equations
-from vsacli.studies.identification.signals import Filter, Signals
-from vsacli.studies.identification.unknowns import GROUPS, unknowns, with_friction
+from vsacli.studies.identification.estimation.independence import Independence, in_words, independence
+from vsacli.studies.identification.links.inertial_parameters import names
+from vsacli.studies.identification.links.link_equations import LinkUnknowns, link_equations
+from vsacli.studies.identification.motors.motor_equations import motor_equations
+from vsacli.studies.identification.motors.unknowns import GROUPS, unknowns, with_friction
+from vsacli.studies.identification.records.signals import Filter, Signals
 
 ALL_PASS = Filter(bandwidth=np.inf, sections=np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]]), stride=1, reach=0)
 """For motions without noise."""

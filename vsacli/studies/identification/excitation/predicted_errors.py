@@ -12,13 +12,13 @@ from vsacli.base.json_records import Published
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import compute_block, fitted
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.bandwidth import bandwidth_of
 from vsacli.studies.identification.excitation.design import RATE
 from vsacli.studies.identification.identification import WORDS, solutions
 from vsacli.studies.identification.identification_report import Number
-from vsacli.studies.identification.signals import Signals, conditioned
+from vsacli.studies.identification.motors.unknowns import with_friction
+from vsacli.studies.identification.records.bandwidth import bandwidth_of
+from vsacli.studies.identification.records.signals import Signals, conditioned
 from vsacli.studies.identification.system_reports import numbers_of
-from vsacli.studies.identification.unknowns import with_friction
 from vsacli.trajectory.trajectory import Trajectory
 
 POSITION_NOISE = 2e-5

@@ -10,13 +10,13 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.base_parameters import BaseParameters
-from vsacli.studies.identification.equations import Equations, with_noise
-from vsacli.studies.identification.inertial_parameters import SYMBOLS, UNITS, names
-from vsacli.studies.identification.link_equations import Given, LinkUnknowns, link_equations
-from vsacli.studies.identification.signals import Signals
-from vsacli.studies.identification.solution import Solution
-from vsacli.studies.identification.unknowns import SPRINGS, group_of
+from vsacli.studies.identification.estimation.equations import Equations, with_noise
+from vsacli.studies.identification.estimation.solution import Solution
+from vsacli.studies.identification.links.base_parameters import BaseParameters
+from vsacli.studies.identification.links.inertial_parameters import SYMBOLS, UNITS, names
+from vsacli.studies.identification.links.link_equations import Given, LinkUnknowns, link_equations
+from vsacli.studies.identification.motors.unknowns import SPRINGS, group_of
+from vsacli.studies.identification.records.signals import Signals
 from vsacli.studies.sensitivities.parameters import Parameter, parameters
 
 LINKS = "links"

@@ -19,7 +19,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import Link
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.inertial_parameters import (
+from vsacli.studies.identification.links.inertial_parameters import (
     SYMBOLS,
     link_of,
     parameters_of,

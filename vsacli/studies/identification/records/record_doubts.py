@@ -12,10 +12,10 @@ from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import MOTORS, VARIABLES
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.motor_equations import motor_equations, motor_names
-from vsacli.studies.identification.record_columns import MOTOR, POSITION, TORQUE
-from vsacli.studies.identification.records import Record
-from vsacli.studies.identification.signals import Signals
+from vsacli.studies.identification.motors.motor_equations import motor_equations, motor_names
+from vsacli.studies.identification.records.record_columns import MOTOR, POSITION, TORQUE
+from vsacli.studies.identification.records.records import Record
+from vsacli.studies.identification.records.signals import Signals
 from vsacli.studies.measured.agreement import Agreement, straight_line
 from vsacli.studies.measured.slips import slips
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.independence import first_independent, in_words, shares_of
-from vsacli.studies.identification.inertial_parameters import SYMBOLS
-from vsacli.studies.identification.regressor import regressor
+from vsacli.studies.identification.estimation.independence import first_independent, in_words, shares_of
+from vsacli.studies.identification.links.inertial_parameters import SYMBOLS
+from vsacli.studies.identification.links.regressor import regressor
 
 SAMPLES_A_LINK = 30
 """Random poses, speeds and accelerations: three for each parameter, and a row of each joint."""

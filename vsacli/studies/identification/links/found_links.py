@@ -7,9 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.consistent_links import WITHIN, ConsistentLinks, Told, consistent_links
-from vsacli.studies.identification.link_system import LinkSystem
-from vsacli.studies.identification.solution import Solution
+from vsacli.studies.identification.estimation.solution import Solution
+from vsacli.studies.identification.links.consistent_links import (
+    WITHIN,
+    ConsistentLinks,
+    Told,
+    consistent_links,
+)
+from vsacli.studies.identification.links.link_system import LinkSystem
 
 
 def found_links(robot: Robot, found: Solution) -> ConsistentLinks:

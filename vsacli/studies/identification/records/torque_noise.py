@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.studies.identification.bandwidth import white_noise
-from vsacli.studies.identification.signals import Filter, Signals
+from vsacli.studies.identification.records.bandwidth import white_noise
+from vsacli.studies.identification.records.signals import Filter, Signals
 
 QUIET_FROM = 2.0
 """Bandwidths from which on a record holds hardly any motion."""

@@ -10,10 +10,10 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.studies.identification.equations import Equations
-from vsacli.studies.identification.gauss_newton import gauss_newton
-from vsacli.studies.identification.least_squares import Fit
-from vsacli.studies.identification.signals import Signals
+from vsacli.studies.identification.estimation.equations import Equations
+from vsacli.studies.identification.estimation.gauss_newton import gauss_newton
+from vsacli.studies.identification.estimation.least_squares import Fit
+from vsacli.studies.identification.records.signals import Signals
 
 FEWEST_ROWS = 5
 """Equations to an unknown below which a record is too short to hold a part of it out."""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import AnyArray, FloatArray, IndexArray
-from vsacli.studies.identification.signals import Signals, disturbed
+from vsacli.studies.identification.records.signals import Signals, disturbed
 
 
 class Equations(NamedTuple):

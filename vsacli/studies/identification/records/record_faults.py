@@ -9,7 +9,7 @@ import numpy as np
 from vsacli.base.units import time_text
 from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.record_columns import TORQUE, Column
+from vsacli.studies.identification.records.record_columns import TORQUE, Column
 from vsacli.trajectory.recorded.faults import wraps
 from vsacli.trajectory.recorded.grain import Grain
 from vsacli.trajectory.recorded.health import column_faults

@@ -14,7 +14,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.variables import MOTORS
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.record_columns import (
+from vsacli.studies.identification.records.record_columns import (
     MOTOR,
     POSITION,
     TORQUE,
@@ -22,7 +22,7 @@ from vsacli.studies.identification.record_columns import (
     Where,
     recorded_columns,
 )
-from vsacli.studies.identification.record_faults import doubts, stopping_faults
+from vsacli.studies.identification.records.record_faults import doubts, stopping_faults
 
 INTERPOLATION = 3
 """Degree of the spline between samples that are not on the grid."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
-from vsacli.studies.identification.equations import System
+from vsacli.studies.identification.estimation.equations import System
 
 COSINES = 24
 """Cosines of a record that count. With 8 the errors themselves were too uncertain (87 % within two of them);

@@ -9,9 +9,9 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError
-from vsacli.studies.identification.equations import Equations, System
-from vsacli.studies.identification.independence import Independence, in_words, independence
-from vsacli.studies.identification.score_covariance import score_covariance
+from vsacli.studies.identification.estimation.equations import Equations, System
+from vsacli.studies.identification.estimation.independence import Independence, in_words, independence
+from vsacli.studies.identification.estimation.score_covariance import score_covariance
 
 SEPARABLE = 1 / 300
 """Share of a column that no combination of the others explains, from which on its unknown can be told.

@@ -16,7 +16,7 @@ from vsacli.dynamics.rigid_body import bare
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.inertial_parameters import SYMBOLS
+from vsacli.studies.identification.links.inertial_parameters import SYMBOLS
 
 Motion = Mapping[str, Sequence[Scalar]]
 _NO_INERTIA = SymmetricTensor(0, 0, 0, 0, 0, 0)

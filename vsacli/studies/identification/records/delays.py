@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.studies.identification.least_squares import least_squares
-from vsacli.studies.identification.signals import Signals
-from vsacli.studies.identification.solution import Solution
+from vsacli.studies.identification.estimation.least_squares import least_squares
+from vsacli.studies.identification.estimation.solution import Solution
+from vsacli.studies.identification.records.signals import Signals
 
 CERTAIN = 4.0
 """Standard errors from which on a delay is taken out; at 2, each twentieth record without any would be."""

@@ -10,10 +10,10 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.equations import Equations, with_noise
-from vsacli.studies.identification.motor_equations import motor_equations
-from vsacli.studies.identification.signals import Signals
-from vsacli.studies.identification.unknowns import SPRINGS, group_of, unknowns
+from vsacli.studies.identification.estimation.equations import Equations, with_noise
+from vsacli.studies.identification.motors.motor_equations import motor_equations
+from vsacli.studies.identification.motors.unknowns import SPRINGS, group_of, unknowns
+from vsacli.studies.identification.records.signals import Signals
 from vsacli.studies.sensitivities.parameters import Parameter
 
 

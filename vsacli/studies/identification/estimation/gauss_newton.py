@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.studies.identification.equations import Equations, System
-from vsacli.studies.identification.least_squares import SEPARABLE, Fit, Step, fit_of, solved
+from vsacli.studies.identification.estimation.equations import Equations, System
+from vsacli.studies.identification.estimation.least_squares import SEPARABLE, Fit, Step, fit_of, solved
 
 STEPS = 50
 """Steps at most. Springs whose exponents were a third off took 6 to 10."""

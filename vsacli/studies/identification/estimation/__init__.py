@@ -1,0 +1,1 @@
+"""Equations of records, and the numbers that satisfy them best."""

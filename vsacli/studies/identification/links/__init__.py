@@ -1,0 +1,1 @@
+"""Equations of links, their base parameters, and bodies that have them."""

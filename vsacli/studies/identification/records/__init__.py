@@ -1,0 +1,1 @@
+"""Records of a robot: read, judged and conditioned."""
