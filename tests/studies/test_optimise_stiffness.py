@@ -14,6 +14,7 @@ from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, op
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.drive import drive
 from vsacli.studies.optimisation.criteria import CRITERIA
+from vsacli.studies.optimisation.optimise import cost
 from vsacli.studies.optimisation.spline_space import SplineSpace
 from vsacli.studies.optimisation.stiffness import StiffnessSearch
 from vsacli.studies.remedies.acceptance import Acceptance
@@ -71,13 +72,17 @@ def costs(arm, load, criterion, rows):
     torques = driven.tau_motor.reshape(2, profiles, -1)
     low, high = admissible_stiffness(joint, load.command, MARGIN)
     kept = np.all((rows[0] >= low) & (rows[0] <= high), axis=1)
+    if criterion == "energy":
+        power = np.maximum(driven.motor_power, 0).sum(axis=0).reshape(profiles, -1)
+        loaded = driven.elastic_energy.reshape(profiles, -1)[:, 0]
+        return np.where(kept, np.trapezoid(power, load.time) + loaded, np.inf)
     if criterion == "peak":
         return np.where(kept, np.abs(torques).max(axis=(0, 2)), np.inf)
     squares = np.trapezoid((torques**2).mean(axis=0), load.time) / (load.time[-1] - load.time[0])
     return np.where(kept, np.sqrt(squares), np.inf)
 
 
-@pytest.mark.parametrize("criterion", ["torque", slow("peak")])
+@pytest.mark.parametrize("criterion", ["torque", slow("peak"), slow("energy")])
 def test_no_profile_of_a_dense_grid_is_better(arm, load, criterion):
     """Of splines with two shapes, so that the grid has two dimensions; refined about its best four times."""
     spaces = lambda span, _: SplineSpace.at_rest(span, 1)  # noqa: E731
@@ -123,6 +128,24 @@ def test_a_fast_periodic_motion_has_its_optimum_inside_the_corridor(arm, load):
     rows = near_edge.basis(load.time, 3) @ near_edge.fitted(load.time, 1.02 * low)
     best = costs(arm, load, "torque", found.rows[:, None])[0]
     assert costs(arm, load, "torque", rows[:, None])[0] > 1.5 * best
+
+
+@pytest.mark.slow
+def test_like_motors_heat_least_where_their_torques_are_least(arm, load):
+    numbers = {"gear_ratio": 1.0, "torque_constant": 2.0, "resistance": 3.0}
+    wound = arm.replace(
+        {f"joints.{SHOULDER}.actuator.motor.{name}": value for name, value in numbers.items()}
+    )
+    coolest, least = (
+        search(robot, load, CRITERIA[name](), SplineSpace.periodic)
+        for robot, name in ((wound, "copper"), (arm, "torque"))
+    )
+    heat, torque = (
+        cost(wound.joints[SHOULDER], load, CRITERIA["copper"](), coolest.rows),
+        costs(arm, load, "torque", least.rows[:, None]),
+    )
+    # R/K^2 times the squares of both motors over the time; the step sums differ by less than the tolerance.
+    assert heat == pytest.approx(3 / 4 * 2 * torque[0] ** 2 * load.time[-1], rel=1e-4)
 
 
 @pytest.mark.slow

@@ -64,6 +64,30 @@ def test_a_motion_that_begins_on_its_way_keeps_its_timing(arm, tmp_path):
 
 
 @pytest.mark.slow
+def test_what_nothing_holds_back_is_no_optimum():
+    arm = load_robot(REPOSITORY / "robots" / "planar_2r.yaml")
+    free = load_trajectory(REPOSITORY / "trajectories" / "planar_2r.yaml", arm)
+    found = optimize(arm, free, "time", "timing")
+    assert not found.possible
+    assert "no limit keeps the motion from being 50 times as fast" in str(found)
+
+
+@pytest.mark.slow
+def test_a_motion_rests_on_its_way_as_long_as_commanded(arm):
+    path = REPOSITORY / "trajectories" / "vsa_3r_pick_and_place.yaml"
+    motion = load_trajectory(path, arm)
+    limited = arm.replace({f"joints.{joint}.actuator.motor.max_torque": 200.0 for joint in range(3)})
+    found = optimize(limited, motion, "time", "timing")
+
+    def resting(trajectory):
+        moving = np.abs(trajectory.block(0, trajectory.samples).dq).max(axis=1) > 1e-9
+        return np.count_nonzero(~moving) * trajectory.duration / (trajectory.samples - 1)
+
+    assert found.timing.after < motion.duration
+    assert resting(found.trajectory) > 0.98 * resting(motion)
+
+
+@pytest.mark.slow
 def test_the_papers_arm_is_faster_than_any_uniform_motion_and_keeps_its_torques_between_the_steps(
     arm, motion
 ):

@@ -44,6 +44,9 @@ SLOWEST, STRIDE = 1000.0, 1.1
 HALVINGS = 16
 """Halvings of the last stride: to 1e-6 of the factor."""
 
+UNBOUNDED = 1.1
+"""Multiple of the least pace that is tried, below which nothing else holds the motion back."""
+
 SLACK = 1.02
 """How much slower than the fastest uniform motion a search begins."""
 
@@ -108,11 +111,13 @@ class TimingSearch:
         """
         spaces = PacedSpaces.of(self._span, PIECES[0], self._varied)
         uniform, begun = self._starts(spaces)
+        if not begun:
+            raise ImpossibleError("no slow-down or speed-up of the whole motion keeps every limit")
         self._scale = uniform if math.isfinite(uniform) else self._scale
         attempts = [self._attempt(spaces, PIECES[0], *start) for start in begun]
         kept = [attempt for attempt in attempts if attempt is not None]
         if not kept:
-            raise ImpossibleError("no pace that was tried keeps every limit, however slow")
+            raise ImpossibleError("no faster pace that was tried keeps every limit at all instants")
         best = min(kept, key=lambda minimum: minimum.cost)
         agreeing = sum(minimum.cost <= (1 + SAME_COST) * best.cost for minimum in kept)
         for pieces in PIECES[1:]:
@@ -122,7 +127,13 @@ class TimingSearch:
             if refined is None or refined.cost > best.cost:
                 break
             spaces, best = finer, refined
-        return self._pacing(spaces, best, uniform, len(begun), agreeing)
+        found = self._pacing(spaces, best, uniform, len(begun), agreeing)
+        if float(found.pace(self._s).min()) < UNBOUNDED * FASTEST:
+            raise ImpossibleError(
+                f"no limit keeps the motion from being {1 / FASTEST:g} times as fast; give some, such as "
+                "max_torque of the motors, or begin with a shorter duration"
+            )
+        return found
 
     def _starts(self, spaces: PacedSpaces) -> tuple[float, list[tuple[FloatArray, FloatArray]]]:
         """The duration of the fastest uniform motion, and unknowns to begin with, each with some inside."""
