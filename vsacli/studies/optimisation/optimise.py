@@ -30,6 +30,7 @@ from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
 from vsacli.studies.remedies.motions import Load
+from vsacli.studies.remedies.smallest_changes import STRICTER
 from vsacli.studies.remedies.suggestions import Remedy
 from vsacli.studies.remedies.task import STEPS, Task
 from vsacli.trajectory.trajectory import Trajectory
@@ -42,9 +43,6 @@ BETWEEN = 10
 
 SEARCHES = 10
 """Searches of a joint: a constant, some starts, finer and finer splines; not all of them may be needed."""
-
-STRICTER = (1.0, 1.001, 1.01)
-"""Factors of the margin with which is searched: what has it at steps may fall short of it between."""
 
 
 def optimize(

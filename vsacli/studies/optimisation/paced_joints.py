@@ -65,11 +65,6 @@ class PacedJoint:
         self._chosen = STIFFNESS.key in self._joint.actuator.commanded
 
     @property
-    def bounds(self) -> int:
-        """Number of bounds."""
-        return len(self.bound_names)
-
-    @property
     def bound_names(self) -> list[str]:
         """What each bound is of, in words."""
         ends = ["lower end of the corridor", "upper end of the corridor"] if self._chosen else []
