@@ -38,8 +38,8 @@ class ActiveLimit(Published):
         worst = self.nearest
         corridor = worst.kind == CORRIDOR
         what = "stiffness" if corridor else Flag.labelled(worst.kind).quantity_of(worst.motor)
-        bound = f"{worst.bound:.4g}" + (" that its load allows" if corridor else "")
-        return f"{self.joint}: {what} {worst.value:.4g} of {bound} {worst.unit}"
+        reason = " that its load allows" if corridor else ""
+        return f"{self.joint}: {what} {worst.value:.4g} of {worst.bound:.4g} {worst.unit}{reason}"
 
 
 @dataclass(frozen=True)
