@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Self
 
 from vsacli.analysis import report_text as text
 from vsacli.analysis.dry_friction import dry_friction_lines
+from vsacli.analysis.energy_text import energy_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.analysis.uncertainty_text import uncertainty_lines
@@ -83,7 +84,7 @@ class Report(Stored):
                 *dry_friction_lines(
                     [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
                 ),
-                *text.energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
+                *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
                 *text.drift_lines(self.drifts),
                 text.self_check_line(self.self_check),
             ]

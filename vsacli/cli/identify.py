@@ -127,8 +127,7 @@ def identify(
         file = None if output is None else outputs.file(Path(output))
         found = identified(loaded, recordings, fit or WORDS, bandwidth)
         if file is not None:
-            with file.opened() as stream:
-                stream.write(fitted_text(loaded, found, Path(output or "").parent))
+            file.write_text(fitted_text(loaded, found, Path(output or "").parent))
         if folder is not None:
             _draw(found, robot, folder, outputs)
     say(json.dumps(found.as_json(), indent=1) if as_json else str(found))

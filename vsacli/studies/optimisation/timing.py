@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +20,6 @@ from vsacli.studies.optimisation.separable import Group, SeparableProblem, inter
 from vsacli.studies.remedies.acceptance import ImpossibleError
 from vsacli.studies.remedies.nearest_spline import peaks
 from vsacli.trajectory.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    pass
 
 PIECES = (12, 24)
 """Pieces of the splines, first with several starts, then finer."""
