@@ -12,6 +12,7 @@ import sys
 import sysconfig
 import tomllib
 from collections.abc import Iterator
+from itertools import takewhile
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -109,6 +110,17 @@ def run_shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+def made_on_other_pages(folder: Path) -> None:
+    """What help texts take for granted: studies, and the record that the page on identification makes."""
+    for name in ("identification.md", "studies.md"):
+        for block in blocks(REPOSITORY / "docs" / name):
+            if saved := SAVED_AS.search(block.before):
+                (folder / saved[1]).write_text(block.text)
+    making = [line for block in blocks(REPOSITORY / "docs" / "identification.md") for line in commands(block)]
+    for line in takewhile(lambda line: not line.startswith("vsacli identify"), making):
+        assert run_shell(line, folder).returncode == 0
+
+
 def comparable(report: str) -> str:
     return ROUNDING.sub("self-check passed (,", report).strip()
 
@@ -135,6 +147,8 @@ def test_every_part_has_its_place(generate: ModuleType) -> None:
 @pytest.mark.parametrize("page", [slow(page) if page.name in LONG else page for page in PAGES], ids=named)
 def test_examples_do_what_the_page_says(page: Path, folder: Path) -> None:
     printed: tuple[str, ...] = ()
+    if page.name == "cli.md":
+        made_on_other_pages(folder)
     for block in blocks(page):
         if saved := SAVED_AS.search(block.before):
             (folder / saved[1]).write_text(block.text)
