@@ -46,7 +46,7 @@ def test_operators_bind_as_in_mathematics(text, expected):
 
 PARTS = st.deferred(
     lambda: (
-        st.sampled_from(["x", "stretch", "2", "0.5", "3"])
+        st.sampled_from(["x", "stretch", "2.0", "0.5", "3.0"])  # Python's integers have no end, doubles have
         | st.tuples(PARTS, st.sampled_from("+-*"), PARTS).map("".join)
         | PARTS.map(lambda part: f"({part})")
         | PARTS.map(lambda part: f"-{part}")
@@ -57,7 +57,7 @@ PARTS = st.deferred(
 
 
 @settings(max_examples=50)
-@given(PARTS.filter(lambda text: len(text) < 60))
+@given(PARTS.filter(lambda text: len(text) < 60 and text.count("^") < 6))  # far below the largest double
 def test_any_expression_has_the_value_that_python_finds(text):
     """Python's own parser knows the same precedence, and is never asked by the code under test."""
     expected = eval(text.replace("^", "**"), {**VALUES, **FUNCTIONS})
