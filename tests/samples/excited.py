@@ -50,9 +50,7 @@ class Recorded(NamedTuple):
     @property
     def signals(self) -> Signals:
         """Ready for equations."""
-        positions = np.concatenate((self.q[..., None], self.theta), axis=-1).reshape(len(self.time), -1)
-        there = np.isfinite(positions).all(axis=0)
-        return conditioned(*self, bandwidth_of(self.time, positions[:, there]))
+        return conditioned(*self, bandwidth_of(self.time, self.q, self.theta))
 
     def noisy(self, seed: int, torque: float = TORQUE_NOISE) -> Recorded:
         """With noise."""

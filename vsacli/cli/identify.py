@@ -100,8 +100,6 @@ def identify(
     """
     if planned:
         _check_options({"--fit": fit, "--bandwidth": bandwidth, "--plot": folder}, "goes without --plan")
-        if len(recordings) > 1:
-            raise click.UsageError("--plan compares with one trajectory at most")
         return plan(
             robot,
             recordings,

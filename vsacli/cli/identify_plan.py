@@ -34,6 +34,8 @@ def plan(
     talk: Talk,
 ) -> int:
     """Plan an excitation, beside a trajectory of the user's if there is one, and write it."""
+    if len(own_paths) > 1:
+        raise click.UsageError("--plan compares with one trajectory at most")
     from vsacli.base.outputs import Outputs
     from vsacli.robot.file import load_robot
     from vsacli.studies.identification.excitation import (

@@ -115,9 +115,7 @@ def _conditioned(record: Record, bandwidth: float | None) -> Signals:
     Raises:
         InputError: the bandwidth that was asked for does not fit the record.
     """
-    positions = np.concatenate((record.q[..., None], record.theta), axis=-1).reshape(len(record.time), -1)
-    recorded = positions[:, np.isfinite(positions).all(axis=0)]
-    chosen = bandwidth_of(record.time, recorded) if bandwidth is None else bandwidth
+    chosen = bandwidth_of(record.time, record.q, record.theta) if bandwidth is None else bandwidth
     low, high = bounds(record.time)
     if not low <= chosen <= high:
         raise InputError.one(

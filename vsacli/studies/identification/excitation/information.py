@@ -14,6 +14,7 @@ from vsacli.robot.model import Robot
 from vsacli.studies.identification.estimation.independence import Independence, in_words, independence
 from vsacli.studies.identification.links.inertial_parameters import names
 from vsacli.studies.identification.links.link_equations import LinkUnknowns, link_equations
+from vsacli.studies.identification.links.link_system import LINKS
 from vsacli.studies.identification.motors.motor_equations import motor_equations
 from vsacli.studies.identification.motors.unknowns import GROUPS, unknowns, with_friction
 from vsacli.studies.identification.records.signals import Filter, Signals
@@ -25,9 +26,6 @@ TOLERANCE = 1e-6
 """Share of a column that no combination of others explains, from which on its unknown can be told by some
 motion: dependent ones leave 1e-12 of rounding."""
 
-
-LINKS = "links"
-"""What the equations of all links are called."""
 
 CONDITION = 20.0
 """Largest condition that costs nothing. On the paper's arm it cost 0 to 1.5 % of the standard errors to come

@@ -111,9 +111,7 @@ def noisy_record(robot: Robot, block: Block, noise: Noise, random: np.random.Gen
     largest = TORQUE_SHARE * np.abs(block.tau_motor).max(axis=0)
     torque = largest if noise.torque is None else noise.torque
     tau_motor = block.tau_motor + torque * random.standard_normal(block.tau_motor.shape)
-    columns = np.concatenate((q, theta.reshape(len(q), -1)), axis=1)
-    recorded = columns[:, np.isfinite(columns).all(axis=0)]
-    return conditioned(block.time, q, theta, tau_motor, bandwidth_of(block.time, recorded))
+    return conditioned(block.time, q, theta, tau_motor, bandwidth_of(block.time, q, theta))
 
 
 def executed(robot: Robot, trajectory: Trajectory) -> Block:

@@ -8,18 +8,19 @@ from functools import partial
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.estimation.equations import Equations, with_noise
 from vsacli.studies.identification.estimation.solution import Solution
 from vsacli.studies.identification.links.base_parameters import BaseParameters
 from vsacli.studies.identification.links.inertial_parameters import SYMBOLS, UNITS, names
 from vsacli.studies.identification.links.link_equations import Given, LinkUnknowns, link_equations
-from vsacli.studies.identification.motors.unknowns import SPRINGS, group_of
+from vsacli.studies.identification.motors.unknowns import SPRINGS, admissible, group_of
 from vsacli.studies.identification.records.signals import Signals
 from vsacli.studies.sensitivities.parameters import Parameter, parameters
 
 LINKS = "links"
+"""Title of the system of all of them, and the word by which users ask for it."""
+
 NONE = np.zeros((0, 0))
 
 
@@ -58,13 +59,7 @@ class LinkSystem:
         """The value itself unless it is of the robot file, and that may hold no more than zero."""
         if number < len(self.base.kept):
             return value
-        for each in (value, 0.0):
-            try:
-                self._robot.replace(self.names[number], each)
-            except InputError:
-                continue
-            return each
-        return None
+        return admissible(self._robot, self.names[number], value)
 
     def without(self, fixed: dict[int, float]) -> LinkSystem:
         """The same with some numbers of the file at given values, which are no longer looked for."""

@@ -8,11 +8,10 @@ from functools import partial
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.estimation.equations import Equations, with_noise
 from vsacli.studies.identification.motors.motor_equations import motor_equations
-from vsacli.studies.identification.motors.unknowns import SPRINGS, group_of, unknowns
+from vsacli.studies.identification.motors.unknowns import SPRINGS, admissible, group_of, unknowns
 from vsacli.studies.identification.records.signals import Signals
 from vsacli.studies.sensitivities.parameters import Parameter
 
@@ -41,13 +40,7 @@ class MotorSystem:
 
     def admissible(self, number: int, value: float) -> float | None:
         """The value itself if the robot file may hold it, else zero if it may hold that; None if neither."""
-        for each in (value, 0.0):
-            try:
-                self._robot.replace(self.names[number], each)
-            except InputError:
-                continue
-            return each
-        return None
+        return admissible(self._robot, self.names[number], value)
 
     def without(self, fixed: dict[int, float]) -> MotorSystem:
         """The same with some numbers at given values, which are no longer looked for."""

@@ -56,6 +56,17 @@ def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
     return robot.replace({each: {"coulomb": 0.0} for each in lacking})
 
 
+def admissible(robot: Robot, path: str, value: float) -> float | None:
+    """A value that the robot file may hold at a path: this one, or else zero; None if it may hold neither."""
+    for each in (value, 0.0):
+        try:
+            robot.replace(path, each)
+        except InputError:
+            continue
+        return each
+    return None
+
+
 def group_of(parameter: Parameter) -> str | None:
     """What a number of a joint belongs to, a word of `GROUPS`; None if it is not to be found."""
     place = parameter.path[2:]

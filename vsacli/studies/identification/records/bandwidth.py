@@ -27,15 +27,18 @@ SAMPLES = 8.0
 """Samples to a period of the bandwidth at least."""
 
 
-def bandwidth_of(time: FloatArray, positions: FloatArray) -> float:
+def bandwidth_of(time: FloatArray, q: FloatArray, theta: FloatArray) -> float:
     """A bandwidth for the equations of a record, Hz.
 
     Args:
         time: (samples,), s, in equal steps.
-        positions: of joints and motors, (samples, columns), without NaN.
+        q: positions of joints, (samples, joints); NaN in columns that were not recorded.
+        theta: of motors, (samples, joints, 2), likewise.
     """
     lowest, highest = bounds(time)
-    edges, ends = zip(*(_motion(time, column) for column in positions.T), strict=True)
+    positions = np.concatenate((q[..., None], theta), axis=-1).reshape(len(time), -1)
+    recorded = positions[:, np.isfinite(positions).all(axis=0)]
+    edges, ends = zip(*(_motion(time, column) for column in recorded.T), strict=True)
     return float(np.clip(min(ROOM * max(edges), min(ends), FASTEST), lowest, highest))
 
 
