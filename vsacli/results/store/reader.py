@@ -7,7 +7,6 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self, TypeVar, cast
 
 import h5py
@@ -20,13 +19,13 @@ from vsacli.base.texts import one_line, shown
 from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import (
     CheckedFile,
-    bounded,
     own_dataset,
     read_attributes,
     reporting_damage,
 )
-from vsacli.results.store.inputs import StoredInput, read_sources
+from vsacli.results.store.inputs import StoredInput
 from vsacli.results.store.schema import EXISTING, FORMAT, row_shape, storage_type
+from vsacli.results.store.stored_file import StoredFile
 
 OF_MOTORS = "inputs/robot/joints/actuator_motor_{}"
 """Where a constant of the motors stands, by its name in the robot file."""
@@ -38,7 +37,7 @@ COMPUTED_BY = ("engine", "compiler", "threads")
 """Attributes that older files have not."""
 
 
-class StoredResult:
+class StoredResult(StoredFile):
     """An open result file; a context manager that closes it. A subclass reads another format.
 
     Attributes:
@@ -73,8 +72,7 @@ class StoredResult:
         return open_one_of(path, cls)
 
     def __init__(self, path: str | Path, file: CheckedFile) -> None:
-        self.path = Path(path)
-        self._file = file
+        super().__init__(path, file)
         with reporting_damage(path):
             self.attributes: dict[str, Any] = dict(file.attrs)
             self.robot_name, self.trajectory_name, self.verdict = (
@@ -92,12 +90,6 @@ class StoredResult:
             self.report_json = self._json("report/json")
         self._whole: set[str] = set()
 
-    def _bounded(self, name: str) -> h5py.Dataset:
-        return bounded(own_dataset(self._file, name))
-
-    def _labels(self, name: str) -> tuple[str, ...]:
-        return tuple(map(one_line, self._bounded(name).asstr()[...]))
-
     def motor_constant(self, name: str) -> FloatArray:
         """A number of the motors as they act on their joints, (joints, 2); NaN where the robot gives none.
 
@@ -111,7 +103,7 @@ class StoredResult:
         """What is stored, which has no second axis if no joint has two motors."""
         constants = np.full((len(self.actuators), len(MOTORS)), np.nan)
         if OF_MOTORS.format(name) in self._file:
-            stored = self._bounded(OF_MOTORS.format(name))
+            stored = self._dataset(OF_MOTORS.format(name))
             constants.T[: 1 if stored.ndim == 1 else len(MOTORS)] = stored[...].T
         return constants
 
@@ -129,7 +121,7 @@ class StoredResult:
 
     def _samples(self) -> int:
         """How many there are, if joints and times fit together."""
-        shape = self._bounded("time").shape
+        shape = self._dataset("time").shape
         if {len(self.joint_types), len(self.actuators)} != {len(self.joint_names)} or len(shape) != 1:
             raise ValueError("joints and times do not fit together")
         return int(shape[0])
@@ -142,7 +134,7 @@ class StoredResult:
             InputError: they are damaged.
         """
         with reporting_damage(self.path, "time"):
-            values: FloatArray = self._bounded("time")[...]
+            values: FloatArray = self._dataset("time")[...]
         return values
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
@@ -207,27 +199,6 @@ class StoredResult:
                 ],
             }
         return cast("dict[str, Any]", shown(provenance))
-
-    def inputs(self) -> list[StoredInput]:
-        """The files that were read, with what they held, as far as it was stored.
-
-        Raises:
-            InputError: the file is damaged.
-        """
-        with reporting_damage(self.path):
-            return list(read_sources(self._file))
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _changes(file: StoredInput) -> dict[str, Any]:

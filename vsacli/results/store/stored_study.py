@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
-
-import h5py
+from typing import Any
 
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line
-from vsacli.results.store.damage import CheckedFile, bounded, own_dataset, reporting_damage
-from vsacli.results.store.inputs import StoredInput, read_sources
-from vsacli.results.store.study_table import FORMAT
+from vsacli.results.store.damage import CheckedFile, reporting_damage
+from vsacli.results.store.stored_file import StoredFile
+from vsacli.results.store.study_table import FORMAT, TEXTS
 
 PROVENANCE = ("method", "seed", "engine", "compiler", "numpy", "command_line")
 """Root attributes that say how a table was computed."""
 
 
-class StoredStudy:
+class StoredStudy(StoredFile):
     """An open table of a study; a context manager that closes it.
 
     Attributes:
@@ -43,8 +40,7 @@ class StoredStudy:
             InputError: there is no such file, or it is no complete table of a study.
             StorageError: the operating system refuses to read it.
         """
-        self.path = Path(path)
-        self._file = CheckedFile(path)
+        super().__init__(path, CheckedFile(path))
         try:
             with reporting_damage(path):
                 self.attributes: dict[str, Any] = dict(self._file.attrs)
@@ -71,12 +67,9 @@ class StoredStudy:
             raise
 
     def _check(self) -> None:
-        for name in ("trajectory", "verdict", "error", "key", *self.parameters, *self.columns):
+        for name in (*TEXTS, *self.parameters, *self.columns):
             if self._dataset(name).shape[0] != self.rows:
                 raise ValueError(f"{name} has not {self.rows} rows")
-
-    def _dataset(self, name: str) -> h5py.Dataset:
-        return bounded(own_dataset(self._file, name))
 
     def texts(self, name: str) -> tuple[str, ...]:
         """Texts of all rows, or the labels of a dimension.
@@ -85,7 +78,7 @@ class StoredStudy:
             InputError: they are damaged.
         """
         with reporting_damage(self.path, name):
-            return tuple(map(one_line, self._dataset(name).asstr()[...]))
+            return self._labels(name)
 
     def read(self, name: str) -> AnyArray:
         """A column of numbers, (rows, ...), or the numbers of the runs.
@@ -111,41 +104,14 @@ class StoredStudy:
         """What is known of how it was computed: method, seed and engine, and what was typed."""
         return {name: str(self.attributes[name]) for name in PROVENANCE if name in self.attributes}
 
-    def inputs(self) -> list[StoredInput]:
-        """The files that were read.
-
-        Raises:
-            InputError: the file is damaged.
-        """
-        with reporting_damage(self.path):
-            return list(read_sources(self._file))
-
     def check(self) -> None:
         """Read everything once.
 
         Raises:
             InputError: something is damaged.
         """
-        for name in (
-            "trajectory",
-            "verdict",
-            "error",
-            "key",
-            *filter(self.parameter_is_text, self.parameters),
-        ):
+        for name in (*TEXTS, *filter(self.parameter_is_text, self.parameters)):
             self.texts(name)
         for name in ("run", *self.columns):
             self.read(name)
         self.inputs()
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.close()
