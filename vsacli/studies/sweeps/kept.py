@@ -142,14 +142,3 @@ KEPT = {
 def columns(kept: Sequence[Kept], report: Report) -> FloatArray:
     """The values of a run one after the other, (columns,)."""
     return np.concatenate([each.values(report).ravel() for each in kept])
-
-
-def divided(kept: Sequence[Kept], rows: FloatArray, joints: int) -> dict[str, FloatArray]:
-    """Rows of columns, (runs, columns), as arrays (runs, joints[, 2]) by name."""
-    arrays, start = {}, 0
-    for each in kept:
-        shape = each.shape(joints)
-        stop = start + math.prod(shape)
-        arrays[each.name] = rows[:, start:stop].reshape(len(rows), *shape)
-        start = stop
-    return arrays

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import Quantity
 from vsacli.base.variables import MOTORS, UNCERTAIN, VARIABLES, Block, deviation
+from vsacli.studies.sweeps.row_values import arrays_of, width
 
 STEP = "step"
 TIME = "time"
@@ -76,25 +76,15 @@ class Recorder:
 
 def steps_of(curves: FloatArray, kept: Sequence[OverTime], joints: int) -> int:
     """How many steps were gathered."""
-    return len(curves) // _width(kept, joints) if kept else 0
-
-
-def _width(kept: Sequence[OverTime], joints: int) -> int:
-    return sum(math.prod(each.shape(joints)) for each in kept)
+    return len(curves) // width(kept, joints) if kept else 0
 
 
 def filled(
     rows: Sequence[FloatArray], kept: Sequence[OverTime], steps: int, joints: int
 ) -> dict[str, FloatArray]:
     """Curves of several runs as arrays (runs, steps, ...) by name, NaN after the end of a run."""
-    table = np.full((len(rows), steps, _width(kept, joints)), np.nan)
+    table = np.full((len(rows), steps, width(kept, joints)), np.nan)
     for place, curves in enumerate(rows):
         count = steps_of(curves, kept, joints)
         table[place, :count] = curves.reshape(count, -1) if count else np.nan
-    arrays, start = {}, 0
-    for each in kept:
-        shape = each.shape(joints)
-        stop = start + math.prod(shape)
-        arrays[each.name] = table[:, :, start:stop].reshape(len(rows), steps, *shape)
-        start = stop
-    return arrays
+    return arrays_of(kept, table, joints)

@@ -11,8 +11,8 @@ import numpy as np
 from vsacli.base.outputs import Staged
 from vsacli.results.store.study_table import Head, Parameter, Rows, StudyWriter
 from vsacli.studies.sweeps.journal import Journal
-from vsacli.studies.sweeps.kept import divided
 from vsacli.studies.sweeps.over_time import filled, steps_of
+from vsacli.studies.sweeps.row_values import arrays_of, width
 from vsacli.studies.sweeps.rows import FAILED, Computer, Row
 from vsacli.studies.sweeps.study import Study
 from vsacli.studies.sweeps.workers import LOST, Workers
@@ -99,7 +99,9 @@ def write(
     def row(run: int) -> Row:
         return lost[run] if run in lost else journal.row(run, study.key(study.point(run)))
 
-    steps = max((steps_of(row(run).curves, study.over_time, joints) for run in runs), default=0)
+    steps = 0
+    if study.over_time:  # known once all rows were read
+        steps = max((steps_of(row(run).curves, study.over_time, joints) for run in runs), default=0)
     at_once = ROWS_AT_ONCE if steps == 0 else 1 + ROWS_AT_ONCE // steps
     with StudyWriter(file, _head(study, steps, provenance), len(runs)) as writer:
         for start in range(0, len(runs), at_once):
@@ -150,12 +152,11 @@ def _rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
                 value if isinstance(value, str) else json.dumps(value) for value in values
             ]
     joints = len(study.robot.joints)
-    width = sum(int(np.prod(each.shape(joints))) for each in study.kept)
-    table = np.full((len(rows), width), np.nan)
+    table = np.full((len(rows), width(study.kept, joints)), np.nan)
     for place, row in enumerate(rows):
         if row.verdict != FAILED:
             table[place] = row.values
-    arrays |= divided(study.kept, table, joints)
+    arrays |= arrays_of(study.kept, table, joints)
     if study.over_time:
         arrays |= filled([row.curves for row in rows], study.over_time, steps, joints)
     return Rows([row.run for row in rows], arrays)
