@@ -20,7 +20,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line
 from vsacli.base.units import POSITION, TORQUE
 from vsacli.base.variables import MOTORS
-from vsacli.results.plots.curves import Failures, read_curves
+from vsacli.results.curves import Failures, read_curves
 from vsacli.results.plots.drawing import draw_bands, draw_curve, house_style, line_handle, line_style
 from vsacli.results.plots.panels import (
     PANEL_WIDTH,

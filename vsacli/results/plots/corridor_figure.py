@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import STIFFNESS
 from vsacli.base.variables import VARIABLES
-from vsacli.results.plots.curves import Curves, Failures, read_curves
+from vsacli.results.curves import Curves, Failures, read_curves
 from vsacli.results.plots.drawing import draw_bands, draw_curve, house_style, line_style
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, folding, joint_panels, result_title
 from vsacli.results.store.reader import StoredResult

@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.results.plots.curves import marked_spans
+from vsacli.results.envelopes import marked_spans
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.plots.curves import FULL_DETAIL, column_starts, kept_samples
+from vsacli.results.envelopes import FULL_DETAIL, column_starts, kept_samples
 from vsacli.results.plots.drawing import draw_curve, house_style, line_handle, line_style
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, joint_panels
 

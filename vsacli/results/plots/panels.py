@@ -17,7 +17,7 @@ from matplotlib.gridspec import SubplotSpec
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.units import TIME, TORQUE
 from vsacli.base.variables import MOTORS, deviation
-from vsacli.results.plots.curves import Failures, read_curves
+from vsacli.results.curves import Failures, read_curves
 from vsacli.results.plots.drawing import (
     draw_bands,
     draw_curve,
