@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from samples.infeasible_tasks import random_task
-from samples.marks import slow
+from samples.marks import slow_but
 from samples.remedies import accepted, written
 
 from vsacli import load_robot, load_trajectory, suggest
@@ -24,9 +24,65 @@ MARGIN = 0.01
 SUPERFLUOUS = 1.06
 """A remedy that is not listed is less than 5 % smaller than one that is; 1 % is a stride of the search."""
 
+INFEASIBLE = [
+    int(seed)
+    for seed in [
+        "0",
+        "1",
+        "5",
+        "6",
+        "9",
+        "13",
+        "15",
+        "16",
+        "18",
+        "20",
+        "24",
+        "25",
+        "26",
+        "29",
+        "31",
+        "32",
+        "33",
+        "34",
+        "36",
+        "37",
+        "38",
+        "39",
+        "41",
+        "45",
+        "46",
+        "47",
+        "48",
+        "49",
+        "50",
+        "51",
+        "54",
+        "55",
+        "57",
+        "61",
+        "62",
+        "64",
+        "65",
+        "66",
+        "68",
+        "72",
+        "74",
+        "76",
+        "77",
+        "83",
+        "84",
+        "86",
+        "89",
+        "92",
+        "93",
+        "95",
+    ]
+]
+"""Fifty of the first sixty seeds whose task is infeasible. Every robot, kind of limit and outcome is among
+them; the ten that are left out take longest, and pass likewise."""
+
 QUICK = (0, 9, 41, 50)
-SLOW = (5, 11, 22, 25, 29, 30, 33, 34, 37, 38, 49, 57, 60, 62)
-"""Two thirds of the tasks are infeasible; these have every robot, kind of limit and outcome among them."""
 
 
 def fine_joints(robot, motion):
@@ -76,7 +132,7 @@ def check_written(path, robot_path, remedy, vsacli):
     assert "motors move" not in done.out
 
 
-@pytest.mark.parametrize("seed", [*QUICK, *map(slow, SLOW)])
+@pytest.mark.parametrize("seed", slow_but(QUICK, INFEASIBLE))
 def test_every_remedy_works_and_none_is_missed(tmp_path, vsacli, seed):
     robot_path, task_path = random_task(np.random.default_rng(seed), tmp_path)
     robot = load_robot(robot_path)
