@@ -26,9 +26,10 @@ from vsacli.results.store.damage import (
 from vsacli.results.store.inputs import StoredInput
 from vsacli.results.store.schema import EXISTING, FORMAT, row_shape, storage_type
 from vsacli.results.store.stored_file import StoredFile
+from vsacli.results.store.stored_limits import ACHIEVED, RANGES, SIZES
 
-OF_MOTORS = "inputs/robot/joints/actuator_motor_{}"
-"""Where a constant of the motors stands, by its name in the robot file."""
+OF_JOINTS = "inputs/robot/joints/{}"
+"""Where a number of the joints stands, by the path to it in the robot file, its dots as underscores."""
 
 BLOCK_SAMPLES = 8192
 """Samples that are read at a time to see whether they can be."""
@@ -82,7 +83,7 @@ class StoredResult(StoredFile):
             self.joint_names = self._labels("joint")
             self.joint_types = self._labels("joint_type")
             self.actuators = self._labels("inputs/robot/joints/actuator_type")
-            self.gear_ratio = self._motor_constant("gear_ratio")
+            self.gear_ratio = self._of_motors("actuator_motor_gear_ratio")
             self.variables = tuple(
                 name for name, variable in self.declared.items() if variable.dims and name in file
             )
@@ -97,15 +98,31 @@ class StoredResult(StoredFile):
             InputError: the file is damaged.
         """
         with reporting_damage(self.path):
-            return self._motor_constant(name)
+            return self._of_motors(f"actuator_motor_{name}")
 
-    def _motor_constant(self, name: str) -> FloatArray:
+    def _of_motors(self, name: str) -> FloatArray:
         """What is stored, which has no second axis if no joint has two motors."""
         constants = np.full((len(self.actuators), len(MOTORS)), np.nan)
-        if OF_MOTORS.format(name) in self._file:
-            stored = self._dataset(OF_MOTORS.format(name))
+        if OF_JOINTS.format(name) in self._file:
+            stored = self._dataset(OF_JOINTS.format(name))
             constants.T[: 1 if stored.ndim == 1 else len(MOTORS)] = stored[...].T
         return constants
+
+    def limits(self, name: str) -> FloatArray:
+        """Lower and upper bound of a variable, (joints, 1 or 2, 2); not finite where there is none.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        name = ACHIEVED.get(name, name)
+        with reporting_damage(self.path):
+            if name in SIZES:
+                largest = self._of_motors(SIZES[name])
+                return np.stack([-largest, largest], axis=-1)
+            bounds = np.full((len(self.actuators), 1, 2), np.nan)
+            if name in RANGES and OF_JOINTS.format(RANGES[name]) in self._file:
+                bounds[:, 0] = self._dataset(OF_JOINTS.format(RANGES[name]))[...]
+        return bounds
 
     def has(self, variable: Variable) -> bool:
         """Whether runs of its robot have a variable, as far as that depends on what the robot file gives."""
