@@ -212,6 +212,17 @@ def test_internal_links_resolve(page: Path) -> None:
         assert not anchor or anchor in anchors(file), f"{page.name}: {target}"
 
 
+def test_the_first_page_lists_every_page() -> None:
+    """Its lists are the contents of the site."""
+    docs = REPOSITORY / "docs"
+    listed = re.findall(
+        r"^- \[[^\]]+\]\((\S+\.md)\)", (docs / "index.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert sorted(listed) == sorted(
+        page.relative_to(docs).as_posix() for page in docs.rglob("*.md") if page.name != "index.md"
+    )
+
+
 def anchors(page: Path) -> set[str]:
     """The names that headings get where Markdown is shown."""
     titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)

@@ -1,0 +1,1 @@
+"""What the site has beside its pages: contents, descriptions of the Python names, formulas, manual pages."""
