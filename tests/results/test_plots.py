@@ -14,8 +14,8 @@ from samples.figures import rest_to_rest, without
 from samples.marks import slow
 
 from vsacli.base.errors import InputError
+from vsacli.results.corridors import visible_range
 from vsacli.results.plots import RESULT_DRAWINGS, compare_files, omitted_figures, plot_stored, save_figures
-from vsacli.results.plots.corridor_figure import visible_range
 from vsacli.results.plots.drawing import line_style, shortened
 
 NAN = np.nan

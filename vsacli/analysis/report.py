@@ -12,7 +12,7 @@ from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.analysis.uncertainty_text import uncertainty_lines
 from vsacli.base.json_records import JsonObject, Stored, named
-from vsacli.base.tables import aligned
+from vsacli.base.tables import ReportText
 
 VERDICTS = ("ok", "over_limit", "singular", "infeasible", "doubtful", "self_check_failed")
 """From best to worst; the worst that applies wins."""
@@ -69,26 +69,27 @@ class Report(Stored):
         """How the deflections were found: as the "root" of (14) at each step, or by "integrate"."""
         return "integrate" if self.drifts else "root"
 
+    def as_text(self) -> ReportText:
+        """The report in its parts, as people read it."""
+        lines = [
+            *text.warnings_and_notes(self.warnings, self.notes),
+            *(sentence for joint in self.joints for sentence in text.sentences(joint)),
+            *uncertainty_lines(self.joints),
+            *text.stops(self.joints, self.drifts),
+            *text.start(self.joints),
+            *text.end(self.joints),
+            *dry_friction_lines(
+                [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
+            ),
+            *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
+            *text.drift_lines(self.drifts),
+            text.self_check_line(self.self_check),
+        ]
+        return ReportText(self._headline(), text.joint_rows(self.joints), lines)
+
     def __str__(self) -> str:
         """The lines that the commands print, without a final newline."""
-        return "\n".join(
-            [
-                self._headline(),
-                *aligned(text.joint_rows(self.joints)),
-                *text.warnings_and_notes(self.warnings, self.notes),
-                *(sentence for joint in self.joints for sentence in text.sentences(joint)),
-                *uncertainty_lines(self.joints),
-                *text.stops(self.joints, self.drifts),
-                *text.start(self.joints),
-                *text.end(self.joints),
-                *dry_friction_lines(
-                    [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
-                ),
-                *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
-                *text.drift_lines(self.drifts),
-                text.self_check_line(self.self_check),
-            ]
-        )
+        return str(self.as_text())
 
     def _headline(self) -> str:
         left = f"{self.robot}, {self.trajectory}: {text.count(self.samples)}, {self.duration:g} s"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from html import escape
+from typing import NamedTuple
 
 
 def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
@@ -15,6 +16,24 @@ def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
             for column, (cell, width) in enumerate(zip(row, widths, strict=True))
         )
         yield "   ".join([name, *cells])
+
+
+class ReportText(NamedTuple):
+    """A report as people read it, in its parts; as a text, its lines without a final newline.
+
+    Attributes:
+        headline: what was run, and the verdict.
+        rows: a table, its header first; none if there is no table.
+        lines: what else there is to say, a line or more each.
+    """
+
+    headline: str
+    rows: Sequence[tuple[str, ...]]
+    lines: Sequence[str]
+
+    def __str__(self) -> str:
+        table = aligned(self.rows) if self.rows else ()
+        return "\n".join([self.headline, *table, *self.lines])
 
 
 def html_table(title: str, rows: Sequence[tuple[str, ...]]) -> str:

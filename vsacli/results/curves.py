@@ -4,16 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, by_joint
+from vsacli.base.arrays import BoolArray, FlagArray, FloatArray, IndexArray, by_joint
 from vsacli.base.flags import Flag
 from vsacli.results.envelopes import FULL_DETAIL, column_starts, kept_samples
 from vsacli.results.store.reader import StoredResult
 
 BLOCK = 65536
 """Samples read at once, about."""
+
+
+class Sampled(Protocol):
+    """What holds variables over time, as a result file does."""
+
+    @property
+    def time(self) -> FloatArray:
+        """Times, (samples,), s, ascending."""
+
+    @property
+    def joint_names(self) -> Sequence[str]:
+        """Of the joints, or of whatever else the second axis of its variables runs over."""
+
+    def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
+        """Steps start..stop-1 of a variable, (steps, joints) or (steps, joints, 2)."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +45,7 @@ class Curves:
     values: FloatArray
 
 
-def read_curves(result: StoredResult, names: Sequence[str]) -> tuple[Curves, ...]:
+def read_curves(result: Sampled, names: Sequence[str]) -> tuple[Curves, ...]:
     """The curves of each joint: the variables in the order of `names`, a variable of the motors as two."""
     time = result.time
     pieces = [_block_curves(result, names, time, bounds) for bounds in _blocks(time)]
@@ -48,7 +64,7 @@ def _blocks(time: FloatArray) -> list[IndexArray]:
 
 
 def _block_curves(
-    result: StoredResult, names: Sequence[str], time: FloatArray, bounds: IndexArray
+    result: Sampled, names: Sequence[str], time: FloatArray, bounds: IndexArray
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Times and values that each joint keeps of one block."""
     start, stop = int(bounds[0]), int(bounds[-1])

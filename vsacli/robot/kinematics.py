@@ -3,19 +3,47 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, checked_shape
 from vsacli.base.wrench import WRENCH_AXES, check_frame
 from vsacli.compute.vector import Matrix, Vector, add, exact, mul, sub, trigonometric
-from vsacli.robot.joint import Joint, Pose
+from vsacli.robot.joint import DenavitHartenberg, Pose
 from vsacli.robot.model import Robot, check_robot
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
+
+
+class Row(Protocol):
+    """What a joint has to do with where frames lie."""
+
+    @property
+    def dh(self) -> DenavitHartenberg:
+        """Its Denavit-Hartenberg row."""
+
+    @property
+    def is_revolute(self) -> bool:
+        """Whether its variable is an angle."""
+
+
+class Geometry(Protocol):
+    """What of a robot says where its frames lie."""
+
+    @property
+    def base(self) -> Pose:
+        """DH frame 0 in the base frame."""
+
+    @property
+    def tool(self) -> Pose:
+        """End effector in the last DH frame."""
+
+    @property
+    def joints(self) -> Sequence[Row]:
+        """From the base to the tip."""
 
 
 class Frame(NamedTuple):
@@ -34,7 +62,7 @@ class Frame(NamedTuple):
         return Frame(self.axes @ inner.axes, origin)
 
 
-def frames(robot: Robot, q: FloatArray) -> Iterator[Frame]:
+def frames(robot: Geometry, q: FloatArray) -> Iterator[Frame]:
     """Frames 0 to N at positions q, (samples, joints)."""
     frame = Frame(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
     yield frame
@@ -43,7 +71,7 @@ def frames(robot: Robot, q: FloatArray) -> Iterator[Frame]:
         yield frame
 
 
-def _link_frame(joint: Joint, variable: FloatArray) -> Frame:
+def _link_frame(joint: Row, variable: FloatArray) -> Frame:
     """Frame i in frame i-1: Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
     dh, zero = joint.dh, np.zeros_like(variable)
     theta, d = (dh.theta + variable, dh.d + zero) if joint.is_revolute else (dh.theta + zero, dh.d + variable)
@@ -69,7 +97,7 @@ def forward_kinematics(robot: Robot, q: ArrayLike) -> FloatArray:
     """
     check_robot(robot)
     positions = checked_shape("q", q, len(robot.joints))
-    _, *moving = _in_base(robot, np.atleast_2d(positions))
+    _, *moving = frames_in_base(robot, np.atleast_2d(positions))
     poses = np.zeros((*np.atleast_2d(positions).shape[:1], len(moving), 4, 4))
     poses[..., 3, 3] = 1
     for index, frame in enumerate(moving):
@@ -98,7 +126,7 @@ def jacobian(robot: Robot, q: ArrayLike, frame: str = "end_effector") -> FloatAr
     check_robot(robot)
     check_frame(frame, "Jacobian")
     positions = checked_shape("q", q, len(robot.joints))
-    *driving, _, tool = _in_base(robot, np.atleast_2d(positions))
+    *driving, _, tool = frames_in_base(robot, np.atleast_2d(positions))
     columns = np.zeros((*np.atleast_2d(positions).shape[:1], len(WRENCH_AXES), len(robot.joints)))
     for index, (joint, moved) in enumerate(zip(robot.joints, driving, strict=True)):
         axis = moved.axes[..., 2]
@@ -110,7 +138,7 @@ def jacobian(robot: Robot, q: ArrayLike, frame: str = "end_effector") -> FloatAr
     return columns.reshape(*positions.shape[:-1], *columns.shape[1:])
 
 
-def _in_base(robot: Robot, q: FloatArray) -> Iterator[Frame]:
+def frames_in_base(robot: Geometry, q: FloatArray) -> Iterator[Frame]:
     """Frames 0 to N and that of the end effector in the base frame, at positions q, (samples, joints)."""
     base, tool = _constant_frame(robot.base), _constant_frame(robot.tool)
     for frame in frames(robot, q):

@@ -14,7 +14,7 @@ from vsacli.analysis.energy_text import energy_lines
 from vsacli.analysis.report_text import WIDTH, warnings_and_notes
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
-from vsacli.base.tables import aligned
+from vsacli.base.tables import ReportText
 from vsacli.base.units import POSITION, time_text
 from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
 from vsacli.control.simulation.history import History
@@ -125,21 +125,22 @@ class SimulationReport(Stored):
         worst = max(self.joints, key=lambda joint: joint.q.peak / max(joint.tolerance, sys.float_info.min))
         return LargestError(worst.name, worst.q.peak, POSITION.unit(worst.type), worst.q.time)
 
+    def as_text(self) -> ReportText:
+        """The report in its parts, as people read it."""
+        lines = [
+            *warnings_and_notes(self.warnings, self.notes),
+            *(limit_sentence(joint, worst) for joint in self.joints for worst in joint.worst.values()),
+            *(end_sentence(joint) for joint in self.joints if self.complete and joint.off_course),
+            *([] if self.ending is None else [self.ending]),
+            *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
+            *self._loss(),
+            *self._effort(),
+        ]
+        return ReportText(self._headline(), [HEADER, *map(row, self.joints)], lines)
+
     def __str__(self) -> str:
         """The lines that the command prints, without a final newline."""
-        return "\n".join(
-            [
-                self._headline(),
-                *aligned([HEADER, *map(row, self.joints)]),
-                *warnings_and_notes(self.warnings, self.notes),
-                *(limit_sentence(joint, worst) for joint in self.joints for worst in joint.worst.values()),
-                *(end_sentence(joint) for joint in self.joints if self.complete and joint.off_course),
-                *([] if self.ending is None else [self.ending]),
-                *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
-                *self._loss(),
-                *self._effort(),
-            ]
-        )
+        return str(self.as_text())
 
     def _headline(self) -> str:
         left = f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"

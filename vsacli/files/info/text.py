@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from vsacli.analysis import report_text
-from vsacli.analysis.report import Report
 from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
 from vsacli.base.units import DAMPING, POSITION, STIFFNESS, TORQUE
 from vsacli.documents.changes import written
 from vsacli.files.info.study_info import KIND, study_lines
+from vsacli.files.stored_reports import stored_report
 
 Description = Mapping[str, Any]
 
@@ -150,19 +150,7 @@ def _result(result: Description) -> Iterator[str]:
             for each in result["variables"]
         ]
     )
-    yield from ("", _report(result["kind"], result["report"]))
-
-
-def _report(kind: str, report: Description) -> str:
-    """What the command that made the file printed."""
-    from vsacli.control.simulation.simulation_report import SimulationReport
-
-    try:
-        if kind == "simulation":
-            return str(SimulationReport.from_json(report))
-        return str(Report.from_json(report))
-    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError):
-        return "its report has another form than this version writes; --json shows it"
+    yield from ("", str(stored_report(result["kind"], result["report"])))
 
 
 def _cache(cache: Description) -> Iterator[str]:

@@ -12,11 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Patch
 
-from vsacli.actuators.kinds import existing
-from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import STIFFNESS
-from vsacli.base.variables import VARIABLES
+from vsacli.results.corridors import BOUNDS, compliant_joints, visible_range
 from vsacli.results.curves import Curves, Failures, read_curves
 from vsacli.results.plots.drawing import draw_bands, draw_curve, house_style, line_style
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, folding, joint_panels, result_title
@@ -32,22 +30,9 @@ PANEL_HEIGHT = 1.7
 """Inches."""
 
 MOST_ROWS = 5
-BOUNDS = ("stiffness_lower", "stiffness_upper")
-
-REACH = 0.25
-"""How far from the command a bound may lie to be shown, relative to the command."""
-
-MARGIN = 0.06
-"""Free space above and below, relative to what is shown."""
 
 _AREA: dict[str, Any] = {"facecolor": "#8fc1ec", "alpha": 0.4, "linewidth": 0, "zorder": 0.8}
 _EDGE: dict[str, Any] = {"color": "#6f9fc8", "linewidth": 0.9, "zorder": 1}
-
-
-def compliant_joints(actuators: Sequence[str]) -> list[int]:
-    """The joints that have a stiffness, by the types of their actuators."""
-    there = existing(VARIABLES["stiffness"], actuators)
-    return [joint for joint, [has_stiffness] in enumerate(there) if has_stiffness]
 
 
 def draw_corridors(place: SubplotSpec, result: StoredResult, failures: Failures) -> list[Artist]:
@@ -80,31 +65,6 @@ def _draw_stiffness(axes: Axes, curves: Curves, joint: int) -> list[Artist]:
     for bound in bounds:
         axes.plot(curves.time, np.where(np.isinf(bound), np.nan, bound), **_EDGE)
     return [Patch(**_AREA, label="reachable")]
-
-
-def visible_range(command: FloatArray, *bounds: FloatArray) -> tuple[float, float]:
-    """Lower and upper end of a stiffness axis.
-
-    It holds the whole command, every bound the command violates, and the bounds near it; bounds far off, or
-    infinite, do not squeeze the command into a line.
-
-    Args:
-        command: (points,), N m/rad (N/m); may hold NaN.
-        bounds: nothing, or lower and upper end of the corridor, each (points,); may hold NaN and infinities.
-    """
-    command = command[np.isfinite(command)]
-    if not command.size:
-        return (0.0, 1.0)
-    low, high = command.min(), command.max()
-    reach = max(high - low, REACH * abs(high))
-    shown = [command]
-    for bound, nearer, end in zip(
-        bounds, (np.maximum, np.minimum), (low - reach, high + reach), strict=False
-    ):
-        shown.append(nearer(bound[np.isfinite(bound)], end))
-    values = np.concatenate(shown)
-    margin = MARGIN * np.ptp(values) or reach
-    return (float(values.min() - margin), float(values.max() + margin))
 
 
 def check_drawable(actuators: Sequence[str]) -> None:

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from vsacli.base.errors import InputError
 from vsacli.base.units import CURRENT, DAMPING, ENERGY, POSITION, POWER, STIFFNESS, TORQUE, VOLTAGE, Quantity
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
+from vsacli.results.corridors import compliant_joints
 from vsacli.results.curves import Failures
-from vsacli.results.plots.corridor_figure import MOST_ROWS, compliant_joints, draw_corridors
+from vsacli.results.plots.corridor_figure import MOST_ROWS, draw_corridors
 from vsacli.results.plots.drawing import house_style
 from vsacli.results.plots.panels import (
     GROUP_HEIGHT,
