@@ -102,8 +102,9 @@ def _cheapest(
     progress: Callable[[int], object],
 ) -> Optimum:
     """The best stiffness of all joints, confirmed by a run."""
-    for factor in STRICTER:
-        search = _Search(Acceptance(what.robot, factor * what.margin), trajectory, criterion, seed, progress)
+    for share in STRICTER:
+        acceptance = Acceptance(what.robot, what.margin).stricter(share)
+        search = _Search(acceptance, trajectory, criterion, seed, progress)
         try:
             joints, best = search.best()
         except ImpossibleError as error:

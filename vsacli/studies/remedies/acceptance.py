@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -23,6 +23,9 @@ from vsacli.robot.model import Robot
 from vsacli.studies.remedies.motions import Instants, Load, Passage
 from vsacli.studies.remedies.recorded_limits import RecordedLimits
 from vsacli.trajectory.trajectory import Trajectory
+
+RESERVED = ("dq", "dtheta", "tau_motor", "current", "voltage")
+"""Variables that may be beyond a limit between steps that keep it, and that a search can keep clear of it."""
 
 
 class ImpossibleError(VsacliError):
@@ -45,11 +48,17 @@ class Acceptance:
         robot: the robot.
         near_singular: the margin.
         recorded: how limits are judged if the task was recorded.
+        reserve: share of each limit of `RESERVED` that is kept clear of.
     """
 
     robot: Robot
     near_singular: float
     recorded: RecordedLimits | None = None
+    reserve: float = 0.0
+
+    def stricter(self, share: float) -> Acceptance:
+        """The same with a margin that is larger by a share, which is kept clear of limits as well."""
+        return replace(self, near_singular=(1 + share) * self.near_singular, reserve=share)
 
     def refused(self, passage: Passage) -> BoolArray:
         """The steps that are not accepted, (samples, joints)."""
@@ -115,7 +124,15 @@ class Acceptance:
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, values, instants)
         refused: BoolArray = (short < self.near_singular) | has(flags, Flag.INFEASIBLE | LIMITS)
-        return refused
+        return refused | self._near_limits(joint, values)
+
+    def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
+        """The steps at which a reserve is used up, (samples,)."""
+        near = np.zeros(len(values["flags"]), dtype=np.bool_)
+        for check in limit_checks(joint) if self.reserve else ():
+            if check.variable in RESERVED:
+                near |= check.clearance(values) < self.reserve
+        return near
 
     def _reach_reason(self, joint: Joint, load: Load, values: OfJoint) -> str:
         asked = load.command.commanded["stiffness"]

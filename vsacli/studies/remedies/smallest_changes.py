@@ -25,9 +25,9 @@ AS_IT_IS = Combination(1.0, {}, {}, 0.0)
 SIMPLER_SHARE = 1.05
 """How much larger a remedy with fewer kinds of change may be and still be worth more."""
 
-STRICTER = (1.0, 1.001, 1.01)
-"""Factors of the margin with which is searched, one after the other: what has the margin at the steps may
-fall short of it between them, by up to 0.8 % of itself where this was first seen."""
+STRICTER = (0.0, 0.001, 0.01)
+"""Shares by which the rule is stricter, one after the other: what has the margin at the steps may fall short
+of it between them, by up to 0.8 % of itself where this was first seen."""
 
 FASTER_SHARE = 0.8
 """Share of the extra time of a remedy that another may take to be worth its while although it is larger."""
@@ -63,9 +63,8 @@ def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SI
     if reasons := acceptance.position_reasons(trajectory):
         none = NotPossible(reasons)
         return Suggestions(near_singular, none, none, none)
-    for factor in STRICTER:
-        stricter = replace(acceptance, near_singular=factor * near_singular)
-        found = _Found.of(replace(asked, acceptance=stricter))
+    for share in STRICTER:
+        found = _Found.of(replace(asked, acceptance=acceptance.stricter(share)))
         chosen, failed = _worth_choosing(found.remedies, asked)
         if not failed:
             break
