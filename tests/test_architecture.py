@@ -18,7 +18,13 @@ REPOSITORY = Path(__file__).parents[1]
 PACKAGE = Path(vsacli.__file__).parent
 ROW = re.compile(r"^\| `(?P<entry>\w+(?:\.\w+)?)` \| .+ \|$", re.MULTILINE)
 
-HOMES = {"yaml": "documents", "h5py": "results.store", "matplotlib": "results.plots", "click": "cli"}
+HOMES = {
+    "yaml": "documents",
+    "h5py": "results.store",
+    "matplotlib": "results.plots",
+    "click": "cli",
+    "pyarrow": "results.exports",
+}
 """Libraries that only one folder may import."""
 
 HEAVY = ("numpy", "scipy", "matplotlib", "h5py", "hashlib")
@@ -27,7 +33,7 @@ NOT_FOR_THE_MAIN_JOB = (
     *("scipy", "matplotlib", "numpy.ma", "numpy.polynomial", "numpy.typing"),
     *("concurrent", "importlib.resources", "random", "shutil", "subprocess", "tempfile", "traceback"),
     *("cli.simulate", "cli.check_feasibility", "control", "files", "studies"),
-    *("results.csv_export", "results.plots", "results.store.reader", "robot.modified_dh", "robot.urdf"),
+    *("results.exports", "results.plots", "results.store.reader", "robot.modified_dh", "robot.urdf"),
     *("analysis.result", "dynamics.integrated_deflections", "documents.table"),
     *("compute.engine.compiled_engine", "compute.engine.compiler", "compute.engine.lanes", "compute.tracing"),
     *("trajectory.curves.piecewise", "trajectory.curves.sinusoids", "trajectory.curves.via_points"),

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 
 import h5py
 import numpy as np
 import pytest
+from pyarrow import parquet
 from samples.command_line import ROBOT, contents, installed
+from samples.joint_trajectory import check_message
+from scipy.io import loadmat
 
 TORQUES = [f"{joint}.tau_motor_{motor}" for joint in ("base", "shoulder", "elbow") for motor in (1, 2)]
 
@@ -125,3 +129,25 @@ def test_unknown_variable_is_named(vsacli, feasible_result):
 def test_verbose_describes_the_result(vsacli, infeasible_result):
     done = vsacli("export", infeasible_result, "--variables", "q", "-v")
     assert done.err == f"{infeasible_result}: vsa-3r, rest-to-rest, 401 steps, infeasible\n"
+
+
+def test_a_format_of_bytes_needs_a_file(vsacli, tmp_path, feasible_result):
+    for form in ("mat", "parquet"):
+        done = vsacli("export", feasible_result, "--format", form)
+        assert (done.code, done.err) == (2, f"a {form} file is no text; name it with -o\n")
+        done = vsacli("export", feasible_result, "--format", form, "-o", f"out.{form}", "--rate", "50")
+        assert (done.code, done.err) == (0, f"wrote out.{form}\n")
+    times = loadmat(tmp_path / "out.mat")["time"][:, 0]
+    np.testing.assert_array_equal(times, stored(feasible_result, "time")[::2])
+    assert parquet.read_table(tmp_path / "out.parquet").column_names == ["time", *TORQUES]
+
+
+def test_a_simulation_becomes_a_joint_trajectory_as_it_went(vsacli, tmp_path, motion):
+    vsacli("simulate", ROBOT, motion, "-o", "s.h5")
+    done = vsacli("export", "s.h5", "--format", "joint-trajectory", "--rate", "20")
+    assert (done.code, done.err) == (0, "")
+    message = json.loads(done.out)
+    check_message(message)
+    assert message["joint_names"] == ["base", "shoulder", "elbow"]
+    positions = [point["positions"] for point in message["points"]]
+    np.testing.assert_array_equal(positions, stored(tmp_path / "s.h5", "q_actual")[::5])

@@ -13,8 +13,9 @@ from samples.results import python, random_block, write_result
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.variables import Block
-from vsacli.results import csv_export as export
-from vsacli.results.csv_export import UndefinedSamplesError, export_csv
+from vsacli.results.exports import selection
+from vsacli.results.exports.csv_table import CSV
+from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
 from vsacli.results.store.reader import StoredResult
 
 SAMPLES = 241
@@ -42,7 +43,7 @@ def stored(tmp_path):
 
 def rows(result, *arguments, **options):
     stream = io.StringIO()
-    export_csv(result, stream, *arguments, **options)
+    export_result(result, stream, CSV, *arguments, **options)
     return list(csv.reader(io.StringIO(stream.getvalue())))
 
 
@@ -76,7 +77,7 @@ def test_extreme_floats_come_back_bit_for_bit(stored, block):
 
 def test_the_text_of_a_line(stored, block):
     stream = io.StringIO()
-    export_csv(stored(block), stream, ["q"])
+    export_result(stored(block), stream, CSV, ["q"])
     lines = stream.getvalue().split("\n")
     assert lines[0] == "time,j0.q,j1.q"
     assert lines[1] == f"0.0,{float(block.q[0, 0])!r},{float(block.q[0, 1])!r}"
@@ -100,7 +101,7 @@ def test_the_size_of_the_blocks_makes_no_difference(stored, block, monkeypatch):
     result = stored(block)
     expected = rows(result, ["tau_motor", "q"], rate=RATE / 3)
     for cells in (1, 50, 100):
-        monkeypatch.setattr(export, "CELLS", cells)
+        monkeypatch.setattr(selection, "CELLS", cells)
         assert rows(result, ["tau_motor", "q"], rate=RATE / 3) == expected
 
 
@@ -151,7 +152,7 @@ def test_a_variable_that_is_not_stored(tmp_path, block):
         StoredResult.open(path) as result,
         pytest.raises(InputError, match="holds no tau_motor; run invdyn again"),
     ):
-        export_csv(result, stream)
+        export_result(result, stream, CSV)
     assert stream.getvalue() == ""
 
 
@@ -159,7 +160,7 @@ def test_undefined_samples_are_refused_with_joint_time_and_number(stored, block)
     result = stored(without(block, "tau_motor", (30, 1, 0), (30, 1, 1), (31, 1, 0), (slice(100, 110), 1)))
     stream = io.StringIO()
     with pytest.raises(UndefinedSamplesError) as caught:
-        export_csv(result, stream)
+        export_result(result, stream, CSV)
     assert stream.getvalue() == ""
     assert [dataclasses.astuple(gap) for gap in caught.value.gaps] == [("tau_motor", "j1", 0.03, 12)]
     assert str(caught.value).endswith(
@@ -185,7 +186,7 @@ def test_undefined_samples_between_the_exported_ones_do_not_matter(stored, block
 
 def export_file(result, path, variables=None):
     with Outputs() as outputs, outputs.file(path).opened() as stream:
-        export_csv(result, stream, variables)
+        export_result(result, stream, CSV, variables)
 
 
 def test_a_file_is_written_under_its_name(stored, block, tmp_path):
@@ -208,7 +209,8 @@ FULL = """
 import resource
 from vsacli.base.errors import StorageError
 from vsacli.base.outputs import Outputs
-from vsacli.results.csv_export import export_csv
+from vsacli.results.exports.csv_table import CSV
+from vsacli.results.exports.result_format import export_result
 from vsacli.results.store.reader import StoredResult
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
@@ -218,7 +220,7 @@ try:
         Outputs() as outputs,
         outputs.file("out.csv").opened() as stream,
     ):
-        export_csv(result, stream)
+        export_result(result, stream, CSV)
 except StorageError as error:
     print(error)
 """

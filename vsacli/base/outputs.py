@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TextIO
+from typing import BinaryIO, Self, TextIO
 
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import interrupts_deferred
@@ -58,6 +58,16 @@ class Staged:
             reporting_storage_errors(self.path),
             self.temporary.open("w", encoding="utf-8", newline="") as stream,
         ):
+            yield stream
+
+    @contextlib.contextmanager
+    def opened_for_bytes(self) -> Iterator[BinaryIO]:
+        """Open for bytes, whoever writes them.
+
+        Raises:
+            StorageError: the disk is full or fails.
+        """
+        with reporting_storage_errors(self.path), self.temporary.open("wb") as stream:
             yield stream
 
     def write_bytes(self, content: bytes) -> None:

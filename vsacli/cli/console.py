@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 PROGRESS_FROM = 100_000
 """Steps from which on a run is long enough for a progress bar."""
 
+WRITING_FROM = 2_000_000
+"""Samples from which on writing them takes longer than a second, as CSV."""
+
 
 class Exit(enum.IntEnum):
     """Exit codes, each with its meaning: its line in the help and in the documentation."""
@@ -119,6 +122,10 @@ class Talk:
     def fitting(self, samples: int) -> AbstractContextManager[Any]:
         """The same over the samples of all components that splines are fitted to."""
         return self.progress(samples, label="fitting")
+
+    def writing(self, samples: int) -> AbstractContextManager[Any]:
+        """The same over the samples of all variables that are written."""
+        return self.progress(samples, shown_from=WRITING_FROM, label="writing")
 
 
 def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import sys
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from vsacli.base.errors import StorageError
+from vsacli.base.errors import InputError, StorageError
 from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import (
     example,
@@ -16,16 +16,35 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Exit, Talk, talk_options, tell
+from vsacli.results.exports import FORMATS as OF_RESULTS
+
+if TYPE_CHECKING:
+    from vsacli.base.outputs import Staged
+    from vsacli.results.exports.result_format import ResultFormat
+    from vsacli.results.store.reader import StoredResult
 
 
 @click.command(
     "export",
-    short_help="Write motor torques, or other variables, as CSV.",
+    short_help="Write motor torques, or other variables, for other programs.",
     epilog=example("vsacli export result.h5 --rate 250 -o torques.csv"),
 )
 @click.argument("file")
-@click.option("-o", "--output", metavar="FILE", help="CSV file; by default standard output.")
-@variables_option("tau_motor, of a simulation q_actual, stiffness_actual, tau_motor_actual")
+@click.option(
+    "-o", "--output", metavar="FILE", help="File to write; by default standard output, which takes texts."
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(tuple(OF_RESULTS)),
+    default="csv",
+    show_default=True,
+    help="CSV, a MATLAB file, Parquet, or a message JointTrajectory of ROS 2.",
+)
+@variables_option(
+    "tau_motor, of a simulation q_actual, stiffness_actual, tau_motor_actual; of a joint-trajectory what it "
+    "has fields for: q, dq, ddq, tau_e"
+)
 @click.option(
     "--rate", metavar="HZ", type=float, help="Samples per second, a whole fraction of the stored rate."
 )
@@ -36,12 +55,13 @@ from vsacli.cli.console import Exit, Talk, talk_options, tell
     show_default=True,
     help="Of the gear, on which motion and torque of the motors are given.",
 )
-@click.option("--allow-nan", is_flag=True, help="Leave cells without a value empty.")
+@click.option("--allow-nan", is_flag=True, help="Leave values out where there are none.")
 @overwrite_option
 @talk_options
 def export(
     file: str,
     output: str | None,
+    form: str,
     variables: tuple[str, ...] | None,
     rate: float | None,
     side: str,
@@ -49,7 +69,7 @@ def export(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Write variables of a result or a simulation as CSV.
+    """Write variables of a result or a simulation for other programs.
 
     By default these are the motor torques to send; of a simulation, motion, stiffness and motor torques as
     they were.
@@ -61,27 +81,43 @@ def export(
     every motor needs a gear_ratio in the robot file. What is not of a motor stays as it is.
     """
     from vsacli.base.outputs import Outputs
-    from vsacli.results.csv_export import UndefinedSamplesError, export_csv
+    from vsacli.results.exports.result_format import UndefinedSamplesError
     from vsacli.results.store.simulation import open_stored
 
-    options: dict[str, Any] = {"rate": rate, "allow_nan": allow_nan, "side": side}
+    options: dict[str, Any] = {"variables": variables, "rate": rate, "allow_nan": allow_nan, "side": side}
+    options["progress"] = talk.writing
+    chosen: ResultFormat = OF_RESULTS[form]
+    to_file = output is not None and output != STANDARD
+    if chosen.binary and not to_file:
+        raise InputError.one(f"a {form} file is no text; name it with -o")
     try:
         with open_stored(file) as stored:
             talk.detail(result_line(stored))
-            if output is None or output == STANDARD:
-                export_csv(stored, _stdout(), variables, **options)
-                sys.stdout.flush()
-            else:
-                with (
-                    Outputs(overwrite=overwrite, inputs=[file]) as outputs,
-                    outputs.file(output).opened() as stream,
-                ):
-                    export_csv(stored, stream, variables, **options)
+            if to_file:
+                assert output is not None
+                with Outputs(overwrite=overwrite, inputs=[file]) as outputs:
+                    _write(stored, outputs.file(output), chosen, options)
                 talk.wrote(outputs)
+            else:
+                _print(stored, chosen, options)
     except UndefinedSamplesError as error:
         tell(str(error))
         return Exit.VERDICT
     return Exit.OK
+
+
+def _write(stored: StoredResult, file: Staged, form: ResultFormat, options: dict[str, Any]) -> None:
+    from vsacli.results.exports.result_format import export_result
+
+    with file.opened_for_bytes() if form.binary else file.opened() as stream:
+        export_result(stored, stream, form, **options)
+
+
+def _print(stored: StoredResult, form: ResultFormat, options: dict[str, Any]) -> None:
+    from vsacli.results.exports.result_format import export_result
+
+    export_result(stored, _stdout(), form, **options)
+    sys.stdout.flush()
 
 
 def _stdout() -> TextIO:

@@ -1,0 +1,173 @@
+"""What an export takes of a result: some variables, at some samples, on one side of the gears."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import compress
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.units import WrenchQuantity
+from vsacli.base.variables import VARIABLES, Variable, column_names, select_variables
+from vsacli.results.exports.sample_rate import stride_of
+from vsacli.results.store.reader import StoredResult
+
+Side: TypeAlias = Literal["joint", "motor"]
+"""Of the gear of a motor."""
+
+CELLS = 2**18
+"""Values of a variable held in memory at a time."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A variable of an export.
+
+    Attributes:
+        variable: its declaration; on the side of the motors its name ends in `_shaft`.
+        stored: what it is called in the result.
+        there: (joints, columns of each), which columns there are; of the wrench (axes, 1).
+        scale: what its stored values are multiplied by; None if they stay as they are.
+    """
+
+    variable: Variable
+    stored: str
+    there: BoolArray
+    scale: FloatArray | None
+
+    @property
+    def on_shaft(self) -> bool:
+        """Whether it is what happens on the shaft of a motor, which turns at any joint."""
+        return self.scale is not None
+
+    @property
+    def name(self) -> str:
+        """What it is called in the export."""
+        return self.variable.name
+
+    def columns(self, joint_names: Iterable[str]) -> Iterator[str]:
+        """Names of the columns that there are."""
+        return compress(column_names(self.variable, joint_names), self.there.flat)
+
+    def units(self, joint_types: Iterable[str]) -> list[str]:
+        """Its unit at each joint, or along each axis of the wrench."""
+        quantity = self.variable.quantity
+        if isinstance(quantity, WrenchQuantity):
+            return [quantity.of_axis(axis) for axis in range(len(self.there))]
+        return [quantity.unit("revolute" if self.on_shaft else each) for each in joint_types]
+
+    def of_columns(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:
+        """The columns that there are, (columns, samples), of (samples, ...)."""
+        flat: npt.NDArray[Any] = values.reshape(len(values), -1).T[self.there.ravel()]
+        return flat
+
+    def undefined(self, values: FloatArray | FlagArray) -> BoolArray:
+        """(samples, joints): whether a value that the joint has is NaN."""
+        missing: BoolArray = np.isnan(values).reshape(len(values), *self.there.shape)
+        undefined: BoolArray = np.any(missing & self.there, axis=-1)
+        return undefined
+
+
+class Samples(NamedTuple):
+    """Consecutive samples of an export: times, (samples,) s, and values (samples, ...) by name."""
+
+    time: FloatArray
+    values: Mapping[str, FloatArray | FlagArray]
+
+
+class Selection:
+    """What an export takes of a result.
+
+    Args:
+        result: an open result or simulation file.
+        variables: names; they are exported in declared order.
+        rate: samples per second, the stored rate or a whole fraction of it; all samples if None.
+        side: of the gear on which motion and torque of the motors are given; on the side "motor" they are in
+            rad and N m at any joint.
+
+    Attributes:
+        result: as given.
+        chosen: the variables.
+
+    Raises:
+        InputError: there is no such variable, the rate is not possible, or a gear ratio is not known.
+    """
+
+    def __init__(
+        self,
+        result: StoredResult,
+        variables: Iterable[str],
+        rate: float | None = None,
+        side: Side = "joint",
+    ) -> None:
+        self.result = result
+        selected = select_variables(variables, result.declared)
+        self._stride = 1 if rate is None else stride_of(result, rate)
+        on_shaft = {variable.name for variable in selected if side == "motor" and variable.geared}
+        if on_shaft:
+            _check_geared(result)
+        self.chosen = tuple(_chosen(result, each, each.name in on_shaft) for each in selected)
+
+    @property
+    def time(self) -> FloatArray:
+        """Times of the samples, (samples,), s."""
+        return self.result.time[:: self._stride]
+
+    @property
+    def steps(self) -> int:
+        """Samples of all variables together."""
+        return len(self.time) * len(self.chosen)
+
+    def spans(self, together: Sequence[Chosen]) -> Iterator[tuple[int, int]]:
+        """Consecutive ranges of samples, at least one, in which some variables need little memory."""
+        widest = max((each.there.size for each in together), default=1)
+        length = max(1, CELLS // (widest * self._stride))
+        count = len(self.time)
+        for start in range(0, max(1, count), length):
+            yield start, min(start + length, count)
+
+    def blocks(self) -> Iterator[Samples]:
+        """All samples, some of them in memory at a time; at least one block."""
+        for start, stop in self.spans(self.chosen):
+            yield Samples(
+                self.time[start:stop], {each.name: self.read(each, start, stop) for each in self.chosen}
+            )
+
+    def read(self, chosen: Chosen, start: int, stop: int) -> FloatArray | FlagArray:
+        """Some samples of a variable, (samples, ...)."""
+        span = start * self._stride, min(stop * self._stride, self.result.samples)
+        values = self.result.read(chosen.stored, *span)[:: self._stride]
+        return values if chosen.scale is None else values * chosen.scale
+
+
+def _chosen(result: StoredResult, variable: Variable, on_shaft: bool) -> Chosen:
+    there = _existing(result, variable)
+    if not on_shaft:
+        return Chosen(variable, variable.name, there, None)
+    scale = result.gear_ratio**variable.geared
+    return Chosen(variable._replace(name=f"{variable.name}_shaft"), variable.name, there, scale)
+
+
+def _existing(result: StoredResult, variable: Variable) -> BoolArray:
+    """(joints, columns of each): which columns of a variable there are; of the wrench (axes, 1)."""
+    if "joint" not in variable.dims:
+        return np.ones((len(column_names(variable, ())), 1), dtype=bool)
+    return result.existing(variable)
+
+
+def _check_geared(result: StoredResult) -> None:
+    """Refuse to guess what happens in a gear of unknown ratio."""
+    there = _existing(result, VARIABLES["tau_motor"])
+    unknown = np.any(np.isnan(result.gear_ratio) & there, axis=1).tolist()
+    if any(unknown):
+        joints = ", ".join(compress(result.joint_names, unknown))
+        message = (
+            f"the robot file gives no gear_ratio at {joints}, so what happens on the motors' shafts is not "
+            f"known; add it (1 without a gear) and run {result.command} again, or export with --side joint"
+        )
+        raise InputError.one(message, result.path)
