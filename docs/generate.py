@@ -34,6 +34,7 @@ from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.cli.console import Exit
 from vsacli.cli.main import vsacli
 from vsacli.control.poles import PolesFile
+from vsacli.documents.column_source import ColumnSource
 from vsacli.documents.plausibility import Rule
 from vsacli.files.examples import Example, examples, examples_root, opening_comment
 from vsacli.robot.file import RobotFile
@@ -129,6 +130,11 @@ def _wrench_columns() -> Iterator[tuple[str, str, str]]:
         columns = " ".join(f"`{column}`" for column in wrench_columns(name))
         needed = "for a wrench" if name == WRENCH_NAMES[0] else "no"
         yield columns, str(VARIABLES[name].quantity), needed
+
+
+def column_fields() -> str:
+    """What may be said of a column."""
+    return record_sections(ColumnSource)
 
 
 def pole_fields() -> str:
@@ -285,6 +291,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "spring-fields": spring_fields,
     "trajectory-fields": trajectory_fields,
     "csv-columns": csv_columns,
+    "column-fields": column_fields,
     "pole-fields": pole_fields,
     "study-fields": study_fields,
     "study-columns": study_columns,

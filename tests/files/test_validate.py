@@ -99,7 +99,7 @@ def test_all_problems_of_all_files(vsacli: Any, tmp_path: Path) -> None:
     assert "duration: must be positive, not 0" in lines[2]
     assert lines[4] == (
         "notes.txt:1: is no file of vsacli: a YAML file begins with `format:`, one of "
-        "vsacli-robot/1, vsacli-trajectory/1, vsacli-poles/1, vsacli-study/1"
+        "vsacli-robot/1, vsacli-trajectory/1, vsacli-poles/1, vsacli-study/1, vsacli-columns/1"
     )
     assert lines[5] == "gone.csv: no such file"
 
@@ -120,7 +120,7 @@ def test_as_json(vsacli: Any, tmp_path: Path) -> None:
             "file": "b.yaml",
             "line": 1,
             "message": "format: expected one of vsacli-robot/1, vsacli-trajectory/1, vsacli-poles/1, "
-            "vsacli-study/1, found 'vsacli-robots/1'; did you mean 'vsacli-robot/1'?",
+            "vsacli-study/1, vsacli-columns/1, found 'vsacli-robots/1'; did you mean 'vsacli-robot/1'?",
             "severity": "error",
         },
         {"file": "gone.csv", "line": None, "message": "no such file", "severity": "error"},

@@ -84,6 +84,12 @@ deflections_option = click.option(
     show_default=True,
     help="Solve for the deflections at each step, or follow those of the first by integration, which drifts.",
 )
+columns_option = click.option(
+    "--columns",
+    metavar="FILE",
+    help="What columns with other names stand for, and which to ignore; `vsacli info` of a recording makes "
+    "such a file.",
+)
 stop_option = click.option("--stop-on-infeasible", is_flag=True, help="End with the first infeasible step.")
 
 

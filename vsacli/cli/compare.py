@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.cli.command_parts import example, json_option, overwrite_option, result_line
+from vsacli.cli.command_parts import columns_option, example, json_option, overwrite_option, result_line
 from vsacli.cli.console import Talk, say, talk_options
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     type=float,
     help="When in the recording the result begins, from its first row on; by default found from the signals.",
 )
+@columns_option
 @json_option
 @click.option(
     "--plot", "folder", metavar="FOLDER", help="Save figures of measured and computed signals there."
@@ -39,6 +40,7 @@ def compare(
     result: str,
     recording: str,
     begins_at: float | None,
+    columns: str | None,
     as_json: bool,
     folder: str | None,
     overwrite: bool,
@@ -48,7 +50,7 @@ def compare(
 
     Its column `time` may begin anywhere and have steps of its own. Columns are named as `vsacli export` names
     them, elbow.q, elbow.tau_motor_1, or elbow.tau_motor_shaft_1 for the motor's side of its gear; a unit in
-    brackets may follow. Others are left out.
+    brackets may follow. Others are left out, unless --columns says what they stand for.
 
     The report gives, for each signal, the error, the gain and offset of measured over computed values, and
     the lag behind the others.
@@ -57,10 +59,10 @@ def compare(
     from vsacli.results.store.simulation import open_stored
     from vsacli.studies.measured import compare as compared
 
-    with Outputs(overwrite=overwrite, inputs=[result, recording]) as outputs:
+    with Outputs(overwrite=overwrite, inputs=[result, recording, *filter(None, [columns])]) as outputs:
         with open_stored(result) as stored:
             talk.detail(result_line(stored))
-            comparison = compared(stored, recording, begins_at)
+            comparison = compared(stored, recording, begins_at, columns)
         if folder is not None:
             _draw(comparison, folder, outputs)
     say(json.dumps(comparison.as_json(), indent=1) if as_json else str(comparison))

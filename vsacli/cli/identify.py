@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.cli.command_parts import example, json_option, numbers, overwrite_option, robot_argument, words_of
+from vsacli.cli.command_parts import (
+    columns_option,
+    example,
+    json_option,
+    numbers,
+    overwrite_option,
+    robot_argument,
+    words_of,
+)
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
 
@@ -37,6 +45,7 @@ if TYPE_CHECKING:
     type=click.FloatRange(min=0, min_open=True),
     help="Of the filter that all signals pass; by default half as much again as the motion has.",
 )
+@columns_option
 @click.option(
     "--plan",
     "planned",
@@ -76,6 +85,7 @@ def identify(
     recordings: tuple[str, ...],
     fit: tuple[str, ...] | None,
     bandwidth: float | None,
+    columns: str | None,
     planned: bool,
     duration: float | None,
     sensor_noise: tuple[float, ...] | None,
@@ -90,7 +100,8 @@ def identify(
 
     Columns are named as `vsacli export` names them: elbow.q, elbow.theta_1, elbow.tau_motor_1, or
     elbow.tau_motor_shaft_1 and elbow.current_1 where the robot file has gear ratio and torque constant; a
-    unit in brackets may follow, and cells may be empty where a column has no sample.
+    unit in brackets may follow, and cells may be empty where a column has no sample. --columns says what
+    columns with other names stand for.
 
     The report gives each number with its standard error, what cannot be told apart, and what the equations
     leave beside the noise, on parts of the records, too, that the fit did not see.
@@ -99,7 +110,10 @@ def identify(
     all limits of ROBOT and from rest to rest. What follows ROBOT is then a TRAJECTORY of yours, to compare.
     """
     if planned:
-        _check_options({"--fit": fit, "--bandwidth": bandwidth, "--plot": folder}, "goes without --plan")
+        _check_options(
+            {"--fit": fit, "--bandwidth": bandwidth, "--columns": columns, "--plot": folder},
+            "goes without --plan",
+        )
         return plan(
             robot,
             recordings,
@@ -120,10 +134,10 @@ def identify(
     from vsacli.studies.identification import identify as identified
 
     loaded = load_robot(robot)
-    inputs = [*(source.path for source in loaded.sources), *recordings]
+    inputs = [*(source.path for source in loaded.sources), *recordings, *filter(None, [columns])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         file = None if output is None else outputs.file(Path(output))
-        found = identified(loaded, recordings, fit or WORDS, bandwidth)
+        found = identified(loaded, recordings, fit or WORDS, bandwidth, columns)
         if file is not None:
             file.write_text(fitted_text(loaded, found, Path(output or "").parent))
         if folder is not None:

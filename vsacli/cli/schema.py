@@ -14,7 +14,7 @@ from vsacli.cli.command_parts import example
     short_help="Print the JSON Schema of a YAML format, for editors.",
     epilog=example("vsacli schema robot > robot.schema.json"),
 )
-@click.argument("kind", type=click.Choice(["robot", "trajectory", "poles", "study"]))
+@click.argument("kind", type=click.Choice(["robot", "trajectory", "poles", "study", "columns"]))
 def schema(kind: str) -> None:
     """Print the JSON Schema of a YAML format, with which editors complete keys and mark mistakes."""
     from vsacli.files.file_kinds import DOCUMENTS

@@ -15,7 +15,7 @@ from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
 from vsacli.base.streams import place_of
 from vsacli.control import poles
-from vsacli.documents import tree
+from vsacli.documents import columns_file, tree
 from vsacli.documents.json_schema import json_schema
 from vsacli.documents.source import HDF5_SIGNATURE, Problems, check_input_file, is_table, read_source
 from vsacli.documents.yaml_tree import parse_yaml
@@ -36,6 +36,7 @@ class FileKind(enum.StrEnum):
     SIMULATION = "simulation"
     STUDY = "study"
     STUDY_TABLE = "table of a study"
+    COLUMNS = "columns"
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ DOCUMENTS = {
     "trajectory": Document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, "trajectory of vsacli"),
     "poles": Document(poles.FORMAT, poles.PolesFile, "poles of a vsacli controller"),
     "study": Document(study_file.FORMAT, study_file.StudyFile, "study of vsacli"),
+    "columns": Document(columns_file.FORMAT, columns_file.ColumnsFile, "columns of recordings for vsacli"),
 }
 """By the word for the kind."""
 

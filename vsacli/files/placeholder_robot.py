@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +21,7 @@ from vsacli.documents import tree
 from vsacli.documents.fields import IDENTIFIER, LARGEST
 from vsacli.documents.reading import survey_document
 from vsacli.documents.source import is_table
-from vsacli.documents.table import read_table
+from vsacli.documents.table_header import read_header
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
 from vsacli.robot.model import Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT
@@ -53,14 +53,18 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
         InputError: the file, or a CSV file that it names, cannot be read.
     """
     if is_table(path):
-        columns = read_table(path).columns
+        columns = read_header(path).columns
         names = _of_columns(columns) or _numbered(1)
         stiffened = _of_suffix(columns, _STIFFNESS_SUFFIX, names) or tuple(names)
         damped = _of_suffix(columns, _DAMPING_SUFFIX, names)
         return PlaceholderRobot(_robot(names, stiffened, damped), ordered=True)
     root, survey = survey_document(path, OF_ANY_ROBOT)
     folder = Path(path).parent
-    columns = tuple(column for file in _tables(root) for column in read_table(folder / file).columns)
+    columns = tuple(
+        column
+        for file, mapped in _tables(root).items()
+        for column in (*mapped, *read_header(folder / file).columns)
+    )
     positions, stiffnesses, dampings = (
         [node for quantity, node in survey if quantity == wanted]
         for wanted in (units.POSITION, units.STIFFNESS, units.DAMPING)
@@ -77,14 +81,18 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     return PlaceholderRobot(_robot(names, stiffened, damped), ordered)
 
 
-def _tables(root: tree.Mapping) -> Iterator[str]:
-    """Names of the CSV files of a document, each once."""
-    files = {}
+def _tables(root: tree.Mapping) -> dict[str, list[str]]:
+    """The CSV files of a document, each with the names that columns are given in it."""
+    files: dict[str, list[str]] = {}
     for key in ("position", *COMMANDED):
         match root.entries.get(key):
-            case tree.Mapping(entries={"type": tree.Scalar(text="csv"), "file": tree.Scalar(text=file)}):
-                files[file] = key
-    return iter(files)
+            case tree.Mapping(
+                entries={"type": tree.Scalar(text="csv"), "file": tree.Scalar(text=file), **others}
+            ):
+                columns = others.get("columns")
+                names = columns.entries if isinstance(columns, tree.Mapping) else ()
+                files.setdefault(file, []).extend(names)
+    return files
 
 
 def _of_columns(columns: Iterable[str]) -> tuple[str, ...]:

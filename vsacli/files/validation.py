@@ -9,6 +9,7 @@ from typing import Any
 from vsacli.actuators.laws.table import MeasuredSpring
 from vsacli.base.errors import InputError, Problem
 from vsacli.control.poles import FORMAT, PolesFile, load_gains
+from vsacli.documents.columns_file import load_columns
 from vsacli.documents.reading import read_document
 from vsacli.documents.table import read_table
 from vsacli.files.file_kinds import FileKind, recognise
@@ -215,6 +216,12 @@ def _study(path: str, _: Robots) -> Checked:
     return _usable(path, f"study {study.file.name}, {_count(study.runs, 'run')} of {study.robot.name}")
 
 
+def _columns(path: str, _: Robots) -> Checked:
+    """Columns, of which only a recording shows whether they are there."""
+    mapping = load_columns(path)
+    return _usable(path, f"columns of recordings, {_count(len(mapping.columns), 'name')}")
+
+
 def _table_of_study(path: str, _: Robots) -> Checked:
     with StoredStudy(path) as table:
         table.check()
@@ -236,5 +243,6 @@ _CHECKS: dict[FileKind, Callable[[str, Robots], Checked]] = {
     FileKind.RESULT: _stored,
     FileKind.SIMULATION: _stored,
     FileKind.STUDY: _study,
+    FileKind.COLUMNS: _columns,
     FileKind.STUDY_TABLE: _table_of_study,
 }

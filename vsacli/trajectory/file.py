@@ -246,16 +246,23 @@ def _read_recordings(
     document: TrajectoryFile, folder: Path, joints: CommandedJoints, progress: Progress
 ) -> list[Recording]:
     """Each CSV file once, for the signals that are wanted from it; all with the times of the first."""
-    wanted: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
-    for signal, declared in document.recorded.items():
-        wanted[folder / declared.file][signal] = declared.chosen
-    if not wanted:
+    if not document.recorded:
         return []
+    from vsacli.documents.column_mapping import ColumnMapping
     from vsacli.trajectory.recorded.recording import read_recording
+
+    wanted: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
+    mappings: dict[Path, ColumnMapping] = defaultdict(ColumnMapping)
+    for signal, declared in document.recorded.items():
+        file = folder / declared.file
+        wanted[file][signal] = declared.chosen
+        mappings[file] = mappings[file].joined(declared.mapping)
 
     resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)
     recordings = [
-        read_recording(file, joints, fits, resampled=resampled, unwrap=unwrap, progress=progress)
+        read_recording(
+            file, joints, fits, mappings[file], resampled=resampled, unwrap=unwrap, progress=progress
+        )
         for file, fits in wanted.items()
     ]
     for other in recordings[1:]:

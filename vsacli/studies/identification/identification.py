@@ -10,6 +10,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import wrench_columns
+from vsacli.documents.columns_file import load_columns
 from vsacli.robot.model import Robot, check_robot
 from vsacli.studies.identification.estimation.solution import Solution, solution
 from vsacli.studies.identification.fitted_file import to_write
@@ -54,6 +55,7 @@ def identify(
     recordings: str | Path | Sequence[str | Path],
     fit: Sequence[str] = WORDS,
     bandwidth: float | None = None,
+    columns: str | Path | None = None,
 ) -> Identification:
     """Find numbers of a robot from records of its motion.
 
@@ -63,6 +65,7 @@ def identify(
             of joints and motors, and motor torques or currents; cells may be empty.
         fit: what to find: words of `WORDS`, or patterns of paths such as `joints.elbow.actuator.spring.*`.
         bandwidth: of the filter, Hz; chosen from each record if None.
+        columns: a file that says what columns of the records with other names stand for.
 
     Raises:
         InputError: a record cannot be used, or `fit` names nothing.
@@ -72,7 +75,8 @@ def identify(
     if not paths:
         raise InputError.one("identification needs a record at least")
     check_fit(robot, fit, WORDS)
-    records = [read_record(robot, path) for path in paths]
+    mapping = load_columns(columns)
+    records = [read_record(robot, path, mapping) for path in paths]
     check_distinct(records)
     complete = {joint for record in records for joint in complete_joints(robot, record)}
     joints = [joint for joint in sorted(complete) if not robot.joints[joint].damper_at("transmission")]

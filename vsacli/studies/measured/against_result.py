@@ -10,13 +10,13 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.documents.table import read_table
+from vsacli.documents.columns_file import load_columns
 from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import open_stored
 from vsacli.studies.measured.agreement import Agreement, straight_line
 from vsacli.studies.measured.alignment import FEWEST_SAMPLES, Alignment, Pairing, align, lag_of
 from vsacli.studies.measured.comparison_report import SHOWN_LAG, Comparison
-from vsacli.studies.measured.measured_columns import Measured, Recording, known_columns, recording_of
+from vsacli.studies.measured.measured_columns import Measured, Recording, known_columns, read_recording
 from vsacli.studies.measured.slips import slips
 
 POSITIONS = ("q", "theta")
@@ -36,15 +36,19 @@ SAME_LAG = 0.2
 
 
 def compare(
-    result: str | Path | StoredResult, recording: str | Path, begins_at: float | None = None
+    result: str | Path | StoredResult,
+    recording: str | Path,
+    begins_at: float | None = None,
+    columns: str | Path | None = None,
 ) -> Comparison:
     """Compare a recording with a result: error figures of each signal, aligned in time.
 
     Args:
         result: a result or simulation, or the path of its file.
         recording: a CSV file with a column `time` and columns named as `vsacli export` names them, at times
-            of its own; a unit in brackets may follow a name.
+            of its own; a unit in brackets may follow a name. Cells may be empty where a column has no sample.
         begins_at: when the result begins, s from the first row of the recording; looked for if None.
+        columns: a file that says what columns of the recording with other names stand for.
 
     Raises:
         InputError: the recording has no column of the result or a wrong unit, its times do not ascend, it
@@ -57,13 +61,14 @@ def compare(
         )
     if not isinstance(result, StoredResult):
         with open_stored(result) as stored:
-            return compare(stored, recording, begins_at)
+            return compare(stored, recording, begins_at, columns)
     variables = [result.declared[name] for name in result.variables]
-    recorded = recording_of(known_columns(result, variables), read_table(recording), "the result")
+    places = known_columns(result, variables)
+    recorded = read_recording(recording, places, "the result", load_columns(columns))
     computed = [_interpolated(result, signal) for signal in recorded.signals]
     duration = float(result.time[-1] - result.time[0])
     pairings = [
-        Pairing(function, duration, recorded.time, signal.values)
+        Pairing(function, duration, *_sampled(recorded, signal))
         for function, signal in zip(computed, recorded.signals, strict=True)
     ]
     alignment = _aligned(recorded, pairings, recording) if begins_at is None else Alignment(begins_at, 1.0)
@@ -88,6 +93,15 @@ def compare(
         signals=signals,
         notes=notes,
     )
+
+
+def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatArray]:
+    """Times and values of a signal, without the rows in which it has none."""
+    there = np.isfinite(signal.values)
+    if np.count_nonzero(there) < FEWEST_SAMPLES and not there.all():
+        message = f"column {signal.column!r} has {np.count_nonzero(there)} numbers; leave it out"
+        raise InputError.one(message, recorded.table.source.path)
+    return recorded.time[there], signal.values[there]
 
 
 def _interpolated(result: StoredResult, signal: Measured) -> Callable[[FloatArray], FloatArray]:
@@ -155,7 +169,7 @@ def _agreement(signal: Measured, pairing: Pairing, begins_at: float, result: Sto
     time = pairing.time - begins_at
     computed = pairing.computed(time)
     there = np.isfinite(computed)
-    time, computed, measured = time[there], computed[there], signal.values[there]
+    time, computed, measured = time[there], computed[there], pairing.measured[there]
     error = measured - computed
     place = signal.place
     worst = int(np.argmax(np.abs(error))) if error.size else None

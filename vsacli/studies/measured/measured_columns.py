@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -13,9 +14,9 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.variables import MOTORS, Variable
-from vsacli.documents.table import Table, split_heading
-
-TIME = "time"
+from vsacli.documents.column_mapping import TIME, ColumnMapping
+from vsacli.documents.table import Table, read_table
+from vsacli.documents.table_header import split_heading
 
 
 class Jointed(Protocol):
@@ -80,30 +81,37 @@ class Recording(NamedTuple):
     Attributes:
         time: (samples,), s, from the first sample on.
         signals: in the order of the variables, then of the joints.
-        others: names of the columns that are none of these variables.
+        others: names of the columns that are none of these variables, or are not to be read.
+        table: the file.
     """
 
     time: FloatArray
     signals: tuple[Measured, ...]
     others: tuple[str, ...]
+    table: Table
 
 
-def recording_of(places: Mapping[str, Place], table: Table, owner: str) -> Recording:
-    """The columns of a table that have a place.
+def read_recording(
+    path: str | Path, places: Mapping[str, Place], owner: str, mapping: ColumnMapping
+) -> Recording:
+    """The columns of a CSV file that have a place, NaN in cells that are empty.
 
     Args:
+        path: a file with a column `time`, and columns named as `vsacli export` names them, or by the number
+            of the joint, `q1` for the first; a unit in brackets may follow any name.
         places: by the names that columns may have, see `known_columns`.
         owner: whose variables they are, for sentences.
-        table: with a column `time`, and columns named as `vsacli export` names them, or by the number of the
-            joint, `q1` for the first; a unit in brackets may follow any name.
+        mapping: what columns with other names stand for.
 
     Raises:
         InputError: there is no such column, a unit is one of something else, or the times do not ascend.
     """
+    table = read_table(path, mapping, {TIME, *places}, empty_cells=True)
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
     problems = [
-        Problem(table.source.path, table.header_line, text) for text in _unusable(names, places, owner)
+        Problem(table.source.path, table.header_line, text)
+        for text in _unusable(names, table.others, places, owner)
     ]
     factors: dict[int, float] = {}
     for index, (name, unit) in enumerate(headings):
@@ -121,8 +129,8 @@ def recording_of(places: Mapping[str, Place], table: Table, owner: str) -> Recor
         if name in places
     ]
     signals.sort(key=lambda signal: order[signal.column])
-    others = tuple(name for name in names if name not in places and name != TIME)
-    return Recording(_elapsed(table, factors[names.index(TIME)]), tuple(signals), others)
+    others = (*table.others, *table.ignored)
+    return Recording(_elapsed(table, factors[names.index(TIME)]), tuple(signals), others, table)
 
 
 def known_columns(jointed: Jointed, variables: Iterable[Variable]) -> dict[str, Place]:
@@ -153,15 +161,17 @@ def _names(jointed: Jointed, variable: Variable) -> Iterator[tuple[str, Place]]:
                 yield f"{jointed.joint_names[joint]}.{variable.name}_shaft{ending}", shaft
 
 
-def _unusable(names: list[str], places: Mapping[str, Place], owner: str) -> Iterator[str]:
+def _unusable(
+    names: Sequence[str], strangers: Sequence[str], places: Mapping[str, Place], owner: str
+) -> Iterator[str]:
     if TIME not in names:
-        yield f"there is no column {TIME!r}"
+        yield f"there is no column {TIME!r}{did_you_mean(TIME, strangers)}; --columns says which it is"
     found = [name for name in names if name in places]
     if not found:
-        strangers = [name for name in names if name != TIME]
         hint = next((hint for name in strangers if (hint := did_you_mean(name, places))), "")
         examples = ", ".join(list(places)[:3])
-        yield f"no column is a variable of {owner}, such as {examples}{hint}"
+        say = "; `vsacli info` shows what the file has, and --columns says what it stands for"
+        yield f"no column is a variable of {owner}, such as {examples}{hint or say}"
     for name in sorted({name for name in names if names.count(name) > 1 and name in places}):
         yield f"column {name!r} appears {names.count(name)} times"
     twice = {place: name for name in found if (place := places[name]._replace(unit="", gear=1.0))}

@@ -31,6 +31,8 @@ from vsacli.documents.fields import (
 from vsacli.trajectory.curves import ClosedForm
 
 if TYPE_CHECKING:
+    from vsacli.documents.column_mapping import ColumnMapping
+    from vsacli.documents.column_source import ColumnSource
     from vsacli.trajectory.fits import FitChoice
 
 SAME_TIME = 1e-9
@@ -157,10 +159,13 @@ class Recorded(Declaration):
     fit: str | None
     noise: Values | None
     bandwidth: float | None
+    columns: Mapping[str, ColumnSource] | None
+    ignore: str | tuple[str | int, ...] | None
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
         """The declared fields by name."""
+        from vsacli.documents.column_source import columns_field, ignore_field
         from vsacli.trajectory.fits import METHODS
 
         doc = (
@@ -175,6 +180,8 @@ class Recorded(Declaration):
             "fit": choice(METHODS, doc, default=None),
             "noise": use.size("standard deviation of the noise of a sample; by default the record tells"),
             "bandwidth": number(units.RATE, bandwidth, check=POSITIVE, default=None),
+            "columns": columns_field(),
+            "ignore": ignore_field(),
         }
         if use.signal is POSITION:
             fields["unwrap"] = boolean("take jumps by 2 pi out of revolute joints' angles", default=False)
@@ -193,6 +200,13 @@ class Recorded(Declaration):
         from vsacli.trajectory.fits import FitChoice
 
         return FitChoice(self.fit, self.noise, self.bandwidth)
+
+    @property
+    def mapping(self) -> ColumnMapping:
+        """What is said of the columns of the file."""
+        from vsacli.documents.column_mapping import ColumnMapping
+
+        return ColumnMapping(self.columns or {}, self.ignore or ())
 
     @classmethod
     def meaning(cls, use: Use) -> str:

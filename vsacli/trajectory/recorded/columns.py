@@ -7,17 +7,16 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, wrench_columns
-from vsacli.documents.table import split_heading
+from vsacli.documents.column_mapping import REST, TIME
+from vsacli.documents.table_header import split_heading
 from vsacli.robot.commanded_joints import CommandedJoints
-
-TIME = "time"
 
 Way = dict[str, dict[int, str]]
 """For each quantity the names of its columns, by index of the joint (wrench axis)."""
@@ -59,6 +58,13 @@ class ColumnLayout:
     unused: Mapping[str, Sequence[str]]
 
 
+def known_columns(joints: CommandedJoints) -> set[str]:
+    """Every name that a column of a recorded trajectory of these joints may have."""
+    of_every_joint = CommandedJoints(joints.types, exempt={})
+    ways = [_columns(pattern, of_every_joint) for pattern in _PATTERNS]
+    return {TIME, *_all(_WRENCH_WAY), *(column for way in ways for column in _all(way))}
+
+
 def column_layout(
     header: Sequence[str],
     joints: CommandedJoints,
@@ -85,13 +91,13 @@ def column_layout(
     headings = [split_heading(text) for text in header]
     names = [name for name, _ in headings]
     of_every_joint = [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in _PATTERNS]
-    everything = [column for way in of_every_joint for column in _all(way)]
     ways = [_columns(pattern, joints) for pattern in _PATTERNS]
     used = [way for way in ways if any(column in names for column in _all(way))]
     way = used[0] if used else ways[0]
     expected = [TIME, *_all(way), *(_all(_WRENCH_WAY) if WRENCH in wanted else ())]
 
-    problems = list(_strangers(names, expected, {TIME, *everything, *_all(_WRENCH_WAY)}))
+    known = known_columns(joints)
+    problems = list(_strangers(names, expected, known))
     problems += [f"column {name!r} appears {n} times" for name, n in Counter(names).items() if n > 1]
     way = way | _WRENCH_WAY
     if len(used) == len(ways):
@@ -101,6 +107,7 @@ def column_layout(
         problems += _gaps(names, way, {signal.names[0] for signal in wanted})
     units = [unit for _, unit in headings]
     columns = dict(_measured(names, units, way, joints, problems))
+    problems += _remedy([name for name in names if name not in known], expected, file)
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
     return ColumnLayout(
@@ -151,6 +158,15 @@ def _strangers(header: Sequence[str], expected: Sequence[str], known: Collection
             yield f"{column!r}: units are written in square brackets, {unit['name']} [{unit['unit']}]"
         else:
             yield f"unknown column {column!r}{did_you_mean(column, missing)}"
+
+
+def _remedy(strangers: Collection[str], expected: Collection[str], file: str) -> Iterator[str]:
+    """What to do about columns with other people's names."""
+    if any(nearest(column, expected) is None for column in strangers):
+        yield (
+            f"`vsacli info {file}` shows how a trajectory file says what columns of other names stand for;"
+            f" ignore: {REST} there leaves out those without use"
+        )
 
 
 def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[str]:

@@ -16,11 +16,12 @@ from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.texts import as_name
 from vsacli.base.wrench import WRENCH_AXES
+from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.robot.commanded_joints import CommandedJoints, takers
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
-from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout
+from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout, known_columns
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, time_problems, value_problems
@@ -30,6 +31,9 @@ from vsacli.trajectory.trajectory import Trajectory
 
 NEEDED = (POSITION, *(signal for signal in COMMANDED.values() if signal.device is None))
 """The signals of joints that a table must have if it is all there is."""
+
+MOST_NAMED = 5
+"""Columns that are ignored, up to which all are named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +47,7 @@ class Recording:
         notes: what of the file is not used, and what was taken out of it.
         source: the file.
         lines: those of its rows.
+        first_stamp: what was taken off its times, see `Table`.
     """
 
     times: RecordedTimes
@@ -51,6 +56,7 @@ class Recording:
     notes: tuple[str, ...]
     source: Source
     lines: Lines
+    first_stamp: int | None = None
 
     def check_times(self, other: Recording) -> None:
         """Refuse another recording that is to be combined with this one if its times differ.
@@ -65,6 +71,9 @@ class Recording:
             row = int(np.argmax(differ))
             message = f"time is {there[row]} s, but {here[row]} s in the same row of {self.source.path}"
             raise InputError.one(message, other.source.path, other.lines.of(row))
+        if self.first_stamp != other.first_stamp:
+            message = f"times begin with {other.first_stamp}, but {self.first_stamp} in {self.source.path}"
+            raise InputError.one(message, other.source.path)
         if len(here) != len(there):
             message = f"the file has {len(there)} rows, but {self.source.path} has {len(here)}"
             raise InputError.one(message, other.source.path)
@@ -74,6 +83,7 @@ def read_recording(
     path: str | os.PathLike[str],
     joints: CommandedJoints,
     wanted: Mapping[Signal, FitChoice] | None = None,
+    mapping: ColumnMapping = AS_NAMED,
     *,
     resampled: bool = False,
     unwrap: bool = False,
@@ -86,6 +96,7 @@ def read_recording(
         joints: those that are commanded.
         wanted: the signals to read, each with what is said of its spline; all of joints if None, those of
             devices if they are there, each fitted as its noise asks for.
+        mapping: what columns with other names stand for.
         resampled: whether the steps will be other times than the recorded ones.
         unwrap: whether to take jumps by 2 pi out of the positions of revolute joints.
         progress: opens a bar over the samples that splines are fitted to.
@@ -93,10 +104,11 @@ def read_recording(
     Raises:
         InputError: with file and line of everything that does not fit.
     """
-    table = read_table(path)
+    table = read_table(path, mapping, known_columns(joints), empty_cells=bool(mapping)).without_empty_rows()
     file = table.source.path
     signals = NEEDED if wanted is None else tuple(wanted)
-    layout = column_layout(table.columns, joints, signals, file, table.header_line)
+    layout = column_layout((*table.columns, *table.others), joints, signals, file, table.header_line)
+    _check_filled(table)
     if wanted is None:
         devices = (signal for signal in COMMANDED.values() if signal.device is not None)
         signals += tuple(each for each in devices if layout.quantities.get(each.key))
@@ -113,14 +125,41 @@ def read_recording(
         *unit_doubts(records, _without_unit(table, layout, joints)),
     ]
     warnings = tuple(str(_located(doubt, table, layout)) for doubt in found)
-    notes = tuple(f"{file}: {clause}" for clause in (*turns, *_unused(layout, signals)))
-    source, lines = table.source, table.lines
+    clauses = (*turns, *_understood(table), *_unused(layout, signals))
+    notes = tuple(f"{file}: {clause}" for clause in clauses)
+    source, lines, first_stamp = table.source, table.lines, table.first_stamp
     del table  # as large as the records, which may be fitted now
     profiles = tuple(
         SampledProfile.of(each, wanted[each.signal], resampled=resampled, progress=progress)
         for each in records
     )
-    return Recording(RecordedTimes(time, rounding_notes(time)), profiles, warnings, notes, source, lines)
+    times = RecordedTimes(time, rounding_notes(time))
+    return Recording(times, profiles, warnings, notes, source, lines, first_stamp)
+
+
+def _check_filled(table: Table) -> None:
+    """Refuse empty cells beside others that are not: all signals are taken from the same rows."""
+    empty = np.isnan(table.values)
+    if empty.any():
+        row, column = (int(place[0]) for place in np.nonzero(empty))
+        count = int(np.count_nonzero(empty[:, column]))
+        message = (
+            f"column {table.columns[column]!r} has no number here, where others have one ({count} such rows);"
+            " a trajectory takes all columns of a file from the same rows: leave out rows or columns"
+        )
+        raise InputError.one(message, table.source.path, table.line_of(row))
+
+
+def _understood(table: Table) -> Iterator[str]:
+    """What was left out of the file, and off its times."""
+    if table.first_stamp is not None:
+        yield f"times count from its first stamp, {table.first_stamp}"
+    if table.kept is not None:
+        yield f"only the {len(table.kept)} rows are read in which these columns have numbers"
+    if table.ignored:
+        shown = ", ".join(name or "a column without a name" for name in table.ignored[:MOST_NAMED])
+        more = len(table.ignored) - MOST_NAMED
+        yield f"ignored: {shown}{f' and {more} more' if more > 0 else ''}"
 
 
 def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:

@@ -13,9 +13,10 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES, measured
 from vsacli.base.variables import VARIABLES, Variable
-from vsacli.documents.table import read_table, split_heading
+from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
+from vsacli.documents.table_header import split_heading
 from vsacli.robot.model import Robot
-from vsacli.studies.measured.measured_columns import Measured, known_columns, recording_of
+from vsacli.studies.measured.measured_columns import Measured, known_columns, read_recording
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 
 POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
@@ -70,17 +71,23 @@ class _RobotColumns(NamedTuple):
         return np.array([joint.has(variable) for joint in self.robot.joints])
 
 
-def recorded_columns(robot: Robot, path: str | Path) -> tuple[list[Column], tuple[str, ...]]:
+def recorded_columns(
+    robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
+) -> tuple[list[Column], tuple[str, ...]]:
     """The columns that are needed, and the names of the others.
+
+    Args:
+        robot: that was recorded.
+        path: the CSV file.
+        mapping: what columns with other names stand for.
 
     Raises:
         InputError: there is none, a unit is one of something else, or times do not ascend.
     """
-    table = read_table(path, empty_cells=True)
     wanted = [VARIABLES[name] for name in (*READINGS, CURRENT)]
     wanted += [SIMULATION_VARIABLES[measured(name)] for name in READINGS]
-    recording = recording_of(known_columns(_RobotColumns(robot), wanted), table, "the robot")
-    united = {name for name, unit in map(split_heading, table.columns) if unit is not None}
+    recording = read_recording(path, known_columns(_RobotColumns(robot), wanted), "the robot", mapping)
+    united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
     stamps, columns = elapsed_times(recording.time), []
     for place, signal in _preferred(recording.signals).items():
         there = np.isfinite(signal.values)

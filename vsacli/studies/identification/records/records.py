@@ -13,6 +13,7 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.variables import MOTORS
+from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.records.record_columns import (
     MOTOR,
@@ -56,14 +57,19 @@ class Record(NamedTuple):
     doubts: tuple[str, ...]
 
 
-def read_record(robot: Robot, path: str | Path) -> Record:
+def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED) -> Record:
     """Read a record, a CSV file with columns as `vsacli export` names them, at rates of their own.
+
+    Args:
+        robot: that was recorded.
+        path: the file.
+        mapping: what columns with other names stand for.
 
     Raises:
         InputError: there is no such column, a unit is one of something else, times do not ascend, or there
             are faults with which nothing can be fitted.
     """
-    columns, unused = recorded_columns(robot, path)
+    columns, unused = recorded_columns(robot, path, mapping)
     faults = list(stopping_faults(columns, robot))
     if faults:
         raise InputError(Problem(str(path), 0, sentence) for sentence in faults)

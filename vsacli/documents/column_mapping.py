@@ -1,0 +1,258 @@
+"""Which columns of a table are read, and what they are called here: its header seen through a mapping."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError, Problem
+from vsacli.documents.table_header import Header, split_heading
+
+TIME = "time"
+"""The column of the stamps."""
+
+REST = "rest"
+"""Of columns to ignore: all that have no use."""
+
+UNIT_WORDS = {
+    **dict.fromkeys(("deg", "degree", "degrees"), "deg"),
+    **dict.fromkeys(("ms", "msec", "millis"), "ms"),
+    **dict.fromkeys(("us", "usec", "micros"), "us"),
+    **dict.fromkeys(("ns", "nsec", "nanosec", "nanoseconds"), "ns"),
+    **{word: word for word in ("rev", "mm", "cm")},
+    "ma": "mA",
+}
+"""Words at the end of a name, in small letters, that speak of a unit other than that of SI."""
+
+_LAST_WORD = re.compile(r"([A-Za-z]+)[^A-Za-z]*$")
+_CAMEL = re.compile(r"[a-z](Deg|Degrees|Degree)$")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MappedColumn:
+    """A column of a table, and what its numbers are.
+
+    Attributes:
+        column: its heading in the file, or its number from 1.
+        unit: of its numbers; None: that in brackets in the header, else that of what it stands for.
+        factor: what its numbers are multiplied by.
+        nanoseconds: of times in whole seconds, the column of the nanoseconds beside them.
+        place: file and line where all that is said.
+    """
+
+    column: str | int
+    unit: str | None = None
+    factor: float = 1.0
+    nanoseconds: str | int | None = None
+    place: tuple[str, int] = ("", 0)
+
+    def heading(self, target: str, own: str) -> str:
+        """What the column would be called here.
+
+        Args:
+            target: what it stands for.
+            own: its heading in the file.
+        """
+        if self.nanoseconds is not None:
+            return f"{target} [ns]"
+        unit = split_heading(own)[1] if self.unit is None else self.unit
+        return target if unit is None else f"{target} [{unit}]"
+
+    def doubt(self, own: str) -> str | None:
+        """A unit that the heading in the file speaks of but nobody gave."""
+        if self.unit is not None or self.nanoseconds is not None or split_heading(own)[1] is not None:
+            return None
+        last, camel = _LAST_WORD.search(own), _CAMEL.search(own)
+        word = camel[1] if camel else last[1] if last else ""
+        return UNIT_WORDS.get(word.lower())
+
+
+class ChosenColumns(NamedTuple):
+    """Columns of a file that are to be read.
+
+    Attributes:
+        places: where they stand, ascending, from 0.
+        headings: what they are called here, each with its unit in brackets if one is known.
+        factors: what their numbers are multiplied by.
+        others: names of columns that are not known.
+        ignored: names of those to leave out.
+        time: place of the stamps, if they are read.
+        nanoseconds: place of the nanoseconds beside them, if there are.
+    """
+
+    places: tuple[int, ...]
+    headings: tuple[str, ...]
+    factors: tuple[float, ...]
+    others: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()
+    time: int | None = None
+    nanoseconds: int | None = None
+
+
+@dataclass(frozen=True)
+class ColumnMapping:
+    """What is said of the columns of a table.
+
+    Attributes:
+        columns: by the names that are known here; they are renamed so.
+        ignore: `REST`, or columns to leave out.
+    """
+
+    columns: Mapping[str, MappedColumn] = dataclasses.field(default_factory=dict)
+    ignore: str | tuple[str | int, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.columns or self.ignore)
+
+    @property
+    def by_number(self) -> bool:
+        """Whether all columns are given by their numbers, so that no header is needed."""
+        return bool(self.columns) and all(isinstance(each.column, int) for each in self.columns.values())
+
+    def applied(self, header: Header, known: Collection[str] | None, file: str) -> ChosenColumns:
+        """The columns of a table to read.
+
+        Args:
+            header: of the table.
+            known: names that mean something; all if None.
+            file: named in errors.
+
+        Raises:
+            InputError: a column is not there, or not the only one of its name, or stands for two things.
+        """
+        return _Choice(self, header, known, file).made()
+
+    def joined(self, other: ColumnMapping) -> ColumnMapping:
+        """Both, said of the same file.
+
+        Raises:
+            InputError: they contradict each other.
+        """
+        for name, source in other.columns.items():
+            mine = self.columns.get(name, source)
+            if dataclasses.replace(mine, place=source.place) != source:
+                file, line = source.place
+                raise InputError.one(f"columns: {name} is another column of the same file above", file, line)
+        rest = REST in (self.ignore, other.ignore)
+        ignore = REST if rest else tuple(dict.fromkeys((*self.ignore, *other.ignore)))
+        return ColumnMapping({**self.columns, **other.columns}, ignore)
+
+
+AS_NAMED = ColumnMapping()
+"""Columns are what their names say."""
+
+
+class _Choice:
+    """Which columns of a header are read, and what is wrong with the mapping."""
+
+    def __init__(
+        self, mapping: ColumnMapping, header: Header, known: Collection[str] | None, file: str
+    ) -> None:
+        self._mapping, self._header, self._known = mapping, header, known
+        self._file = file
+        self._problems: list[Problem] = []
+
+    def made(self) -> ChosenColumns:
+        mapped = dict(self._mapped())
+        nanoseconds = self._nanoseconds()
+        used = dict(mapped)
+        others: list[str] = []
+        ignored: list[str] = []
+        for place, heading in enumerate(self._header.columns):
+            if place in mapped or place == nanoseconds:
+                continue
+            name = split_heading(heading)[0]
+            if self._is_ignored(place, heading):
+                ignored.append(heading)
+            elif self._known is None or name in self._known:
+                used[place] = (heading, 1.0)
+            else:
+                (ignored if self._mapping.ignore == REST else others).append(heading)
+        self._note_repeated(heading for heading, _ in used.values())
+        if self._problems:
+            raise InputError(self._problems)
+        places = tuple(sorted(used))
+        headings = tuple(used[place][0] for place in places)
+        time = next((place for place in places if split_heading(used[place][0])[0] == TIME), None)
+        factors = tuple(used[place][1] for place in places)
+        return ChosenColumns(places, headings, factors, tuple(others), tuple(ignored), time, nanoseconds)
+
+    def _mapped(self) -> Iterator[tuple[int, tuple[str, float]]]:
+        """Of each column that is mapped its place, its heading here, and its factor."""
+        taken: dict[int, str] = {}
+        for name, source in self._mapping.columns.items():
+            if self._known is not None and name not in self._known:
+                self._note(source, f"{name!r} is not known here{did_you_mean(name, self._known)}")
+                continue
+            place = self._place(source.column, source)
+            if place is None:
+                continue
+            own = self._header.columns[place]
+            unit = source.doubt(own)
+            if place in taken:
+                self._note(source, f"{own or source.column!r} stands for {taken[place]} already")
+            elif unit is not None:
+                self._note(source, _unit_remedy(name, own, unit))
+            else:
+                taken[place] = name
+                yield place, (source.heading(name, own), source.factor)
+
+    def _nanoseconds(self) -> int | None:
+        source = self._mapping.columns.get(TIME)
+        if source is None or source.nanoseconds is None:
+            return None
+        return self._place(source.nanoseconds, source)
+
+    def _place(self, column: str | int, source: MappedColumn) -> int | None:
+        """Where a column stands; None if that was noted as a problem."""
+        names = self._header.columns
+        if isinstance(column, int):
+            if column <= len(names):
+                return column - 1
+            self._note(source, f"{self._file} has {len(names)} columns, none with the number {column}")
+            return None
+        bare = [split_heading(heading)[0] for heading in names]
+        for candidates in (names, bare):
+            places = [place for place, name in enumerate(candidates) if name == column]
+            if len(places) == 1:
+                return places[0]
+            if places:
+                numbers = " or ".join(str(place + 1) for place in places)
+                self._note(source, f"{column!r} appears {len(places)} times; give its number, {numbers}")
+                return None
+        near = did_you_mean(column, [name for name in names if name])
+        self._note(source, f"{self._file} has no column {column!r}{near}")
+        return None
+
+    def _is_ignored(self, place: int, heading: str) -> bool:
+        ignore = self._mapping.ignore
+        return ignore != REST and (
+            heading in ignore or split_heading(heading)[0] in ignore or place + 1 in ignore
+        )
+
+    def _note_repeated(self, headings: Iterable[str]) -> None:
+        if not self._mapping:
+            return  # the header was refused if names were repeated
+        for name, count in Counter(split_heading(heading)[0] for heading in headings).items():
+            source = self._mapping.columns.get(name)
+            if count > 1 and source is not None:
+                message = (
+                    f"{self._file} has a column {name!r} of its own; leave this out, or ignore: [{name}]"
+                )
+                self._note(source, message)
+            elif count > 1:
+                message = f"column {name!r} appears {count} times"
+                self._problems.append(Problem(self._file, self._header.line, message))
+
+    def _note(self, source: MappedColumn, message: str) -> None:
+        self._problems.append(Problem(*source.place, f"columns: {message}"))
+
+
+def _unit_remedy(name: str, own: str, unit: str) -> str:
+    say = f"{name}: {{column: {own!r}, unit: {unit}}}"
+    return f"{own!r} speaks of {unit}; if its numbers are, write {say}, else their unit"
