@@ -24,6 +24,7 @@ HOMES = {
     "matplotlib": "results.plots",
     "click": "cli",
     "pyarrow": "results.exports",
+    "jinja2": "results.pages",
 }
 """Libraries that only one folder may import."""
 

@@ -35,6 +35,11 @@ def files_below(folder: Path, pattern: str) -> set[str]:
 
 def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> None:
     modules = files_below(REPOSITORY / "vsacli", "*.py") | {"vsacli/compute/engine/lanes.c"}
+    pages = {
+        name
+        for ending in ("css", "html", "js")
+        for name in files_below(REPOSITORY / "vsacli" / "results" / "pages", f"*.{ending}")
+    }
     examples = {
         f"vsacli/{name}"
         for folder in ("robots", "trajectories")
@@ -43,7 +48,8 @@ def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> No
     }
     assert {"vsacli/robots/vsa_3r.yaml", "vsacli/trajectories/rest_to_rest.yaml"} <= examples
     content = {name for name in wheel.root.namelist() if not re.search(r"\.dist-info/|/$", name)}
-    assert content == modules | examples | {"vsacli/py.typed"}
+    assert {"vsacli/results/pages/page.html", "vsacli/results/pages/page.css"} <= pages
+    assert content == modules | pages | examples | {"vsacli/py.typed"}
 
 
 def test_the_examples_in_the_wheel_are_those_of_the_repository(wheel: zipfile.Path) -> None:

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "file_format",
-    type=click.Choice(["png", "pdf", "svg"]),
+    type=click.Choice(["png", "pdf", "svg", "html"]),
     default="png",
     show_default=True,
-    help="Format of the figures.",
+    help="Format of the figures; html is one page of everything.",
 )
 @overwrite_option
 @talk_options
@@ -48,11 +48,19 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
 
     The table of a study gives <stem>-margin, over the numbers that vary, <stem>-pareto, cost over margin, and
     <stem>-feasibility, the share of runs with at least a margin; of several tables the latter are compared.
+
+    --format html writes one page <stem>.html instead, for a browser and without network: the report, zoomable
+    plots of every variable, and the robot at the time cursor; of several FILEs their differences, too. It
+    needs what pip install 'vsacli[html]' installs.
     """
     from vsacli.base.outputs import Outputs
 
     with Outputs(overwrite=overwrite, inputs=files) as outputs:
-        if _are_studies(files):
+        if file_format == "html":
+            from vsacli.cli.plot_page import write_page
+
+            write_page([Path(file) for file in files], Path(folder), outputs, talk)
+        elif _are_studies(files):
             _draw_studies([Path(file) for file in files], Path(folder), file_format, outputs)
         elif len(files) == 1:
             _draw_file(Path(files[0]), Path(folder), file_format, outputs, talk)

@@ -5,9 +5,8 @@ Of results the motor torques, after Fig. 4 of Buondonno & De Luca (2016), of sim
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,6 @@ from matplotlib.figure import Figure
 
 from vsacli.base.arrays import BoolArray
 from vsacli.base.errors import InputError
-from vsacli.base.texts import one_line
 from vsacli.base.units import POSITION, TORQUE
 from vsacli.base.variables import MOTORS
 from vsacli.results.curves import Failures, read_curves
@@ -31,6 +29,7 @@ from vsacli.results.plots.panels import (
     joint_panels,
     missing_variables,
 )
+from vsacli.results.several import check_comparable, distinct_labels
 from vsacli.results.store.reader import StoredResult
 
 COMPARISON = "compare"
@@ -81,34 +80,17 @@ def compare_files(files: Sequence[StoredResult]) -> Figure:
         InputError: the files are of different kinds or have different joints, or one was written without the
             variable that is compared.
     """
-    _check_kinds(files)
+    check_comparable(files)
     compared = _COMPARED[files[0].kind]
     for file in files:
-        _check_comparable(file, files[0], compared)
+        _check_holds(file, compared)
     with house_style():
         return _comparison(files, compared)
 
 
-def _check_kinds(files: Sequence[StoredResult]) -> None:
-    if len({file.kind for file in files}) > 1:
-        listed = ", ".join(f"{file.path} is a {file.kind}" for file in files)
-        raise InputError.one(f"{listed}; compare results with results, and simulations with simulations")
-
-
-def _check_comparable(result: StoredResult, first: StoredResult, compared: _Compared) -> None:
-    if compared.variable not in result.variables:
-        raise InputError.one(missing_variables(COMPARISON, [compared.variable]), result.path)
-    if _joints(result) != _joints(first):
-        message = (
-            f"cannot be compared with {first.path}: it has the joints {_joints(result)}, "
-            f"the other has {_joints(first)}; compare results of the same robot"
-        )
-        raise InputError.one(message, result.path)
-
-
-def _joints(result: StoredResult) -> str:
-    pairs = zip(result.joint_names, result.joint_types, strict=True)
-    return ", ".join(f"{name} ({joint_type})" for name, joint_type in pairs)
+def _check_holds(file: StoredResult, compared: _Compared) -> None:
+    if compared.variable not in file.variables:
+        raise InputError.one(missing_variables(COMPARISON, [compared.variable]), file.path)
 
 
 def _comparison(results: Sequence[StoredResult], compared: _Compared) -> Figure:
@@ -151,19 +133,3 @@ def _overlay(panels: list[list[Axes]], result: StoredResult, index: int, variabl
             draw_curve(axes, curves.time, values, index, line_style(index))
             handles += draw_bands(axes, failures.time, *failures.among([joint]))
     return handles
-
-
-def distinct_labels(results: Sequence[StoredResult]) -> list[str]:
-    """Names of the trajectories; where two are equal, all with the stem of their file, or with its path."""
-    for label in _LABELS:
-        labels = [label(result) for result in results]
-        if len(set(labels)) == len(labels):
-            return labels
-    return [f"{number}: {label}" for number, label in enumerate(labels, start=1)]
-
-
-_LABELS: tuple[Callable[[StoredResult], str], ...] = (
-    lambda result: result.trajectory_name,
-    lambda result: f"{result.trajectory_name} ({one_line(Path(result.path).stem)})",
-    lambda result: f"{result.trajectory_name} ({one_line(str(result.path))})",
-)

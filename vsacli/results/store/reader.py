@@ -26,6 +26,7 @@ from vsacli.results.store.damage import (
 from vsacli.results.store.inputs import StoredInput
 from vsacli.results.store.schema import EXISTING, FORMAT, row_shape, storage_type
 from vsacli.results.store.stored_file import StoredFile
+from vsacli.results.store.stored_geometry import DH, StoredGeometry
 from vsacli.results.store.stored_limits import ACHIEVED, RANGES, SIZES
 
 OF_JOINTS = "inputs/robot/joints/{}"
@@ -123,6 +124,20 @@ class StoredResult(StoredFile):
             if name in RANGES and OF_JOINTS.format(RANGES[name]) in self._file:
                 bounds[:, 0] = self._dataset(OF_JOINTS.format(RANGES[name]))[...]
         return bounds
+
+    def geometry(self) -> StoredGeometry:
+        """What of the robot says where its frames lie.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        with reporting_damage(self.path):
+            rows = [self._dataset(OF_JOINTS.format(f"dh_{name}"))[...] for name in DH]
+            poses = [
+                np.stack([self._dataset(f"inputs/robot/{frame}_{part}")[...] for part in ("xyz", "rpy")])
+                for frame in ("base", "tool")
+            ]
+            return StoredGeometry.of(self.joint_types, np.stack(rows, axis=-1), *poses)
 
     def has(self, variable: Variable) -> bool:
         """Whether runs of its robot have a variable, as far as that depends on what the robot file gives."""

@@ -1,0 +1,45 @@
+"""`vsacli plot --format html`: a page in place of figures."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager, ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vsacli.cli.command_parts import result_line
+from vsacli.cli.console import Talk
+
+if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs
+    from vsacli.base.progress import Bar
+
+LONG_PAGE = 2_000_000
+"""Samples, of all files together, from which on a page takes so long that its progress is shown."""
+
+
+def write_page(paths: list[Path], folder: Path, outputs: Outputs, talk: Talk) -> None:
+    """Write the page of results, or of simulations.
+
+    Raises:
+        InputError: nothing can be drawn from these files, they do not belong together, or what a page needs
+            is not installed.
+        StorageError: the page cannot be written.
+    """
+    from vsacli.files.stored_reports import stored_report
+    from vsacli.results.pages import result_page
+    from vsacli.results.store.simulation import open_stored
+
+    outputs.folder(folder)
+    page = outputs.file(folder / f"{'-'.join(path.stem for path in paths)}.html")
+    with ExitStack() as stack:
+        files = [stack.enter_context(open_stored(path)) for path in paths]
+        for each in files:
+            talk.detail(result_line(each))
+        reports = [stored_report(each.kind, each.report_json) for each in files]
+        samples = sum(each.samples for each in files)
+
+        def progress(variables: int) -> AbstractContextManager[Bar]:
+            shown_from = 0 if samples >= LONG_PAGE else variables + 1
+            return talk.progress(variables, shown_from=shown_from, label="drawing")
+
+        page.write_text(result_page(files, reports, progress))

@@ -1,0 +1,9 @@
+"""Pages of stored results: one HTML file each, with everything in it that it needs.
+
+What is drawn is packed here, by the same envelopes, corridors and limits as in figures; how it looks and
+acts is in `page.html`, `page.css` and the scripts beside them.
+"""
+
+from vsacli.results.pages.result_page import result_page
+
+__all__ = ["result_page"]

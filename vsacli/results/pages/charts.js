@@ -1,0 +1,290 @@
+"use strict";
+/* The plots over time: each a card with a legend that shows the values at the cursor; one window of time for all. */
+Bokeh.set_log_level("warn");
+vsacli.charts = (() => {
+  const { data, state, array, valueAt, number, colour, curveColour, element } = vsacli;
+  const DASHES = ["solid", "dashed", "dotdash", "dotted"];
+  const BORDERS = { solid: "solid", dashed: "dashed", dotdash: "double", dotted: "dotted" };
+  const NEAR = 0.5, ROOM = 0.06;  // how far limits may be from curves to be shown, and room left; in heights of the curves
+  const ROLES = { commanded: "commanded", measured: "measured", actual: "actual" };
+  const MANY = 8;  // joints, from which on a legend scrolls
+  const cards = [];
+
+  /* Joints have colours; what is beyond those, other files and other roles have other dashes. */
+  function dash(series) {
+    const roles = { commanded: 1, measured: 3 };
+    return DASHES[(roles[series.role] || series.file + Math.floor(series.colour / vsacli.COLOURS)) % DASHES.length];
+  }
+
+  function absolute(times) {
+    return Float64Array.from(times, (time) => time + data.start);
+  }
+
+  /* The stretches of a kind at some joints of any file, those that overlap as one. */
+  function stretches(kind, joints) {
+    const every = data.files.flatMap((file) => (kind === "doubtful" ? file.doubtful
+      : (file.troubles[kind] || []).filter((_, joint) => joints.has(joint)).flat()));
+    const merged = [];
+    for (const [start, end] of every.sort((one, other) => one[0] - other[0])) {
+      const last = merged.at(-1);
+      if (last && start <= last[1]) last[1] = Math.max(last[1], end); else merged.push([start, end]);
+    }
+    return merged;
+  }
+
+  function shade(figure, kind, joints, look) {
+    const spans = stretches(kind, joints);
+    if (spans.length) {
+      const [x0, x1] = [0, 1].map((end) => spans.map((span) => span[end] + data.start));
+      figure.vstrip({ x0, x1, fill_color: colour(kind), line_color: colour(kind), line_alpha: look.fill_alpha,
+                      level: "underlay", ...look });
+    }
+  }
+
+  /* Runs of points between gaps, as index pairs; single points are what a line would not show. */
+  function runs(values) {
+    const found = [];
+    let start = -1;
+    for (let index = 0; index <= values.length; index += 1) {
+      const there = index < values.length && !Number.isNaN(values[index]);
+      if (there && start < 0) start = index;
+      if (!there && start >= 0) { found.push([start, index]); start = -1; }
+    }
+    return found;
+  }
+
+  function addBand(figure, series, x, fill) {
+    const [lower, upper] = series.band.map(array);
+    const summed = lower.map((value, index) => value + upper[index]);
+    return runs(summed).filter(([start, end]) => end - start > 1).map(([start, end]) => {
+      const [part, y1, y2] = [x, lower, upper].map((each) => each.slice(start, end));
+      const source = new Bokeh.ColumnDataSource({ data: { x: part, y1, y2 } });
+      const look = { fill_color: fill, fill_alpha: 0.3, level: "underlay" };
+      return figure.varea({ field: "x" }, { field: "y1" }, { field: "y2" }, { source, ...look });
+    });
+  }
+
+  function addSeries(figure, series, bandColour) {
+    const x = absolute(array(series.time)), y = array(series.values);
+    const look = { line_color: curveColour(series.colour), line_width: series.role === "measured" ? 1 : 1.7,
+                   line_dash: dash(series) };
+    const source = new Bokeh.ColumnDataSource({ data: { x, y } });
+    const drawn = [figure.line({ field: "x" }, { field: "y" }, { source, ...look })];
+    const alone = runs(y).filter(([start, end]) => end - start === 1).map(([start]) => start);
+    if (alone.length) {
+      drawn.push(figure.scatter(alone.map((at) => x[at]), alone.map((at) => y[at]),
+                                { size: 3, line_color: look.line_color, fill_color: look.line_color }));
+    }
+    if (series.band) drawn.push(...addBand(figure, series, x, bandColour || look.line_color));
+    return { series, drawn };
+  }
+
+  function paint(figure) {
+    for (const axis of [...figure.xaxes, ...figure.yaxes]) {
+      axis.setv({ axis_line_color: colour("line"), major_tick_line_color: colour("line"), minor_tick_line_color: null,
+                  major_label_text_color: colour("soft"), axis_label_text_color: colour("soft"),
+                  axis_label_text_font_style: "normal", axis_label_text_font_size: "12px" });
+    }
+    for (const grid of [...figure.xgrids, ...figure.ygrids]) grid.grid_line_color = colour("grid");
+    figure.setv({ background_fill_color: colour("card"), border_fill_color: colour("card"), outline_line_color: null });
+  }
+
+  /* A figure in the page's colours, its labels taken literally. */
+  function newFigure(attributes, labels) {
+    const figure = Bokeh.Plotting.figure({ sizing_mode: "stretch_both", tools: [], min_border_right: 12,
+                                           lod_threshold: null, ...attributes });
+    figure.toolbar.autohide = true;
+    figure.toolbar.logo = null;
+    figure.xaxes[0].axis_label = new Bokeh.PlainText({ text: labels[0] });
+    figure.yaxes[0].axis_label = new Bokeh.PlainText({ text: labels[1] });
+    paint(figure);
+    return figure;
+  }
+
+  function addTools(figure) {
+    const tools = [new Bokeh.BoxZoomTool({ dimensions: "auto" }), new Bokeh.PanTool(),
+                   new Bokeh.WheelZoomTool({ modifiers: { ctrl: true } }), new Bokeh.SaveTool()];
+    figure.toolbar.setv({ tools, active_drag: tools[0], active_scroll: tools[2] });
+  }
+
+  class Card {
+    constructor(chart) {
+      this.chart = chart;
+      this.plot = element("div", { class: "plot" });
+      this.values = [];
+      this.keys = [...new Set(chart.series.map((series) => series.label))].map((label) => this.key(label));
+      const legend = element("div", { class: this.keys.length > MANY ? "legend long" : "legend" }, ...this.keys);
+      if (chart.band) {
+        this.area = element("span", { class: "area" });
+        legend.append(element("span", { class: "key" }, this.area, chart.band));
+      }
+      this.node = element("figure", { class: "chart" },
+        element("figcaption", {}, chart.title, " ", element("code", {}, chart.name)), this.plot, legend);
+      this.node.card = this;
+    }
+
+    /* What the legend says of a joint: each of its curves, by dashes and role, with the value at the cursor. */
+    key(label) {
+      const box = element("span", { class: "key" }, `${label} `);
+      for (const series of this.chart.series.filter((each) => each.label === label)) {
+        const swatch = element("i", { class: "swatch" }), value = element("b"), role = ROLES[series.role] || "";
+        const rms = series.rms === null ? "" : `rms ${number(series.rms)}, now `;
+        const part = element("span", { class: "key", title: data.files[series.file].label }, swatch, role, rms, value);
+        this.values.push({ series, swatch, value, part });
+        box.append(part);
+      }
+      return box;
+    }
+
+    /* The corridor has a colour of its own; uncertainty that of its curve. */
+    get bandColour() {
+      return this.chart.shown ? colour("reachable") : "";
+    }
+
+    get visible() {
+      const box = this.node.getBoundingClientRect();
+      return box.width > 0 && box.bottom > -200 && box.top < innerHeight + 200;
+    }
+
+    async build() {
+      if (this.figure || this.node.offsetParent === null) return;
+      const [start, end] = state.window.map((time) => time + data.start);
+      const ranges = { x_range: new Bokeh.Range1d({ start, end }), y_range: new Bokeh.Range1d(this.extent()) };
+      this.figure = newFigure(ranges, ["time [s]", `[${this.chart.unit}]`]);
+      addTools(this.figure);
+      this.shadeAll();
+      this.curves = this.chart.series.map((series) => addSeries(this.figure, series, this.bandColour));
+      this.addLimits();
+      this.span = new Bokeh.Span({ dimension: "height", location: state.cursor + data.start,
+                                   line_color: colour("cursor"), line_width: 1 });
+      this.figure.add_layout(this.span);
+      this.follow();
+      this.show();
+      await Bokeh.Plotting.show(this.figure, this.plot);
+      this.update();
+    }
+
+    shadeAll() {
+      const joints = new Set(this.chart.series.map((series) => series.joint ?? -1));
+      if (joints.has(-1)) data.joints.forEach((_, joint) => joints.add(joint));
+      shade(this.figure, "doubtful", joints, { fill_alpha: 0.18 });
+      shade(this.figure, "near-singular", joints, { fill_alpha: 0.25 });
+      shade(this.figure, "infeasible", joints, { fill_alpha: 0.35 });
+      shade(this.figure, "singular", joints, { fill_alpha: 0.0, hatch_pattern: "right_diagonal_line",
+                                               hatch_color: colour("singular"), hatch_alpha: 0.6, hatch_scale: 8 });
+    }
+
+    /* What the axis of values shows at first: all curves that are not hidden, and limits that are near them. */
+    extent() {
+      if (this.chart.shown) return { start: this.chart.shown[0], end: this.chart.shown[1] };
+      let low = Infinity, high = -Infinity;
+      for (const series of this.chart.series.filter(vsacli.shown)) {
+        for (const value of array(series.values)) {
+          if (value < low) low = value;
+          if (value > high) high = value;
+        }
+      }
+      if (low > high) return { start: 0, end: 1 };
+      const height = high - low || Math.abs(high) || 1;
+      const near = this.chart.limits.filter(({ joint, value }) => state.joints.has(joint)
+        && value > low - NEAR * height && value < high + NEAR * height).map(({ value }) => value);
+      return { start: Math.min(low, ...near) - ROOM * height, end: Math.max(high, ...near) + ROOM * height };
+    }
+
+    addLimits() {
+      this.limits = this.chart.limits.map((limit) => ({ joint: limit.joint, line: this.figure.hspan({
+        y: [limit.value], line_color: curveColour(limit.joint), line_dash: "dotted", line_width: 1.2 }) }));
+    }
+
+    follow() {
+      const x = this.figure.x_range;
+      x.change.connect(() => {
+        const [start, end] = state.window.map((time) => time + data.start);
+        if (x.start !== start || x.end !== end) vsacli.setWindow(x.start - data.start, x.end - data.start, this);
+      });
+      this.figure.on_event("mousemove", (event) => vsacli.setCursor(event.x - data.start));
+      this.figure.on_event("doubletap", () => vsacli.tell("reset"));
+    }
+
+    /* Take over window, cursor and values, if there is somebody to see it. */
+    update() {
+      if (!this.visible) return;
+      this.values.forEach(({ series, value }) => {
+        value.textContent = number(valueAt(array(series.time), array(series.values), state.cursor));
+      });
+      if (!this.figure) return;
+      const [start, end] = state.window.map((time) => time + data.start);
+      const x = this.figure.x_range;
+      if (x.start !== start || x.end !== end) x.setv({ start, end });
+      this.span.location = state.cursor + data.start;
+    }
+
+    reset() {
+      if (this.figure) this.figure.y_range.setv(this.extent());
+    }
+
+    /* Hide what the filters hide. */
+    show() {
+      if (this.area) this.area.style.background = this.bandColour || colour("soft");
+      this.values.forEach(({ series, part, swatch }) => {
+        part.classList.toggle("hidden", !vsacli.shown(series));
+        swatch.style.borderTopColor = curveColour(series.colour);
+        swatch.style.borderTopStyle = BORDERS[dash(series)];
+      });
+      this.keys.forEach((key) => key.classList.toggle("hidden", !key.querySelector(".key:not(.hidden)")));
+      for (const { series, drawn } of this.curves || []) drawn.forEach((each) => { each.visible = vsacli.shown(series); });
+      for (const { joint, line } of this.limits || []) line.visible = state.joints.has(joint);
+      this.reset();
+    }
+
+    drop() {
+      this.plot.replaceChildren();
+      this.figure = undefined;
+    }
+  }
+
+  function add(parent, charts) {
+    const made = charts.map((chart) => new Card(chart));
+    made.forEach((card) => { parent.append(card.node); card.show(); watcher.observe(card.node); });
+    cards.push(...made);
+  }
+
+  /* Plots are built one after the other, so that the first is there soon. */
+  let first = true, queue = Promise.resolve();
+  function build(card) {
+    queue = queue.then(() => card.build()).then(() => {
+      if (first && card.figure) performance.mark("first plot");
+      first = first && !card.figure;
+      return new Promise((done) => { setTimeout(done, 0); });
+    });
+    return queue;
+  }
+
+  const watcher = new IntersectionObserver((entries) => {
+    for (const { isIntersecting, target } of entries) {
+      if (isIntersecting) build(target.card).then(() => target.card.update());
+    }
+  }, { rootMargin: "300px" });
+
+  /* Whatever is open but out of sight, while nothing else is to be done: it may be printed. */
+  async function buildRest() {
+    for (const card of cards) {
+      if (!card.figure && card.node.offsetParent !== null) await build(card);
+    }
+    document.documentElement.dataset.ready = "yes";
+  }
+
+  let waiting = false;
+  function updateSoon() {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; cards.forEach((card) => card.update()); });
+  }
+  vsacli.listen("cursor", updateSoon);
+  vsacli.listen("window", updateSoon);
+  vsacli.listen("shown", () => cards.forEach((card) => card.show()));
+  vsacli.listen("reset", () => { cards.forEach((card) => card.reset()); vsacli.setWindow(...data.span); });
+  vsacli.listen("scheme", () => { cards.forEach((card) => { card.drop(); card.show(); }); buildRest(); });
+  addEventListener("scroll", updateSoon, { passive: true });
+  return { add, buildRest, newFigure, addTools, cards };
+})();

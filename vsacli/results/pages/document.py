@@ -1,0 +1,85 @@
+"""One HTML file: the template of the project around texts, numbers and scripts, closed to the network."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+from vsacli.base.tables import ReportText
+from vsacli.results.pages.library import plotting_library
+from vsacli.results.pages.packing import Packed, as_script
+
+TEMPLATE, STYLE = "page.html", "page.css"
+
+SCRIPTS = ("marks.js", "charts.js", "robot.js", "scatter.js", "page.js")
+"""The project's own, in the order in which they run."""
+
+LARGEST_SHOWN = 200_000
+"""Letters of an input up to which a page shows all of it; tables of samples are longer."""
+
+
+class Facts(NamedTuple):
+    """What a page says of a file in words.
+
+    Attributes:
+        title: what was run.
+        label: short, to tell it from the others on the page.
+        verdict: one word, as in the report.
+        report: what the command printed that made it.
+        provenance: pairs of a word and what it says.
+        inputs: the files that were read.
+    """
+
+    title: str
+    label: str
+    verdict: str
+    report: ReportText
+    provenance: Sequence[tuple[str, str]]
+    inputs: Sequence[InputText]
+
+
+class InputText(NamedTuple):
+    """A file that was read: its path, SHA-256, and what it held, as far as a page shows it."""
+
+    path: str
+    sha256: str
+    content: str | None
+
+
+def rendered(title: str, facts: Sequence[Facts], data: Mapping[str, Any], packed: Packed) -> str:
+    """The page.
+
+    Args:
+        title: of the page.
+        facts: what is said of each file.
+        data: JSON values for the scripts.
+        packed: arrays for the scripts.
+
+    Raises:
+        InputError: what a page needs is not installed.
+    """
+    library = plotting_library()
+    import jinja2  # what bokeh brings along
+
+    folder = files(__package__)
+    scripts = [*library.scripts, *((folder / name).read_text(encoding="utf-8") for name in SCRIPTS)]
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True)
+    template = environment.from_string((folder / TEMPLATE).read_text(encoding="utf-8"))
+    return template.render(
+        title=title,
+        facts=facts,
+        data=as_script({**data, "library": library.name}),
+        arrays=packed.texts,
+        style=(folder / STYLE).read_text(encoding="utf-8"),
+        scripts=scripts,
+        allowed=" ".join(map(_hash, scripts)),
+    )
+
+
+def _hash(script: str) -> str:
+    """What names a script in a Content Security Policy: no other one runs, wherever it came from."""
+    digest = hashlib.sha256(script.encode("utf-8")).digest()
+    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"

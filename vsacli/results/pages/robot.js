@@ -1,0 +1,219 @@
+"use strict";
+/* The robot at the time cursor: prisms in orthographic view, painted from the back to the front. */
+vsacli.robot = (() => {
+  const { data, state, array, after, colour, curveColour } = vsacli;
+  const THICK = 0.034, THIN = 0.014;  // radii of joints and links, relative to the size of the motion
+  const ISOMETRIC = { turn: -0.75 * Math.PI, tilt: 0.6155 };
+  const view = { ...ISOMETRIC };
+  const canvas = document.getElementById("chain"), note = document.getElementById("chain-note");
+  const chains = data.files ? data.files.map((file) => file.chain).map(unpacked).filter(Boolean) : [];
+  const joints = data.joints || [];
+  const box = bounds();
+
+  const add = (a, b, share = 1) => [a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]];
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+  const scaled = (a, factor) => a.map((each) => factor * each);
+  const size = (a) => Math.sqrt(dot(a, a));
+
+  function unpacked(chain, file) {
+    if (!chain) return null;
+    const [time, origins, elbows, axes] = [chain.time, chain.origins, chain.elbows, chain.axes].map(array);
+    return { file, time, origins, elbows, axes, points: origins.length / time.length / 3, count: axes.length / time.length / 3 };
+  }
+
+  /* Middle and radius of all points that any chain passes. */
+  function bounds() {
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    for (const { origins } of chains) {
+      origins.forEach((value, index) => {
+        if (value < low[index % 3]) low[index % 3] = value;
+        if (value > high[index % 3]) high[index % 3] = value;
+      });
+    }
+    const middle = low.map((value, axis) => (value + high[axis]) / 2);
+    return { middle, radius: Math.hypot(...low.map((value, axis) => (high[axis] - value) / 2)) || 1, low };
+  }
+
+  /* Points of an array at the cursor, linear between instants. */
+  function pointsAt(chain, values, count) {
+    const next = Math.min(Math.max(after(chain.time, state.cursor), 1), chain.time.length - 1), before = Math.max(next - 1, 0);
+    const span = chain.time[next] - chain.time[before];
+    const share = span > 0 ? Math.min(Math.max((state.cursor - chain.time[before]) / span, 0), 1) : 0;
+    return Array.from({ length: count }, (_, point) => [0, 1, 2].map((axis) => {
+      const [a, b] = [before, next].map((instant) => values[(instant * count + point) * 3 + axis]);
+      return a + share * (b - a);
+    }));
+  }
+
+  function camera() {
+    const { width, height } = canvas;
+    const [c, s, ct, st] = [Math.cos(view.turn), Math.sin(view.turn), Math.cos(view.tilt), Math.sin(view.tilt)];
+    const right = [-s, c, 0], up = [-c * st, -s * st, ct], towards = [c * ct, s * ct, st];
+    const scale = 0.49 * Math.min(width, height) / (box.radius * (1 + THICK));
+    const flat = (point) => {
+      const from = add(point, box.middle, -1);
+      return [width / 2 + scale * dot(from, right), height / 2 - scale * dot(from, up)];
+    };
+    return { flat, towards };
+  }
+
+  /* The faces of a prism from one point to another, each with its depth and how bright it is. */
+  function prism(from, to, radius, sides, paint, faces, eye) {
+    const axis = add(to, from, -1), length = size(axis);
+    if (!(length > 1e-9)) return;
+    const along = scaled(axis, 1 / length);
+    const aside = cross(along, Math.abs(along[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]);
+    const u = scaled(aside, radius / size(aside)), v = cross(along, u);
+    const ring = (centre) => Array.from({ length: sides }, (_, side) => {
+      const angle = 2 * Math.PI * (side + 0.5) / sides;
+      return add(add(centre, u, Math.cos(angle)), v, Math.sin(angle));
+    });
+    const [first, last] = [ring(from), ring(to)];
+    const face = (corners, normal) => {
+      if (dot(normal, eye.towards) <= 0) return;
+      const centre = scaled(corners.reduce((sum, corner) => add(sum, corner), [0, 0, 0]), 1 / corners.length);
+      faces.push({ corners, depth: dot(centre, eye.towards), bright: 0.62 + 0.38 * dot(normal, eye.towards) / size(normal), paint });
+    };
+    for (let side = 0; side < sides; side += 1) {
+      const next = (side + 1) % sides;
+      face([first[side], first[next], last[next], last[side]], add(add(first[side], first[next]), from, -2));
+    }
+    face(first, scaled(along, -1));
+    face(last, along);
+  }
+
+  const inside = (spans) => spans.some(([start, end]) => start <= state.cursor && state.cursor <= end);
+
+  /* What is wrong with a joint now, worst first. */
+  function trouble(file, joint) {
+    const { troubles } = data.files[file];
+    return Object.keys(troubles).filter((kind) => inside(troubles[kind][joint]));
+  }
+
+  function chainFaces(chain, eye) {
+    const faces = [], radius = box.radius;
+    const origins = pointsAt(chain, chain.origins, chain.points);
+    const elbows = pointsAt(chain, chain.elbows, chain.count), axes = pointsAt(chain, chain.axes, chain.count);
+    const link = { fill: colour("soft") };
+    const base = origins[0];
+    prism([base[0], base[1], base[2] - 2.4 * THICK * radius], [base[0], base[1], base[2] - THICK * radius],
+          2 * THICK * radius, 4, link, faces, eye);
+    axes.forEach((axis, joint) => {
+      const bad = trouble(chain.file, joint)[0];
+      const paint = { fill: bad ? colour("bad") : curveColour(joint) }, wide = THICK * radius * (bad ? 1.35 : 1);
+      const here = origins[joint], sleeve = scaled(axis, 1.3 * THICK * radius);
+      const sliding = joints[joint].type === "prismatic";
+      prism(add(here, sleeve, -1), add(here, sleeve), sliding ? 1.2 * wide : wide, sliding ? 4 : 18, paint, faces, eye);
+      prism(here, elbows[joint], (sliding ? 0.75 : 1) * THIN * radius, sliding ? 4 : 10, sliding ? paint : link, faces, eye);
+      prism(elbows[joint], origins[joint + 1], THIN * radius, 10, link, faces, eye);
+    });
+    prism(origins[chain.points - 2], origins[chain.points - 1], 0.6 * THIN * radius, 8, link, faces, eye);
+    return faces;
+  }
+
+  function shaded(fill, bright) {
+    const [r, g, b] = fill.match(/[0-9a-f]{2}/gi).map((pair) => parseInt(pair, 16));
+    const lifted = (part) => Math.round(bright * (0.8 * part + 40));
+    return `rgb(${lifted(r)},${lifted(g)},${lifted(b)})`;
+  }
+
+  function path(context, corners, flat) {
+    context.beginPath();
+    corners.map(flat).forEach(([x, y], index) => (index ? context.lineTo(x, y) : context.moveTo(x, y)));
+  }
+
+  function drawGround(context, flat) {
+    const { middle, radius } = box, level = chains[0].origins[2] - 2.4 * THICK * radius, step = radius / 3;
+    context.strokeStyle = colour("line");
+    context.lineWidth = devicePixelRatio;
+    for (let line = -3; line <= 3; line += 1) {
+      for (const [a, b] of [[[line, -3], [line, 3]], [[-3, line], [3, line]]]) {
+        path(context, [a, b].map(([x, y]) => [middle[0] + x * step, middle[1] + y * step, level]), flat);
+        context.stroke();
+      }
+    }
+  }
+
+  function drawTrace(context, chain, flat) {
+    const last = chain.points - 1, trace = [];
+    for (let instant = 0; instant < chain.time.length; instant += 1) {
+      const at = (instant * chain.points + last) * 3;
+      trace.push([chain.origins[at], chain.origins[at + 1], chain.origins[at + 2]]);
+    }
+    path(context, trace.filter((point) => point.every(Number.isFinite)), flat);
+    context.strokeStyle = colour("accent");
+    context.lineWidth = 1.2 * devicePixelRatio;
+    context.stroke();
+  }
+
+  function draw() {
+    if (!chains.length) return;
+    const wanted = Math.round(canvas.clientWidth * devicePixelRatio);
+    if (canvas.width !== wanted || canvas.height !== Math.round(canvas.clientHeight * devicePixelRatio)) {
+      canvas.width = wanted;
+      canvas.height = Math.round(canvas.clientHeight * devicePixelRatio);
+    }
+    const context = canvas.getContext("2d"), eye = camera();
+    context.clearRect(0, 0, canvas.width, canvas.height);
+    context.lineJoin = "round";
+    drawGround(context, eye.flat);
+    chains.filter((chain) => state.files.has(chain.file)).forEach((chain, order) => {
+      context.globalAlpha = order ? 0.45 : 1;
+      drawTrace(context, chain, eye.flat);
+      for (const { corners, bright, paint } of chainFaces(chain, eye).sort((a, b) => a.depth - b.depth)) {
+        path(context, corners, eye.flat);
+        context.closePath();
+        context.fillStyle = context.strokeStyle = shaded(paint.fill, bright);
+        context.lineWidth = 0.6;
+        context.fill();
+        context.stroke();
+      }
+    });
+    context.globalAlpha = 1;
+    tellTroubles();
+  }
+
+  function tellTroubles() {
+    const said = chains.flatMap((chain) => joints.map((joint, at) => [joint.name, trouble(chain.file, at)]));
+    const bad = said.filter(([, kinds]) => kinds.length).map(([name, kinds]) => `${name}: ${kinds.join(", ")}`);
+    note.textContent = bad.length ? bad.join("; ") : "drag, or arrow keys, turn the view; double-click resets it";
+  }
+
+  let waiting = false;
+  function drawSoon() {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => { waiting = false; draw(); });
+  }
+
+  function turn(aside, upward) {
+    view.turn -= aside;
+    view.tilt = Math.min(Math.max(view.tilt + upward, -Math.PI / 2), Math.PI / 2);
+    drawSoon();
+  }
+
+  function follow() {
+    canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      if (event.buttons) turn(0.01 * event.movementX, 0.01 * event.movementY);
+    });
+    canvas.addEventListener("dblclick", () => { Object.assign(view, ISOMETRIC); drawSoon(); });
+    canvas.addEventListener("keydown", (event) => {
+      const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+      if (!way) return;
+      turn(0.1 * way[0], 0.1 * way[1]);
+      event.preventDefault();
+      event.stopPropagation();
+    });
+    new ResizeObserver(drawSoon).observe(canvas);
+    ["cursor", "shown", "scheme"].forEach((topic) => vsacli.listen(topic, drawSoon));
+  }
+
+  if (chains.length) {
+    document.getElementById("robot").hidden = false;
+    document.getElementById("columns").className = "beside";
+    follow();
+  }
+  return { draw, view };
+})();
