@@ -51,7 +51,7 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
 
     --format html writes one page <stem>.html instead, for a browser and without network: the report, zoomable
     plots of every variable, and the robot at the time cursor; of several FILEs their differences, too. It
-    needs what pip install 'vsacli[html]' installs.
+    needs the package bokeh: pip install bokeh.
     """
     from vsacli.base.outputs import Outputs
 

@@ -33,7 +33,7 @@ def plotting_library() -> Library:
     try:
         installed = distribution("bokeh")
     except PackageNotFoundError:
-        reason = "pages need the package bokeh, which is not installed; pip install 'vsacli[html]' gets it"
+        reason = "pages need the package bokeh, which is not installed; pip install bokeh gets it"
         raise InputError.one(reason) from None
     folder = Path(str(installed.locate_file("bokeh/server/static/js")))
     scripts = (folder / name for name in SCRIPTS)
