@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import subprocess
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from samples.codegen import clear, commands, motion_of, with_springs
+from samples.codegen import clear, commands, expected_of, motion_of, with_springs
 from samples.generated_code import STRICT, compile_c, compiled_robot, write_files
 from samples.marks import COMPILERS, needs, needs_compiler, slow, slow_but
 from samples.robots import random_robot
@@ -21,6 +22,7 @@ from samples.springs import SPRINGS
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.variables import VARIABLES
+from vsacli.base.version import __version__
 from vsacli.control.codegen import interface
 from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
@@ -80,12 +82,16 @@ def test_no_undefined_behaviour(name: str, tmp_path: Path) -> None:
 @needs_compiler
 @pytest.mark.parametrize("name", ["3R", *map(slow, ("mixed", "sinh", "table", "four_bar"))])
 def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_path: Path) -> None:
-    flags = ("-Wconversion", "-Wdouble-promotion") if name == "3R" else ()
-    folder = tmp_path / "library"
-    folder.mkdir()
-    write_files(project(name, "float"), folder)
-    compile_c(folder, *STRICT, *flags, "-c", f"{prefix_of(ROBOTS[name])}.c")
     assert self_test(name, tmp_path, compiler=COMPILERS[-1], precision="float") == "all values agree\n"
+
+
+@needs_compiler
+@pytest.mark.parametrize("precision", ["double", "float"])
+@pytest.mark.parametrize("name", ["3R", *map(slow, ("mixed", "sinh", "table", "four_bar"))])
+def test_no_number_changes_its_type_unsaid(name: str, precision: str, tmp_path: Path) -> None:
+    write_files(project(name, precision), tmp_path)
+    flags = ("-Wconversion", "-Wdouble-promotion", "-fsyntax-only")
+    compile_c(tmp_path, *STRICT, *flags, f"{prefix_of(ROBOTS[name])}.c")
 
 
 @needs_compiler
@@ -175,10 +181,54 @@ def test_the_header_says_what_it_is_about() -> None:
 
 
 def test_the_files() -> None:
-    assert set(project("3R").files) == {"vsa_3r.c", "vsa_3r.h", "vsa_3r_test.c", "Makefile", "README.md"}
+    sources = {"vsa_3r.c", "vsa_3r.h", "vsa_3r_test.c"}
+    assert set(project("3R").files) == {*sources, "Makefile", "CMakeLists.txt", "README.md"}
     readme = project("3R").files["README.md"]
     assert "vsa_3r_inverse_dynamics(&" in readme or "vsa_3r_inverse_dynamics(command" in readme
     assert "0 base, 1 shoulder, 2 elbow" in readme
+
+
+def test_the_header_says_of_which_robot_and_by_which_vsacli() -> None:
+    robot = shipped_robot("vsa_3r")
+    digest = hashlib.sha256(Path(robot.sources[0].path).read_bytes()).hexdigest()
+    header = generate(robot).files["vsa_3r.h"]
+    assert f'#define VSA_3R_ROBOT_SHA256 "{digest}"\n' in header
+    assert f'#define VSA_3R_VERSION "{__version__}"\n' in header
+    assert "ROBOT_SHA256" not in project("one joint").files[f"{prefix_of(ROBOTS['one joint'])}.h"]
+
+
+@needs("cmake", "cmake")
+def test_cmake_builds_the_library_and_its_test(tmp_path: Path) -> None:
+    write_files(project("prismatic"), tmp_path)
+    for command in (
+        ("cmake", "-B", "build", f"-DCMAKE_C_COMPILER={COMPILERS[0]}"),
+        ("cmake", "--build", "build"),
+        ("ctest", "--test-dir", "build", "--output-on-failure"),
+    ):
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert "100% tests passed" in done.stdout
+
+
+@needs_compiler
+@needs("make", "make")
+def test_make_size_says_what_code_and_stack_take(tmp_path: Path) -> None:
+    write_files(project("prismatic"), tmp_path)
+    done = subprocess.run(
+        ["make", "size", "CC=gcc"], cwd=tmp_path, capture_output=True, text=True, check=True
+    ).stdout
+    assert re.search(r"^ *\d+\s+0\s+0\s", done, re.MULTILINE), "text, and nothing that changes"
+    assert re.search(r"rp_2_inverse_dynamics\t\d+$", done, re.MULTILINE)
+
+
+def test_code_without_loops() -> None:
+    made = generate(ROBOTS["3R"], loops=False)
+    assert "for (" not in made.files["vsa_3r.c"]
+    assert made.files["vsa_3r.c"] == project("3R").files["vsa_3r.c"]
+    one_loops = with_springs("sinh")  # the springs of the first joint are alike, those of the second are not
+    name = one_loops.joint_names[1]
+    with pytest.raises(InputError, match=f"two sinh takes loops at {name}: code without loops needs"):
+        generate(one_loops, loops=False)
 
 
 def test_a_project_is_the_same_each_time() -> None:
@@ -219,7 +269,7 @@ def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
     with np.errstate(invalid="ignore"):
         margin = (block.stiffness - block.stiffness_lower) / block.stiffness - 0.1 + 1e-3
     for key, values in found.items():
-        expected = getattr(block, key)
+        expected = expected_of(block, key)
         chosen = clear(margin, expected.shape) & np.isfinite(expected)
         if key == "flags":
             np.testing.assert_array_equal(values[chosen], expected[chosen])

@@ -10,7 +10,9 @@ from samples.robots import random_robot
 from samples.springs import SPRINGS
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.motor import Motor
+from vsacli.actuators.reach import margin
 from vsacli.base.arrays import FloatArray
+from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
@@ -59,6 +61,14 @@ def commands(robot: Robot, samples: int, seed: int) -> dict[str, FloatArray]:
 
 def motion_of(arrays: dict[str, FloatArray]) -> Motion:
     return Motion.of(np.zeros(len(arrays["q"])), arrays)
+
+
+def expected_of(block: Block, name: str) -> FloatArray:
+    """What the tool computes of an array that the generated code gives."""
+    if name == "margin":
+        with np.errstate(invalid="ignore"):
+            return margin(block.stiffness, block.stiffness_lower, block.stiffness_upper)
+    return np.asarray(getattr(block, name))
 
 
 def clear(margin: FloatArray, shape: tuple[int, ...]) -> FloatArray:

@@ -63,6 +63,10 @@ class Dialect(ABC):
     def real(self, number: float) -> str:
         """A constant."""
 
+    def entry(self, number: float) -> str:
+        """A constant in a table."""
+        return digits(number)
+
     @abstractmethod
     def integer(self, number: int) -> str:
         """A constant field of bits or index."""
@@ -235,7 +239,7 @@ def table_names(programs: Iterable[Program]) -> dict[Table, str]:
 def table_declarations(names: Mapping[Table, str], dialect: Dialect) -> Iterator[str]:
     """Constants at the head of a file."""
     for table, name in names.items():
-        values = ", ".join(map(digits, table.values))
+        values = ", ".join(map(dialect.entry, table.values))
         yield f"static const {dialect.table_type} {name}[{len(table.values)}] = {{{values}}};"
 
 

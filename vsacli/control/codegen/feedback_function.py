@@ -9,9 +9,10 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.flags import Flag, finite, marked, not_finite_flags
+from vsacli.base.wrench import Wrench
 from vsacli.compute.rows import RowLayout
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
-from vsacli.control.codegen.robot_functions import command_structure, variable_array
+from vsacli.control.codegen.robot_functions import command_structure, variable_array, wrench_argument
 from vsacli.control.gains import STIFFNESS_ORDER, Gains, Integral
 from vsacli.control.linearization import control_law, position_order
 from vsacli.dynamics.forward import Plant
@@ -32,13 +33,13 @@ class _Gains(NamedTuple):
     stiffness_integral: Any
 
 
-def feedback_linearization_function(robot: Robot) -> Function:
-    """(32)-(35), (60), (69)-(74).
+def feedback_linearization_function(robot: Robot, frame: str | None = None) -> Function:
+    """(32)-(35), (60), (69)-(74), under a wrench along the axes of a frame of `WRENCH_FRAMES` if given one.
 
     Raises:
         InputError: the robot mixes rigid joints with others, for which there is no such law.
     """
-    law = _Law(robot)
+    law = _Law(robot, frame)
     return Function(
         name="feedback_linearization",
         meaning=(
@@ -62,9 +63,10 @@ class _Law:
         arguments: what it reads.
     """
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, frame: str | None) -> None:
         self._robot = robot
-        self._plant = Plant(robot)
+        self._frame = frame
+        self._plant = Plant(robot, frame)
         joints, order = (len(robot.joints),), position_order(robot, self._plant)
         self.arguments = (
             ("state", Structure("state", "Measured state.", _state_arrays(robot))),
@@ -92,17 +94,19 @@ class _Law:
                     (Array("q", joints, "of the position"), Array("stiffness", joints, "of the stiffness")),
                 ),
             ),
+            *wrench_argument(frame),
         )
 
     def __call__(self, rows: Rows) -> list[Any]:
         """Rows of the torques of the motors, then of the flags."""
-        state, reference, gains, integral = self._unpacked(rows)
+        state, reference, gains, integral, *wrench = self._unpacked(rows)
         drivetrain = self._plant.drivetrain
         law: Any = control_law(self._plant, cast("Gains", _Gains(**gains)))
         theta, dtheta = (
             drivetrain.of_motors(state[name])[..., drivetrain.sprung] for name in ("theta", "dtheta")
         )
-        command = Motion.of(np.zeros(1), reference)
+        acting = Wrench(**wrench[0], frame=self._frame) if self._frame else None
+        command = Motion.of(np.zeros(1), reference, acting)
         torque = law.torque(state["q"], state["dq"], theta, dtheta, command, Integral(**integral))
         tau_motor = self._of_joints(torque)
         values = {**state, "phi": state["theta"] - state["q"][:, None], "tau_motor": tau_motor}

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from vsacli.base.flags import Flag
 from vsacli.base.texts import for_comment
+from vsacli.base.version import __version__
 from vsacli.control.codegen.interface import Array, Function, Structure
 from vsacli.control.codegen.scalar import DIGEST, WIDTH, signature
 from vsacli.robot.model import Robot
@@ -18,9 +19,9 @@ def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precis
     parts = [
         head,
         f"#ifndef {guard}\n#define {guard}",
-        f"/* The same in all files that were written together. */\n#define {prefix.upper()}_DIGEST {DIGEST}",
+        "\n".join(_provenance(prefix, robot)),
         '#ifdef __cplusplus\nextern "C" {\n#endif',
-        _joints(prefix, robot),
+        _joints(prefix, robot, any(name == "wrench" for each in functions for name, _ in each.arguments)),
         "\n".join(_flags(prefix)),
         *(_structure(prefix, structure, precision) for structure in structures(functions)),
         *(_declaration(prefix, function) for function in functions),
@@ -40,14 +41,26 @@ def structures(functions: Sequence[Function]) -> list[Structure]:
     return list(dict.fromkeys(used))
 
 
-def _joints(prefix: str, robot: Robot) -> str:
+def _provenance(prefix: str, robot: Robot) -> Iterator[str]:
+    """What wrote the files, and of which robot."""
+    yield "/* The same in all files that were written together. */"
+    yield f"#define {prefix.upper()}_DIGEST {DIGEST}"
+    yield "/* The vsacli that wrote them. */"
+    yield f'#define {prefix.upper()}_VERSION "{__version__}"'
+    if robot.sources:
+        yield "/* Of the file that the robot was read from; results of the same file have it, too. */"
+        yield f'#define {prefix.upper()}_ROBOT_SHA256 "{robot.sources[0].sha256}"'
+
+
+def _joints(prefix: str, robot: Robot, acted_on: bool) -> str:
+    acting = "the argument wrench acts" if acted_on else "nothing acts"
     names = ", ".join(
         f"{index} {joint.name} ({joint.type}, {joint.actuator_type})"
         for index, joint in enumerate(robot.joints)
     )
     text = (
         f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN. SI units; "
-        "signs, frames and gravity as in the robot file; nothing acts on the end effector. Functions keep "
+        f"signs, frames and gravity as in the robot file; {acting} on the end effector. Functions keep "
         "nothing between calls."
     )
     return f"{comment(text)}\nenum {{ {prefix.upper()}_JOINTS = {len(robot.joints)} }};"

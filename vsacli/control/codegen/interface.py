@@ -63,6 +63,15 @@ class Structure:
         return RowLayout({array.name: array.shape for array in self.arrays})
 
 
+Arguments = tuple[tuple[str, Structure], ...]
+"""Structures that a function reads, by the names of the arguments."""
+
+
+def unpacked(arguments: Arguments, rows: Rows) -> dict[str, Rows]:
+    """Rows of all entries of the arguments by the names of their arrays, which differ."""
+    return RowLayout({array.name: array.shape for _, each in arguments for array in each.arrays}).unpack(rows)
+
+
 @dataclass(frozen=True)
 class Function:
     """A function to generate.
@@ -78,7 +87,7 @@ class Function:
 
     name: str
     meaning: str
-    arguments: tuple[tuple[str, Structure], ...]
+    arguments: Arguments
     result: Structure
     compute: Callable[[Rows], Rows]
 

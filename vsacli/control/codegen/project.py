@@ -1,7 +1,8 @@
-"""Everything that `vsacli codegen` writes: header, source, self-test, Makefile, README."""
+"""Everything that `vsacli codegen` writes: header, source, self-test, what compiles them, README."""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import re
 from collections.abc import Sequence
@@ -10,101 +11,18 @@ from typing import NamedTuple
 
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
-from vsacli.base.texts import for_markdown, sentence
+from vsacli.base.texts import sentence
 from vsacli.base.version import __version__
+from vsacli.control.codegen.build_files import build_files
+from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.header import comment, header_text
 from vsacli.control.codegen.interface import Function
+from vsacli.control.codegen.readme import readme_text
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.scalar import DIGEST, signature, source_text
-from vsacli.control.codegen.self_test import TOLERANCE, Reference, self_test_text
+from vsacli.control.codegen.scalar import DIGEST, source_text
+from vsacli.control.codegen.self_test import Reference, self_test_text
 from vsacli.robot.model import Robot
-
-_MAKEFILE = """CFLAGS ?= -std=c99 -O2 -Wall -Wextra -pedantic
-
-{prefix}.o: {prefix}.c {prefix}.h
-	$(CC) $(CFLAGS) -c {prefix}.c
-
-{prefix}_test: {prefix}_test.c {prefix}.o
-	$(CC) $(CFLAGS) {prefix}_test.c {prefix}.o -o {prefix}_test -lm
-
-.PHONY: test clean
-test: {prefix}_test
-	./{prefix}_test
-
-clean:
-	rm -f {prefix}.o {prefix}_test
-"""
-
-_README = """# {name} in C
-{warnings}
-`{prefix}.c` and `{prefix}.h` are C99 and need nothing but math.h. The functions allocate nothing, keep
-nothing between calls, never print, and always end after a bounded number of operations; several threads may
-call them at once.
-
-    make test
-
-compiles `{prefix}_test.c` and compares the functions with what vsacli computes by NumPy, within
-{tolerance:g} of the largest value of each array.
-
-## Functions
-
-{functions}
-
-The structures are in `{prefix}.h`, each member with its unit. Joints are numbered from the base: {joints}.
-{omitted}
-## In a control loop
-
-Call the function once per period, e.g. each millisecond, and look at what it returns before the torques go
-out: where a bit says that a joint's step is infeasible or singular, its torques are no numbers. NaN, infinity
-and what is too large in a command, from a sensor that failed for instance, counts as infeasible.
-
-```c
-#include "{prefix}.h"
-
-void every_millisecond({parameters})
-{{
-    {prefix}_drive drive;
-    const unsigned flags = {prefix}_inverse_dynamics({call}, &drive);
-    if (flags & ({upper}_INFEASIBLE | {upper}_SINGULAR)) {{
-        brake(); /* there is no such torque: drive.flags[joint] says at which joint, and why */
-        return;
-    }}
-    for (int joint = 0; joint < {upper}_JOINTS; joint++)
-        send(joint, drive.tau_motor[joint][0], drive.tau_motor[joint][1]);
-}}
-```
-
-The command must be smooth: four derivatives of the position and two of the stiffness, all of the same
-motion. Torques are those of the joint side of the gears. With -ffast-math or -ffinite-math-only, under which
-NaN would go unnoticed, the code does not compile.
-"""
-
-
-def makefile_text(prefix: str) -> str:
-    """Compiles the code, and runs its self-test."""
-    return _MAKEFILE.format(prefix=prefix)
-
-
-def readme_text(
-    prefix: str, robot: Robot, functions: Sequence[Function], precision: str, omitted: Sequence[str]
-) -> str:
-    """How to use the code."""
-    loop = next(function for function in functions if function.name == "inverse_dynamics")
-    return _README.format(
-        name=for_markdown(robot.name),
-        warnings="".join(f"\nWarning: {for_markdown(sentence(warning))}\n" for warning in robot.warnings),
-        prefix=prefix,
-        upper=prefix.upper(),
-        call=", ".join(name for name, _ in loop.arguments),
-        parameters=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
-        tolerance=TOLERANCE[precision],
-        functions="\n".join(
-            f"- `{signature(prefix, function)}`: {function.meaning}" for function in functions
-        ),
-        joints=for_markdown(", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names))),
-        omitted="".join(f"There is {for_markdown(sentence(reason))}\n" for reason in omitted),
-    )
 
 
 class Project(NamedTuple):
@@ -121,26 +39,34 @@ class Project(NamedTuple):
     warnings: tuple[str, ...]
 
 
-def generate(robot: Robot, precision: str = "double") -> Project:
+def generate(
+    robot: Robot, precision: str = "double", wrench: str | None = None, *, loops: bool = True
+) -> Project:
     """C99 for a robot: link torques, inverse dynamics, feedback linearization.
 
     Args:
         robot: the robot.
         precision: type of the numbers, one of `vsacli.control.codegen.scalar.PRECISIONS`.
+        wrench: frame, one of `vsacli.base.wrench.WRENCH_FRAMES`, along whose axes the functions take a wrench
+            at the end effector; None if they take none.
+        loops: whether there may be some; without them a call takes the same operations whatever goes in.
 
     Raises:
-        InputError: something of the robot has no evaluation in a bounded number of operations, or too many.
+        InputError: something of the robot has no evaluation in a bounded number of operations, or too many;
+            or none without loops.
     """
     prefix = prefix_of(robot)
     title = f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
     head = comment(" ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)]))
     try:
-        functions, omitted = _functions(robot)
+        functions, omitted = _functions(robot, wrench)
+        if not loops:
+            _check_loops(robot, functions)
         files = {
             f"{prefix}.h": header_text(prefix, robot, functions, precision, head),
             f"{prefix}.c": source_text(prefix, functions, precision, head),
             f"{prefix}_test.c": self_test_text(prefix, functions, Reference(robot), precision, head),
-            "Makefile": makefile_text(prefix),
+            **build_files(prefix),
             "README.md": readme_text(prefix, robot, functions, precision, omitted),
         }
     except NotImplementedError as error:
@@ -154,7 +80,7 @@ def _sealed(files: dict[str, str]) -> dict[str, str]:
     return {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
 
 
-def _functions(robot: Robot) -> tuple[list[Function], list[str]]:
+def _functions(robot: Robot, wrench: str | None) -> tuple[list[Function], list[str]]:
     """Those that there are, and why there are not more.
 
     The last one grows with the third power of the number of joints, so it is looked at if the others were not
@@ -164,14 +90,32 @@ def _functions(robot: Robot) -> tuple[list[Function], list[str]]:
         NotImplementedError: not even the first two.
     """
     makers = (link_torques_function, inverse_dynamics_function)
-    functions, omitted = [_recorded(make(robot)) for make in makers], []
+    functions, omitted = [_recorded(make(robot, wrench)) for make in makers], []
     try:
-        functions.append(_recorded(feedback_linearization_function(robot)))
+        functions.append(_recorded(feedback_linearization_function(robot, wrench)))
     except InputError as error:
         omitted.append(f"no feedback_linearization: {error}")
     except NotImplementedError as error:
         omitted.append(f"no {error}")
     return functions, omitted
+
+
+def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
+    """Refuse joints that take loops.
+
+    Raises:
+        InputError: naming them.
+    """
+    if not any(worst_cost(function.program).loops for function in functions):
+        return
+    alone = (dataclasses.replace(robot, joints=(joint,)) for joint in robot.joints)
+    names = [
+        each.joints[0].name for each in alone if worst_cost(inverse_dynamics_function(each).program).loops
+    ]
+    raise InputError.one(
+        f"{robot.name} takes loops at {', '.join(names)}: code without loops needs actuators with a closed "
+        "solution, such as pairs of alike cubic, sinh, exponential or quadratic springs"
+    )
 
 
 def _recorded(function: Function) -> Function:

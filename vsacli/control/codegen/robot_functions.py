@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.reach import margin
 from vsacli.base.flags import finite, not_finite_flags
 from vsacli.base.signals import POSITION
 from vsacli.base.variables import VARIABLES
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.compute.vector import Scalar
-from vsacli.control.codegen.interface import Array, Function, Rows, Structure
+from vsacli.control.codegen.interface import Array, Function, Rows, Structure, unpacked
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques
 from vsacli.dynamics.inverse import INTERNAL, InverseDynamics
 from vsacli.robot.model import Robot
@@ -23,16 +25,14 @@ DRIVE_NAMES = (
     "tau_motor",
     "stiffness_lower",
     "stiffness_upper",
-    "flags",
 )
-"""Variables that the generated inverse dynamics gives."""
+"""Variables that the generated inverse dynamics gives, beside margins and flags."""
 
 
 def motion_structure(robot: Robot) -> Structure:
     """Position and its derivatives; damping between the links, if there is any."""
-    return Structure(
-        "motion", "Motion of the joints.", _arrays(robot, tuple(LinkTorques(robot).arguments.shapes))
-    )
+    names = tuple(LinkTorques(robot).arguments.shapes)
+    return Structure("motion", "Motion of the joints.", _arrays(robot, names))
 
 
 def command_structure(robot: Robot) -> Structure:
@@ -42,9 +42,26 @@ def command_structure(robot: Robot) -> Structure:
     return Structure("command", meaning, _arrays(robot, tuple(names)))
 
 
-def link_torques_function(robot: Robot) -> Function:
-    """(36)-(60)."""
-    kernel = LinkTorques(robot)
+def wrench_structure(frame: str) -> Structure:
+    """What the environment exerts on the end effector."""
+    meaning = (
+        "Wrench that the environment exerts on the end effector: force and moment about the origin of the "
+        f"tool frame, along the axes of the {frame.replace('_', ' ')} frame."
+    )
+    components = f"{', '.join(WRENCH_AXES)}; N and N m"
+    units = (components, f"{components} per s", f"{components} per s^2")
+    arrays = (Array(name, (len(WRENCH_AXES),), unit) for name, unit in zip(WRENCH_NAMES, units, strict=True))
+    return Structure("wrench", meaning, tuple(arrays))
+
+
+def wrench_argument(frame: str | None) -> tuple[tuple[str, Structure], ...]:
+    """The wrench as an argument, if there is one."""
+    return () if frame is None else (("wrench", wrench_structure(frame)),)
+
+
+def link_torques_function(robot: Robot, frame: str | None = None) -> Function:
+    """(36)-(60), under a wrench along the axes of a frame of `WRENCH_FRAMES` if one is given."""
+    kernel = LinkTorques(robot, frame)
 
     def compute(rows: Rows) -> Rows:
         torques = kernel(rows)
@@ -57,29 +74,41 @@ def link_torques_function(robot: Robot) -> Function:
             "Torques that the links demand of the joints, and their first two derivatives; returns the flags "
             "of all joints, 0 if all numbers are finite."
         ),
-        arguments=(("motion", motion_structure(robot)),),
+        arguments=(("motion", motion_structure(robot)), *wrench_argument(frame)),
         result=Structure("torques", "Torques of the joints.", _arrays(robot, (*TORQUES, "flags"))),
         compute=compute,
     )
 
 
-def inverse_dynamics_function(robot: Robot) -> Function:
-    """(36)-(74); what moves inside damped transmissions goes in and, with its rates, comes out."""
+def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Function:
+    """(36)-(74); what moves inside damped transmissions goes in and, with its rates, comes out.
+
+    Args:
+        robot: the robot.
+        frame: along whose axes a wrench is given, one of `WRENCH_FRAMES`; None if there is none.
+    """
     damped = tuple(index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission"))
-    kernel = InverseDynamics(robot, internal=damped, driven=True)
-    given, inside = command_structure(robot), internal_structure(robot) if damped else None
+    kernel = InverseDynamics(robot, frame, internal=damped, driven=True)
+    inside = internal_structure(robot) if damped else None
+    arguments = (
+        ("command", command_structure(robot)),
+        *([] if inside is None else [("internal", inside)]),
+        *wrench_argument(frame),
+    )
 
     def compute(rows: Rows) -> Rows:
-        values = given.layout.unpack(rows[: given.layout.size])
-        deflections = rows[given.layout.size :]
+        values = unpacked(arguments, rows)
+        deflections = values.get(INTERNAL[0], ())
         values[INTERNAL[0]] = [deflections[SIDES * index + side] for index in damped for side in range(SIDES)]
-        named = {name: values[name] for name in kernel.arguments.shapes}
-        computed = kernel.results.unpack(kernel(kernel.arguments.pack(named)))
+        computed = kernel.results.unpack(kernel(kernel.arguments.pack(values)))
         drive = [row for name in DRIVE_NAMES for row in computed[name]]
+        corridor = (values["stiffness"], computed["stiffness_lower"], computed["stiffness_upper"])
+        drive += [*map(margin, *corridor), *computed["flags"]]
         if inside is None:
             return drive
         return [*drive, *_inside(robot, computed, "phi"), *_inside(robot, computed, "dphi")]
 
+    gap = "relative distance of the stiffness to the nearer end of what is reachable, negative beyond it"
     rates = _internal_array(robot, "dinternal_phi", "their rates")
     further = () if inside is None else (*inside.arrays, rates)
     return Function(
@@ -88,11 +117,16 @@ def inverse_dynamics_function(robot: Robot) -> Function:
             "Motor torques that execute a command; returns the flags of all joints, 0 if all is well."
             + (" Between calls integrate internal_phi by dinternal_phi." if inside else "")
         ),
-        arguments=(("command", given), *([] if inside is None else [("internal", inside)])),
+        arguments=arguments,
         result=Structure(
             "drive",
             "What the motors have to do; NaN where a flag says it cannot be.",
-            (*_arrays(robot, DRIVE_NAMES), *further),
+            (
+                *_arrays(robot, DRIVE_NAMES),
+                Array("margin", (len(robot.joints),), gap),
+                variable_array(robot, "flags"),
+                *further,
+            ),
         ),
         compute=compute,
     )

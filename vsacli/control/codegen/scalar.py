@@ -72,13 +72,17 @@ class Scalar(Dialect):
         self._suffix = "f" if precision == "float" else ""
 
     def real(self, number: float) -> str:
-        """As of `Dialect`."""
+        """As of `Dialect`; NAN and INFINITY of math.h are floats."""
         if not self._suffix:
-            return digits(number)
+            return digits(number).replace("INFINITY", "HUGE_VAL").replace("NAN", "(double)NAN")
         text = digits(_in_range(number))
         if "N" in text:
             return text
         return text.replace(")", "f)") if text.endswith(")") else f"{text}f"
+
+    def entry(self, number: float) -> str:
+        """As of `Dialect`."""
+        return self.real(number)
 
     def integer(self, number: int) -> str:
         """As of `Dialect`."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, over_time
 from vsacli.base.signals import DAMPING, POSITION
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.interface import Array, Function
 from vsacli.control.codegen.scalar import included
@@ -45,6 +46,7 @@ class Reference:
             "state": self._state(command),
             "internal": self._internal(command),
             "integral": {name: self._drawn(scale) for name, scale in (("q", 1e-3), ("stiffness", 1.0))},
+            "wrench": {name: self._rng.uniform(-1, 1, (CASES, len(WRENCH_AXES))) for name in WRENCH_NAMES},
         }
 
     def inputs(self, function: Function) -> list[Arrays]:

@@ -1,0 +1,55 @@
+"""What a generated function costs at the very most: operations and constants, counted in its program."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from vsacli.compute.tracing import Program, Symbol
+from vsacli.compute.tracing.c_code import table_names
+from vsacli.compute.tracing.program import FUNCTIONS, Branch, Loop, Table
+
+BYTES = {"double": 8, "float": 4}
+"""Of a number."""
+
+
+class Cost(NamedTuple):
+    """Operations of one call if every branch is entered and every loop runs to its bound.
+
+    Attributes:
+        operations: additions, products, comparisons and the like; a function of math.h is one.
+        functions: how many of them are functions of math.h, `fabs` and `sqrt` among them.
+        loops: how many loops there are, those inside others counted once.
+    """
+
+    operations: int
+    functions: int
+    loops: int
+
+    def __add__(self, other: Cost) -> Cost:  # type: ignore[override]
+        return Cost(*(mine + others for mine, others in zip(self, other, strict=True)))
+
+
+def worst_cost(program: Program) -> Cost:
+    """What a call costs at most."""
+    return sum(map(_of_operation, program.operations), Cost(0, 0, 0))
+
+
+def table_bytes(programs: Iterable[Program], precision: str) -> int:
+    """Memory of the constant tables that the functions share."""
+    return BYTES[precision] * sum(len(table.values) for table in table_names(programs))
+
+
+def _of_operation(symbol: Symbol) -> Cost:
+    nested = symbol.operands[0] if symbol.operands else None
+    if isinstance(nested, Loop):
+        body = worst_cost(nested.body)
+        return Cost(nested.limit * body.operations, nested.limit * body.functions, 1 + body.loops)
+    if isinstance(nested, Branch):
+        return worst_cost(nested.body)
+    if symbol.operation == "item":
+        return Cost(0, 0, 0)
+    if symbol.operation == "searchsorted" and isinstance(nested, Table):
+        return Cost(math.ceil(math.log2(len(nested.values) + 1)), 0, 1)
+    return Cost(1, int(symbol.operation in FUNCTIONS), 0)
