@@ -114,6 +114,7 @@ vsacli.charts = (() => {
       this.values = [];
       this.keys = [...new Set(chart.series.map((series) => series.label))].map((label) => this.key(label));
       const legend = element("div", { class: this.keys.length > MANY ? "legend long" : "legend" }, ...this.keys);
+      if (chart.limits.length) legend.append(element("span", { class: "key" }, element("i", { class: "swatch limit" }), "limit"));
       if (chart.band) {
         this.area = element("span", { class: "area" });
         legend.append(element("span", { class: "key" }, this.area, chart.band));
@@ -192,8 +193,8 @@ vsacli.charts = (() => {
     }
 
     addLimits() {
-      this.limits = this.chart.limits.map((limit) => ({ joint: limit.joint, line: this.figure.hspan({
-        y: [limit.value], line_color: curveColour(limit.joint), line_dash: "dotted", line_width: 1.2 }) }));
+      this.limits = this.chart.limits.map(({ joint, value }) => ({ joint, line: this.figure.hspan([value], {
+        line_color: curveColour(joint), line_dash: "dotted", line_width: 1.2 }) }));
     }
 
     follow() {
@@ -237,6 +238,11 @@ vsacli.charts = (() => {
       this.reset();
     }
 
+    fail(error) {
+      console.error(error);
+      this.plot.textContent = `cannot be drawn: ${error.message}`;
+    }
+
     drop() {
       this.plot.replaceChildren();
       this.figure = undefined;
@@ -252,7 +258,7 @@ vsacli.charts = (() => {
   /* Plots are built one after the other, so that the first is there soon. */
   let first = true, queue = Promise.resolve();
   function build(card) {
-    queue = queue.then(() => card.build()).then(() => {
+    queue = queue.then(() => card.build()).catch((error) => card.fail(error)).then(() => {
       if (first && card.figure) performance.mark("first plot");
       first = first && !card.figure;
       return new Promise((done) => { setTimeout(done, 0); });
