@@ -10,6 +10,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # where `site_parts` and `python_names` lie
 
+from nbclient import NotebookClient
+
 from vsacli.base.version import __version__
 
 project = "vsacli"
@@ -37,7 +39,8 @@ myst_fence_as_directive = ["math"]
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120  # seconds a cell; the longest takes about 10 on one core
-nb_merge_streams = True
+nb_execution_in_temp = True
+NotebookClient.coalesce_streams = True  # commands print in pieces; `nb_merge_streams` breaks lines between them
 
 autodoc_typehints = "none"  # the docstrings say shapes and units
 autodoc_member_order = "bysource"

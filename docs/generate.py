@@ -7,21 +7,25 @@ python docs/generate.py --check    changes nothing; exit code 1 if a part is sta
 from __future__ import annotations
 
 import math
+import os
 import re
 import shutil
+import subprocess
 import sys
+import sysconfig
 import tempfile
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import chdir
 from pathlib import Path
 from typing import Any
 
 import click
 from click.testing import CliRunner
 from field_tables import record_sections, table, variant_sections
-from noise_study import draw, table_rows
+from five_figures import draw as draw_five_figures
+from noise_study import draw as draw_noise
+from noise_study import table_rows
 from python_names import public_names
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
@@ -49,18 +53,13 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 ROBOT = ROOT / "robots" / "vsa_3r.yaml"
 IMAGES = ROOT / "docs" / "images"
 
-SHOWN = (
-    "rest_to_rest-motion.png",
-    "rest_to_rest-motor-torque.png",
-    "rest_to_rest-energy.png",
-    "rest_to_rest_soft-rest_to_rest_stiff-compare.png",
-    "rest_to_rest-rest_to_rest_soft-rest_to_rest_stiff-compare.png",
-    "vsa_3r_pick_and_place-motion.png",
-    "yield-1-yield-2-yield-3-yield-5-compare.png",
-    "design-margin.png",
-    "design-pareto.png",
+DRAWING = ("gallery.md", "studies.md")
+"""Pages whose commands draw the figures of the tool, wherever they are shown."""
+
+FILE_OR_COMMANDS = re.compile(
+    r"(?:^Save as `(?P<name>\S+)`:\n\n)?^```(?:yaml|sh)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
 )
-"""Figures on the pages."""
+IMAGE = re.compile(r"\]\(images/(\S+\.png)\)")
 
 HELP_WIDTH = 80
 END = "<!-- end of generated part -->"
@@ -318,39 +317,29 @@ def stale(pages: Iterable[Path] = PAGES) -> list[Path]:
 
 
 def draw_images() -> None:
-    """Draw the pictures of the pages with the tool itself."""
-    with tempfile.TemporaryDirectory() as folder, chdir(folder):
-        for name in ("rest_to_rest", "rest_to_rest_soft", "rest_to_rest_stiff", "vsa_3r_pick_and_place"):
-            _run("invdyn", ROBOT, ROOT / "trajectories" / f"{name}.yaml", "-o", f"{name}.h5")
-        _run("plot", "rest_to_rest.h5")
-        _run("plot", "vsa_3r_pick_and_place.h5")
-        _run("plot", "rest_to_rest_soft.h5", "rest_to_rest_stiff.h5")
-        _run("plot", "rest_to_rest.h5", "rest_to_rest_soft.h5", "rest_to_rest_stiff.h5")
-        _draw_studies()
-        for name in SHOWN:
-            shutil.copy(name, IMAGES)
-    draw(IMAGES / "recorded-noise.png")
+    """Draw the pictures of the pages: those of the tool by the commands that stand beside them."""
+    shown = {name for page in PAGES for name in IMAGE.findall(page.read_text(encoding="utf-8"))}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ("robots", "trajectories"):
+            shutil.copytree(ROOT / name, Path(folder) / name)
+        for page in DRAWING:
+            _do_what_it_says(ROOT / "docs" / page, Path(folder))
+        for drawn in Path(folder).rglob("*.png"):
+            if drawn.name in shown:
+                shutil.copy(drawn, IMAGES)
+    draw_noise(IMAGES / "recorded-noise.png")
+    draw_five_figures(IMAGES)
 
 
-def _draw_studies() -> None:
-    """Draw the pictures of the studies that their page has."""
-    for name in ("robots", "trajectories"):
-        shutil.copytree(ROOT / name, name)
-    page = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
-    studies = dict(re.findall(r"Save as `(\w+)\.yaml`:\n\n```yaml\n(.*?)```", page, re.DOTALL))
-    tolerances = (1, 2, 3, 5)
-    texts = {f"yield-{size}": studies["yield"].replace("2 %", f"{size} %") for size in tolerances}
-    for name, text in {**texts, "design": studies["design"]}.items():
-        Path(f"{name}.yaml").write_text(text, encoding="utf-8")
-        _run("study", f"{name}.yaml")
-    _run("plot", *(f"{name}.h5" for name in texts))
-    _run("plot", "design.h5")
-
-
-def _run(*arguments: Any) -> None:
-    outcome = CliRunner().invoke(vsacli, [str(argument) for argument in arguments], standalone_mode=False)
-    if outcome.exception:
-        raise outcome.exception
+def _do_what_it_says(page: Path, folder: Path) -> None:
+    """Save the files of a page and run its commands; that they work is for the tests."""
+    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
+    for block in FILE_OR_COMMANDS.finditer(page.read_text(encoding="utf-8")):
+        if block["name"]:
+            (folder / block["name"]).write_text(block["text"], encoding="utf-8")
+        else:
+            environment = {**os.environ, "PATH": path}
+            subprocess.run(["sh", "-c", block["text"]], cwd=folder, env=environment, check=False)
 
 
 def main() -> int:

@@ -35,7 +35,8 @@ README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 
 LONG = (
-    *("cli.md", "energy.md", "identification.md", "optimisation.md", "python.md", "quickstart.md"),
+    *("cli.md", "energy.md", "gallery.md", "identification.md", "mending-a-motion.md", "optimisation.md"),
+    *("python.md", "quickstart.md", "reading-a-verdict.md"),
     *("recorded.md", "robots.md", "sensitivity.md", "simulation.md", "studies.md"),
     *("suggestions.md", "urdf.md"),
 )
