@@ -40,7 +40,8 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120  # seconds a cell; the longest takes about 10 on one core
 nb_execution_in_temp = True
-NotebookClient.coalesce_streams = True  # commands print in pieces; `nb_merge_streams` breaks lines between them
+# Commands print in pieces, which `nb_merge_streams` would put on lines of their own.
+NotebookClient.coalesce_streams = True
 
 autodoc_typehints = "none"  # the docstrings say shapes and units
 autodoc_member_order = "bysource"
