@@ -14,7 +14,7 @@ from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, op
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.drive import drive
 from vsacli.studies.optimisation.criteria import CRITERIA
-from vsacli.studies.optimisation.optimise import cost
+from vsacli.studies.optimisation.joint_costs import cost
 from vsacli.studies.optimisation.spline_space import SplineSpace
 from vsacli.studies.optimisation.stiffness import StiffnessSearch
 from vsacli.studies.remedies.acceptance import Acceptance

@@ -30,7 +30,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 
 @click.command(
     "optimize",
-    short_help="Find the cheapest stiffness, or the fastest timing.",
+    short_help="Find the cheapest stiffness or pace, or the fastest pace.",
     epilog=example(
         "vsacli optimize robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --minimize torque -o best.yaml"
     ),
@@ -79,10 +79,10 @@ def optimize(
     overwrite: bool,
     talk: Talk,
 ) -> Exit:
-    """Find the stiffness with which ROBOT executes TRAJECTORY at the least cost, or the fastest timing.
+    """Find the stiffness or the pace with which ROBOT executes TRAJECTORY at the least cost, or fastest.
 
-    Every step keeps the margin and all limits. What is found is a local optimum; the report says from how
-    many starts the search came to it.
+    Unless time is minimised, the motion takes as long as commanded. Every step keeps the margin and all
+    limits. What is found is a local optimum; the report says from how many starts the search came to it.
     """
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
@@ -94,12 +94,13 @@ def optimize(
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
             check_fixed_target(output, outputs)
-        steps = searches(inputs.robot, minimize)
+        vary = vary or ("timing" if minimize == "time" else "stiffness")
+        steps = searches(inputs.robot, minimize, vary)
         with talk.progress(steps, shown_from=0, label="searching") as progress:
             found = optimized(
                 *inputs,
                 minimize,
-                vary or ("timing" if minimize == "time" else "stiffness"),
+                vary,
                 margin=NEAR_SINGULAR_MARGIN if margin is None else margin,
                 seed=seed,
                 progress=progress.update,

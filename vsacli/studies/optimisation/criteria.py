@@ -33,6 +33,9 @@ class Scale(NamedTuple):
     smoothing: float = 0.0
 
 
+UNSCALED = Scale()
+
+
 @dataclass(frozen=True)
 class Criterion:
     """A cost of a joint: an integral over time, or a level that bounds something.
@@ -41,6 +44,8 @@ class Criterion:
         name: as on the command line.
         words: for reports.
         quantity: what it is measured in.
+        relative: whether joints, taken together, count relative to what they cost as commanded.
+        over_time: places of the integrands that are integrated over time; others count at instants.
         levels: rows besides those of the motion: 1 if the cost is a level that bounds something, else 0.
         smoothings: how much it is smoothed, one search after the other.
         repeating: whether the motion ends as it begins, on its way.
@@ -49,6 +54,8 @@ class Criterion:
     name: ClassVar[str]
     words: ClassVar[str]
     quantity: ClassVar[Quantity] = ENERGY
+    relative: ClassVar[bool] = False
+    over_time: ClassVar[tuple[int, ...]] = (0,)
     levels: ClassVar[int] = 0
     smoothings: ClassVar[tuple[float, ...]] = (0.0,)
     repeating: bool = False
@@ -92,6 +99,29 @@ class Criterion:
         """By what it is scaled: what it is, of some motion."""
         return self.of(joint, driven, time)
 
+    def together(self, costs: Sequence[float]) -> float:
+        """The cost of all joints; of shares of what they cost as commanded if these are relative."""
+        return math.fsum(costs)
+
+
+class NoCost(Criterion):
+    """Where something else is minimised."""
+
+    over_time = ()
+
+    def integrands(
+        self, _joint: Joint, _driven: Drive, _level: Values | None, _scale: Scale
+    ) -> Sequence[Any]:
+        """None."""
+        return ()
+
+    def weights(self, time: FloatArray) -> FloatArray:
+        """None."""
+        return np.zeros((0, len(time)))
+
+
+NO_COST = NoCost()
+
 
 class Torque(Criterion):
     """Root mean square over time and the motors of the joint."""
@@ -99,6 +129,7 @@ class Torque(Criterion):
     name = "torque"
     words = "rms motor torque"
     quantity = TORQUE
+    relative = True
 
     def integrands(self, joint: Joint, driven: Drive, _level: Values | None, scale: Scale) -> Sequence[Any]:
         """The mean square."""
@@ -112,8 +143,12 @@ class Torque(Criterion):
 
     def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
         """N m (N)."""
-        (square,) = self.integrands(joint, driven, None, Scale())
+        (square,) = self.integrands(joint, driven, None, UNSCALED)
         return math.sqrt(float(self.weights(time)[0] @ square))
+
+    def together(self, costs: Sequence[float]) -> float:
+        """Root mean square."""
+        return math.hypot(*costs) / math.sqrt(len(costs))
 
 
 class Copper(Criterion):
@@ -136,7 +171,7 @@ class Copper(Criterion):
 
     def of(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
         """J."""
-        (power,) = self.integrands(joint, driven, None, Scale())
+        (power,) = self.integrands(joint, driven, None, UNSCALED)
         return float(trapezoidal(time) @ power)
 
 
@@ -180,6 +215,8 @@ class Peak(Criterion):
     name = "peak"
     words = "peak motor torque"
     quantity = TORQUE
+    relative = True
+    over_time = ()
     levels = 1
 
     def integrands(self, _joint: Joint, _driven: Drive, level: Values | None, _scale: Scale) -> Sequence[Any]:
@@ -202,6 +239,10 @@ class Peak(Criterion):
     def of(self, joint: Joint, driven: Drive, _time: FloatArray) -> float:
         """N m (N)."""
         return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven.tau_motor)))
+
+    def together(self, costs: Sequence[float]) -> float:
+        """The largest."""
+        return max(costs)
 
 
 CRITERIA = {criterion.name: criterion for criterion in (Torque, Energy, Copper, Peak)}

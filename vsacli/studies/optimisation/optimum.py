@@ -45,6 +45,21 @@ class JointOptimum(Published):
 
 
 @dataclass(frozen=True)
+class TotalCost(Published):
+    """What all joints cost together, which is what is minimised where they share a timing.
+
+    Attributes:
+        before: as commanded; NaN where that is out of reach.
+        after: with the best timing.
+        unit: of the costs; empty where each joint counts relative to what it costs as commanded.
+    """
+
+    before: float
+    after: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class TimingOptimum(Published):
     """The fastest pace that was found along the path of a motion.
 
@@ -87,8 +102,9 @@ class Optimum(Published):
         words: the same in words.
         varied: what was varied.
         margin: that every step has.
-        joints: by name; empty if nothing was found, and where the timing varies.
-        timing: None if it does not vary, or nothing was found.
+        joints: by name; empty if nothing was found, and where time is minimised.
+        together: what they cost together, if they share a timing; else None.
+        timing: None if time is not minimised, or nothing was found.
         reasons: why nothing was found, in clauses.
         trajectory: the best; None if nothing was found.
     """
@@ -100,6 +116,7 @@ class Optimum(Published):
     varied: str
     margin: float
     joints: dict[str, JointOptimum] = field(default_factory=dict)
+    together: TotalCost | None = None
     timing: TimingOptimum | None = None
     reasons: tuple[str, ...] = ()
     trajectory: Trajectory | None = field(default=None, repr=False)
@@ -111,6 +128,7 @@ class Optimum(Published):
         "trajectory": "asked",
         "possible": "possible",
         **named("minimised", "varied", "margin", "joints"),
+        "together?": "together",
         "timing?": "timing",
         "reasons?": "reasons",
     }
@@ -139,19 +157,27 @@ class Optimum(Published):
             yield from self.timing.lines()
             return
         yield from aligned(list(self._rows()))
+        whole = "time" if self.together is None else "path"
         yield from (
-            f"{name}: {_along(each.bounding, 'time')}; {_search(each)}" for name, each in self.joints.items()
+            f"{name}: {_along(each.bounding, whole)}; {_search(each)}" for name, each in self.joints.items()
         )
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
+        if self.together is not None:
+            yield ("joint", "as commanded", "local optimum", "change")
+            costs: dict[str, JointOptimum | TotalCost] = {**self.joints, "together": self.together}
+            for name, of in costs.items():
+                before, after = (_cost(cost, of.unit) for cost in (of.before, of.after))
+                yield (name, before, after, _change(of.before, of.after))
+            return
         yield ("joint", "as commanded", "best constant", "local optimum", "change")
         for name, each in self.joints.items():
-            costs = [_cost(cost, each.unit) for cost in (each.before, each.constant, each.after)]
-            yield (name, *costs, _change(each.before, each.after))
+            found = [_cost(cost, each.unit) for cost in (each.before, each.constant, each.after)]
+            yield (name, *found, _change(each.before, each.after))
 
 
 def _cost(cost: float, unit: str) -> str:
-    return "-" if math.isnan(cost) else f"{cost:.4g} {unit}"
+    return "-" if math.isnan(cost) else f"{cost:.4g} {unit}".rstrip()
 
 
 def _change(before: float, after: float) -> str:

@@ -13,6 +13,7 @@ from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import Drive, driven_by
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
+from vsacli.studies.optimisation.criteria import NO_COST, UNSCALED, Criterion, Scale
 from vsacli.studies.optimisation.fixed_motion import finite_ends
 from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, PacedMotion
 from vsacli.studies.sensitivities.implicit import ImplicitSolution
@@ -49,34 +50,64 @@ class Pace:
 
 
 class PacedJoint:
-    """The `Functions` of the pace with its derivatives, and of a stiffness with its own if that varies.
+    """The `Functions` of the pace, of a stiffness if it varies, both with their derivatives, and of a level.
 
     Args:
         motion: of all joints.
         index: of the joint.
         near_singular: the margin.
+        criterion: what it costs.
+        share: that its cost has in that of all joints.
+
+    Attributes:
+        criterion: what it costs.
+        scale: of that cost.
     """
 
-    def __init__(self, motion: PacedMotion, index: int, near_singular: float) -> None:
+    def __init__(
+        self,
+        motion: PacedMotion,
+        index: int,
+        near_singular: float,
+        criterion: Criterion = NO_COST,
+        scale: Scale = UNSCALED,
+        share: float = 1.0,
+    ) -> None:
         self._motion, self._index, self._near_singular = motion, index, near_singular
+        self.criterion, self.scale, self._share = criterion, scale, share
         self._joint = motion.robot.joints[index]
         self._carrying = _made_to_carry(self._joint)
         self._checks = [check for check in limit_checks(self._joint) if check.variable not in NOT_OF_THE_PACE]
         self._chosen = STIFFNESS.key in self._joint.actuator.commanded
 
     @property
+    def name(self) -> str:
+        """Of the joint."""
+        return self._joint.name
+
+    @property
     def bound_names(self) -> list[str]:
-        """What each bound is of, in words."""
+        """What the first bounds are of, in words; those behind are of levels."""
         ends = ["lower end of the corridor", "upper end of the corridor"] if self._chosen else []
         return ends + [
             check.flag.quantity_of(check.motor) for check in self._checks for _ in finite_ends(check)
         ]
 
+    @property
+    def bound_count(self) -> int:
+        """Number of bounds."""
+        return len(self.bound_names) + self.criterion.bound_count(self._joint)
+
+    def weights(self, s: FloatArray) -> FloatArray:
+        """What each integrand of the cost counts at each instant, (integrands, instants)."""
+        return self._share * self.criterion.weights(s)
+
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
-        """No cost, and the bounds; see `Functions`."""
-        pace, stiffness = list(rows[:PACE_ORDERS]), list(rows[PACE_ORDERS:])
+        """Integrands of the cost over the path, and the bounds; see `Functions`."""
+        behind = len(rows) - self.criterion.levels
+        pace, stiffness, level = list(rows[:PACE_ORDERS]), list(rows[PACE_ORDERS:behind]), rows[behind:]
         with np.errstate(all="ignore"):  # a step of the search may leave the corridor
             command = self._motion.commands(pace, instants)[self._index]
             if len(stiffness):
@@ -86,7 +117,11 @@ class PacedJoint:
             joint = self._carrying if isinstance(pace[0], Dual) else self._joint
             driven = driven_by(joint, command, self._near_singular)
             bounds = [*self._corridor(driven), *self._limits({**command.arrays(), **driven.arrays()})]
-        return [], bounds
+            costed = (self._joint, driven, level[0] if len(level) else None, self.scale)
+            integrands = list(self.criterion.integrands(*costed))
+            for index in self.criterion.over_time:  # dt = pace ds
+                integrands[index] = integrands[index] * pace[0]
+        return integrands, [*bounds, *self.criterion.bounds(*costed)]
 
     def _corridor(self, driven: Drive) -> Iterator[Any]:
         if self._chosen:

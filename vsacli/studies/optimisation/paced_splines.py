@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.studies.optimisation.separable import Functions, Group
 from vsacli.studies.optimisation.spline_space import SplineSpace
 
 if TYPE_CHECKING:
@@ -17,27 +18,62 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Pacing:
-    """A pace along the path of a trajectory.
+    """A pace along the path of a trajectory, and the stiffness of joints where it varies.
 
     Attributes:
-        pace: over the path, a spline whose argument is s.
-        stiffness: of each joint where it varies, by index, likewise.
-        duration: with that pace, s.
-        uniform: of the fastest motion that is passed uniformly slower or faster, s; NaN if there is none.
+        splines: of the pace, None, and of joints by index: a space, and the amounts of its shapes.
         found: whether the conditions for a local optimum hold.
         starts: from how many the search began.
         agreeing: from how many it came to this optimum.
         bounding: share of the path along each bound, by joint and name of the bound.
     """
 
-    pace: BSpline[np.float64] = field(repr=False)
-    stiffness: dict[int, BSpline[np.float64]] = field(repr=False)
-    duration: float
-    uniform: float
+    splines: dict[int | None, tuple[SplineSpace, FloatArray]] = field(repr=False)
     found: bool
     starts: int
     agreeing: int
     bounding: dict[str, dict[str, float]]
+
+    def pace(self, count: int = 1) -> BSpline[np.float64]:
+        """Over the path, a spline whose argument is s; passed so many times if it repeats itself."""
+        return self._spline(None, count)
+
+    def stiffness(self, count: int = 1) -> dict[int, BSpline[np.float64]]:
+        """Likewise of the joints where it varies, by index."""
+        return {key: self._spline(key, count) for key in self.splines if key is not None}
+
+    def _spline(self, key: int | None, count: int) -> BSpline[np.float64]:
+        space, amounts = self.splines[key]
+        return space.spline(amounts) if count == 1 else space.repeated(amounts, count)
+
+
+class Rows(NamedTuple):
+    """How rows of functions follow from unknowns: the fields of a `Group` that say so."""
+
+    basis: FloatArray
+    places: IndexArray
+    scales: FloatArray
+    offsets: FloatArray
+
+    def first(self) -> Rows:
+        """The first of them alone."""
+        return Rows(self.basis[:1], self.places, self.scales[:1], self.offsets[:1])
+
+    def beside(self, other: Rows) -> Rows:
+        """These and others, with unknowns of their own."""
+        rows, own = len(self.basis), self.basis.shape[2]
+        joined = np.zeros((rows + len(other.basis), self.basis.shape[1], own + other.basis.shape[2]))
+        joined[:rows, :, :own], joined[rows:, :, own:] = self.basis, other.basis
+        pairs = zip(self[1:], other[1:], strict=True)
+        return Rows(joined, *(np.append(mine, others) for mine, others in pairs))
+
+
+def of_rows(
+    functions: Functions, instants: IndexArray, rows: Rows, weights: FloatArray, bounds: int
+) -> Group:
+    """Functions of rows at instants, with so many bounds at each of them."""
+    there = np.ones((bounds, len(instants)), dtype=np.bool_)
+    return Group(functions, instants, rows.basis, rows.places, weights, there, rows.scales, rows.offsets)
 
 
 class PacedSpaces(NamedTuple):
@@ -51,6 +87,16 @@ class PacedSpaces(NamedTuple):
         """With so many pieces each."""
         at_rest = SplineSpace.at_rest(span, pieces)
         return cls(SplineSpace.free(span, pieces), dict.fromkeys(varied, at_rest))
+
+    @classmethod
+    def repeating(cls, span: tuple[float, float], pieces: int, varied: Sequence[int]) -> PacedSpaces:
+        """The same for what goes on at the end as it begins."""
+        periodic = SplineSpace.periodic(span, pieces)
+        return cls(periodic, dict.fromkeys(varied, periodic))
+
+    def lasting_as_commanded(self) -> PacedSpaces:
+        """Those with which the path takes as long as it is."""
+        return self._replace(pace=self.pace.of_mean(1.0))
 
     def parts(self) -> dict[int | None, tuple[SplineSpace, IndexArray]]:
         """Space and places of unknowns, of the pace, None, and of joints."""
@@ -66,11 +112,13 @@ class PacedSpaces(NamedTuple):
         wanted.update(stiffness.items())
         return np.concatenate([space.fitted(s, wanted[key]) for key, (space, _) in self.parts().items()])
 
+    def rows(self, key: int | None, s: FloatArray, orders: int, size: float = 1.0) -> Rows:
+        """The pace, None, or the stiffness of a joint, of about a size, with its derivatives at instants."""
+        space, own = self.parts()[key]
+        scales = size * space.piece ** -np.arange(orders, dtype=np.float64)
+        return Rows(space.basis(s, orders), own, scales, space.offsets(orders))
 
-def joined_rows(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Two bases of rows with unknowns of their own as one, (rows, instants, unknowns)."""
-    rows, instants = len(first) + len(second), first.shape[1]
-    joined = np.zeros((rows, instants, first.shape[2] + second.shape[2]))
-    joined[: len(first), :, : first.shape[2]] = first
-    joined[len(first) :, :, first.shape[2] :] = second
-    return joined
+    def level(self, s: FloatArray) -> Rows:
+        """A further unknown, behind all others, that is the same everywhere."""
+        last = sum(space.size for space, _ in self.parts().values())
+        return Rows(np.ones((1, len(s), 1)), np.array([last]), np.ones(1), np.zeros(1))

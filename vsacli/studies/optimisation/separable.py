@@ -65,6 +65,7 @@ class Group:
         weights: of each integrand at each instant, (integrands, instants).
         there: which bounds there are, (bounds, instants); others do not count.
         scales: sizes of the rows, (rows,).
+        offsets: what the rows are without any unknown, (rows,); zero unless given.
     """
 
     functions: Functions
@@ -74,11 +75,12 @@ class Group:
     weights: FloatArray
     there: BoolArray
     scales: FloatArray
+    offsets: FloatArray | None = None
 
     def rows(self, unknowns: FloatArray) -> FloatArray:
         """The rows of all unknowns of a problem, (rows, instants)."""
         rows: FloatArray = self.basis @ unknowns[self.unknowns]
-        return rows
+        return rows if self.offsets is None else rows + self.offsets[:, None]
 
     def values(self, rows: FloatArray) -> tuple[float, FloatArray]:
         """The cost and the bounds there are."""
@@ -271,6 +273,7 @@ def _relieved(group: Group, start: FloatArray) -> Group:
         weights=np.full((1, instants), 1 / instants),
         there=group.there,
         scales=np.append(group.scales, 1.0),
+        offsets=None if group.offsets is None else np.append(group.offsets, 0.0),
     )
 
 

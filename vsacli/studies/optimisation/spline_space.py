@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,10 +25,12 @@ class SplineSpace:
     Attributes:
         knots: (coefficients + 6,), s.
         shapes: B-spline coefficients of each shape, (coefficients, shapes).
+        offset: what each spline has besides its shapes.
     """
 
     knots: FloatArray
     shapes: FloatArray
+    offset: float = 0.0
 
     @classmethod
     def at_rest(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
@@ -62,6 +64,22 @@ class SplineSpace:
         whole = cls.at_rest(span, 1)
         return cls(whole.knots, np.ones((len(whole.shapes), 1)))
 
+    def of_mean(self, mean: float) -> SplineSpace:
+        """Those of them with a mean over the span, the constant among them."""
+        from scipy.interpolate import BSpline
+        from scipy.linalg import null_space
+
+        ends = self.knots[DEGREE], self.knots[-DEGREE - 1]
+        integrals = BSpline(self.knots, self.shapes, DEGREE).integrate(*ends)
+        return replace(self, shapes=self.shapes @ null_space(integrals[None]), offset=mean)
+
+    def repeated(self, amounts: FloatArray, count: int) -> BSpline[np.float64]:
+        """A spline that goes on at the end as it begins, passed so many times."""
+        first, last = self.knots[DEGREE], self.knots[-DEGREE - 1]
+        pieces = len(self.shapes) - DEGREE
+        whole = self.periodic((first, first + count * (last - first)), count * pieces)
+        return whole.spline(np.tile(self.spline(amounts).c[:pieces], count))
+
     @property
     def size(self) -> int:
         """Number of shapes."""
@@ -74,16 +92,22 @@ class SplineSpace:
 
     def basis(self, time: FloatArray, orders: int) -> FloatArray:
         """The shapes and their derivatives, (orders, instants, shapes)."""
-        every = self.spline(np.eye(self.size))
+        from scipy.interpolate import BSpline
+
+        every = BSpline(self.knots, self.shapes, DEGREE)
         return np.stack([every(time, nu=order) for order in range(orders)])
+
+    def offsets(self, orders: int) -> FloatArray:
+        """What the splines and their derivatives are without any shape, (orders,)."""
+        return np.append(self.offset, np.zeros(orders - 1))
 
     def spline(self, amounts: FloatArray) -> BSpline[np.float64]:
         """The spline of so much of each shape, (shapes, ...)."""
         from scipy.interpolate import BSpline
 
-        return BSpline(self.knots, self.shapes @ amounts, DEGREE)
+        return BSpline(self.knots, self.offset + self.shapes @ amounts, DEGREE)
 
     def fitted(self, time: FloatArray, values: FloatArray) -> FloatArray:
         """The amounts of the shapes with which they come nearest to values, (shapes,)."""
-        amounts: FloatArray = np.linalg.lstsq(self.basis(time, 1)[0], values, rcond=None)[0]
+        amounts: FloatArray = np.linalg.lstsq(self.basis(time, 1)[0], values - self.offset, rcond=None)[0]
         return amounts

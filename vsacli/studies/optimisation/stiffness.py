@@ -13,8 +13,9 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.studies.optimisation.criteria import Criterion, Scale
 from vsacli.studies.optimisation.fixed_motion import CLEARANCE, FixedMotion
-from vsacli.studies.optimisation.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimise
+from vsacli.studies.optimisation.interior_point import FIRST_GAP, WARM_GAP, Minimum
 from vsacli.studies.optimisation.separable import Group, SeparableProblem, interior
+from vsacli.studies.optimisation.smoothing import smoothed_minimum
 from vsacli.studies.optimisation.spline_space import SplineSpace
 from vsacli.studies.optimisation.starts import nearest_profile, targets
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
@@ -196,7 +197,7 @@ class StiffnessSearch:
             begun = interior(problem, unknowns, inside)
             if begun is None:
                 return None
-            found, gap = self._minimum(problem, begun, gap), WARM_GAP
+            found, gap = smoothed_minimum(problem, begun, gap, [self._whole]), WARM_GAP
             self._progress()
             missed = self._missed(every, found.unknowns)
             if not missed.size:
@@ -204,14 +205,6 @@ class StiffnessSearch:
             instants = np.union1d(instants, missed)
             unknowns = self._with_level(every, found.unknowns[: space.size])
         return None
-
-    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
-        """Of a cost that is smoothed less and less, far from it at least."""
-        for smoothing in self._criterion.smoothings if gap > WARM_GAP else self._criterion.smoothings[-1:]:
-            self._whole.scale = self._whole.scale._replace(smoothing=smoothing)
-            found = minimise(problem, start, gap)
-            start, gap = found.unknowns, WARM_GAP
-        return found
 
     def _group(self, space: SplineSpace, instants: IndexArray) -> Group:
         """Cost and bounds at some instants."""
