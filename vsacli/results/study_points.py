@@ -1,0 +1,111 @@
+"""What there is to see of the table of a study: margin and cost of each run, over what varies."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.base.errors import InputError
+from vsacli.results.store.stored_study import StoredStudy
+
+NAMED_RUNS = 3
+"""The worst runs, which are named beside their points."""
+
+NORMAL_95 = 1.96
+"""Standard deviations of a normal distribution within which 95 % lie."""
+
+COSTS = {"energy_spent": ("energy that motors spend", "J"), "peak_tau_motor": ("largest motor torque", "N m")}
+"""What a study may have kept that says what a motion costs: the first of these counts."""
+
+
+class StudyPoints:
+    """What figures show of a table.
+
+    Attributes:
+        name: of the study.
+        runs: numbers of the runs, (rows,).
+        margin: smallest margin of all joints, (rows,), relative; NaN if a run failed.
+        feasible: whether every step was feasible and regular, (rows,).
+
+    Raises:
+        InputError: the table has no margins, or no rows.
+    """
+
+    def __init__(self, table: StoredStudy) -> None:
+        if "margin" not in table.columns or not table.rows:
+            what = "no runs" if not table.rows else "no margin; put it into `keep:` of the study"
+            raise InputError.one(f"nothing can be drawn: it has {what}", table.path)
+        self.name, self.runs, self._table = table.study_name, table.read("run"), table
+        self.margin = _least(table.read("margin"))
+        self.feasible: BoolArray = np.isin(table.texts("verdict"), ("ok", "over_limit", "doubtful"))
+
+    @cached_property
+    def varying(self) -> dict[str, FloatArray]:
+        """The numbers that are not the same in all rows, by path."""
+        table = self._table
+        found = {path: table.read(path) for path in table.parameters if not table.parameter_is_text(path)}
+        return {path: values for path, values in found.items() if np.ptp(values) > 0}
+
+    @cached_property
+    def cost(self) -> tuple[str, FloatArray] | None:
+        """The words for the cost, and that of each run, NaN if steps are without; None if none was kept."""
+        for name, (words, unit) in COSTS.items():
+            if name in self._table.columns:
+                values = self._table.read(name)
+                total = values.sum(axis=1) if values.ndim == 2 else _most(values)
+                return f"{words} [{unit}]", total
+        return None
+
+    @property
+    def share(self) -> tuple[float, float, float]:
+        """Of the feasible runs, with the interval that 95 of 100 such studies would have (Wilson 1927)."""
+        count, feasible = len(self.feasible), int(self.feasible.sum())
+        share, square = feasible / count, NORMAL_95**2
+        centre = (share + square / (2 * count)) / (1 + square / count)
+        spread = math.sqrt(share * (1 - share) / count + square / (4 * count**2))
+        half = NORMAL_95 * spread / (1 + square / count)
+        return share, max(0.0, centre - half), min(1.0, centre + half)
+
+    @property
+    def exceedance(self) -> tuple[FloatArray, FloatArray]:
+        """Each margin, ascending, and the share of all runs that have at least this one."""
+        margins = np.sort(self.margin[np.isfinite(self.margin)])
+        return margins, np.arange(len(margins), 0, -1) / len(self.margin)
+
+    def unit(self, path: str) -> str:
+        """The unit of a number, empty if it has none."""
+        unit = self._table.unit(path)
+        return "" if unit == "1" else unit
+
+    @property
+    def worst(self) -> IndexArray:
+        """The rows with the smallest margins."""
+        order = np.argsort(np.where(np.isnan(self.margin), np.inf, self.margin), kind="stable")
+        return order[: min(NAMED_RUNS, int(np.isfinite(self.margin).sum()))]
+
+    @property
+    def front(self) -> IndexArray:
+        """Feasible rows with less cost than any with a larger margin, the least margin first."""
+        assert self.cost is not None, "a front is asked for where there is a cost"
+        rows = np.flatnonzero(self.feasible & np.isfinite(self.cost[1]) & np.isfinite(self.margin))
+        rows = rows[np.lexsort((self.cost[1][rows], -self.margin[rows]))]
+        cost = self.cost[1][rows]
+        before = np.concatenate([[np.inf], np.minimum.accumulate(cost)[:-1]])
+        return rows[cost < before][::-1]
+
+
+def _least(margins: FloatArray) -> FloatArray:
+    """Over joints; those without a corridor have none."""
+    least: FloatArray = np.where(np.isnan(margins), np.inf, margins).min(axis=1)
+    return np.where(np.isinf(least), np.nan, least)
+
+
+def _most(peaks: FloatArray) -> FloatArray:
+    """Over joints and motors; NaN of a second motor that is not there does not count."""
+    peaks = peaks.reshape(len(peaks), -1)
+    there = ~np.isnan(peaks).all(axis=0)
+    most: FloatArray = peaks[:, there].max(axis=1, initial=-math.inf)
+    return most
