@@ -15,8 +15,11 @@ from samples.command_line import REPOSITORY
 from samples.studies import GRID, HEAD, column, content, study
 
 from vsacli.cli.main import run
-from vsacli.studies.sweeps import Journal, compute, load_study
 from vsacli.studies.sweeps import journal as journal_module
+from vsacli.studies.sweeps.journal import Journal
+from vsacli.studies.sweeps.rows import Computer
+from vsacli.studies.sweeps.run_study import gather
+from vsacli.studies.sweeps.study import load_study
 
 PATHS = ("joints.*.actuator.spring.k", "stiffness.end.elbow")
 
@@ -155,7 +158,7 @@ def test_an_interrupted_study_goes_on(vsacli: Any, grid: str, whole: Path) -> No
     """From the rows in the journal, of which the last was cut off."""
     journal = Path("study.h5.journal")
     with Journal(journal) as rows:
-        compute(load_study(grid), range(5), rows, 1, lambda _: None)
+        gather(map(Computer(load_study(grid)).row, range(5)), rows, lambda _: None)
     journal.write_bytes(journal.read_bytes()[:-9])
     done = vsacli("study", grid)
     assert done.err.splitlines() == [f"4 of 6 runs are in {journal} already", "wrote study.h5"]

@@ -63,7 +63,7 @@ def test_auto_compiles_for_many_samples_and_remembers_it_for_fewer():
 
 @needs_compiler
 def test_threads_are_as_many_as_processors_unless_given(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(choice, "_processors", lambda: 7)
+    monkeypatch.setattr(choice, "processors", lambda: 7)
     assert choose("c", KERNEL, 1).reason.endswith("in 7 threads")
 
 

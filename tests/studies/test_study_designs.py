@@ -11,7 +11,7 @@ from samples.command_line import edited
 from samples.studies import HEAD, study
 
 from vsacli.base.errors import InputError
-from vsacli.studies.sweeps import load_study
+from vsacli.studies.sweeps.study import load_study
 
 ELBOW = "joints.elbow.link.mass"
 SPRING = "joints.*.actuator.spring.k"

@@ -12,9 +12,11 @@ from pathlib import Path
 import pytest
 from samples.studies import DRAWN, GRID, content, study
 
-from vsacli.studies.sweeps import Journal, compute, load_study
-from vsacli.studies.sweeps.rows import Computer
-from vsacli.studies.sweeps.workers import Workers
+from vsacli.studies.sweeps.executors.processes import Processes
+from vsacli.studies.sweeps.journal import Journal
+from vsacli.studies.sweeps.rows import Computer, lost
+from vsacli.studies.sweeps.run_study import gather
+from vsacli.studies.sweeps.study import load_study
 
 COMMAND = (sys.executable, "-m", "vsacli", "study", "study.yaml")
 
@@ -35,13 +37,14 @@ def test_the_table_is_the_same_for_any_number_of_processes(tmp_path: Path) -> No
 def test_a_worker_that_is_killed_costs_its_run(tmp_path: Path) -> None:
     """Its row says so, the others are those of one process, and the lost run is not in the journal."""
     found = load_study(study(tmp_path, GRID))
-    with Workers(found, 1) as workers:
+    with Processes(found, 1) as workers:
         rows = workers.rows(range(6))
         computed = [next(rows)]
         os.kill(workers._workers[0].process.pid or 0, signal.SIGKILL)
         computed += rows
-    lost = [row for row in computed if row.error]
-    assert [row.error for row in lost] == ["the process that computed it was ended by SIGKILL"]
+    assert [row.error for row in computed if row.lost] == [
+        "the process that computed it was ended by SIGKILL"
+    ]
     alone = Computer(found)
     assert sorted(row.run for row in computed) == list(range(6))
     assert all(
@@ -49,17 +52,13 @@ def test_a_worker_that_is_killed_costs_its_run(tmp_path: Path) -> None:
     )
 
 
-def test_rows_that_were_lost_are_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from vsacli.studies.sweeps import rows, sweep
-
+def test_rows_that_were_lost_are_tried_again(tmp_path: Path) -> None:
     found = load_study(study(tmp_path, GRID))
-    row = Computer(found).row(0)
-    lost = rows.failed(1, "key", "the process that computed it was ended by SIGKILL")
-    monkeypatch.setattr(sweep.Workers, "rows", lambda *_: iter([row, lost]))
+    rows = [Computer(found).row(0), lost(found, 1, "was ended by SIGKILL")]
     with Journal(tmp_path / "rows.journal") as journal:
-        assert compute(found, range(2), journal, 2, lambda _: None) == {1: lost}
-        assert row.key in journal
-        assert lost.key not in journal
+        assert gather(rows, journal, lambda _: None) == {1: rows[1]}
+        assert rows[0].key in journal
+        assert rows[1].key not in journal
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from vsacli.base.texts import one_line
 
@@ -40,7 +40,7 @@ class InputError(VsacliError, ValueError):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     @classmethod
-    def one(cls, message: str, file: str | Path = "", line: int = 0) -> InputError:
+    def one(cls, message: str, file: str | Path = "", line: int = 0) -> Self:
         """An error with a single problem."""
         return cls([Problem(str(file), line, message)])
 

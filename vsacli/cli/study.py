@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
 import sys
-from pathlib import Path
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -17,18 +16,12 @@ from vsacli.cli.command_parts import example, hdf5_name, json_option, overwrite_
 from vsacli.cli.console import Exit, Talk, say, talk_options
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Staged
-    from vsacli.studies.sweeps import Journal, Shard, Study
-
-RUNS_A_PROCESS = 25
-"""A process takes as long to begin as some 25 short runs."""
+    from vsacli.results.store.stored_study import StoredStudy
 
 _SHARD = re.compile(r"(\d{1,6})/(\d{1,6})")
 
 
-def _shard(_context: click.Context, _parameter: click.Parameter, text: str | None) -> tuple[int, int] | None:
-    if text is None:
-        return None
+def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> tuple[int, int]:
     found = _SHARD.fullmatch(text)
     if found is None or not 1 <= int(found[1]) <= int(found[2]):
         raise click.BadParameter(f"expected K/N with K from 1 to N, e.g. 2/8, found {text!r}")
@@ -54,7 +47,13 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str | Non
     "--shard",
     metavar="K/N",
     callback=_shard,
+    default="1/1",
     help="Compute part K of N, e.g. as one job of N; by default into STUDY-K-of-N.h5.",
+)
+@click.option(
+    "--dask",
+    metavar="ADDRESS",
+    help="Compute on the workers of a Dask cluster: address of its scheduler, or local for processes here.",
 )
 @click.option("--merge", is_flag=True, help="Put tables of all parts together, given in place of STUDY.")
 @click.option(
@@ -71,7 +70,8 @@ def study(
     files: tuple[str, ...],
     output: str | None,
     processes: int | None,
-    shard: tuple[int, int] | None,
+    shard: tuple[int, int],
+    dask: str | None,
     merge: bool,
     engine: str,
     as_json: bool,
@@ -88,80 +88,49 @@ def study(
         return _merge(files, output, overwrite, as_json, talk)
     if len(files) > 1:
         raise click.UsageError(f"expected one study, found {len(files)} files; --merge puts tables together")
-    from vsacli.base.outputs import Outputs
-    from vsacli.studies.sweeps import Journal, Shard, load_study
-
     if files[0] == STANDARD:
         raise click.UsageError("a study is read by several processes and again when it goes on; give a file")
-    found = load_study(files[0], engine)
-    part = Shard() if shard is None else Shard(*shard)
-    stem = Path(files[0]).stem + (f"-{part.number}-of-{part.parts}" if shard else "")
-    path = Path(f"{stem}.h5" if output is None else output)
-    with Outputs(overwrite=overwrite, inputs=[source.path for source in found.sources]) as outputs:
-        outputs.check(path)
-        with Journal(path.with_name(f"{path.name}.journal")) as journal:
-            file = outputs.file(path)
-            lost = _computed(found, part, journal, file, processes, talk)
-            summary, failed = _shown(file, as_json)
-    say(summary)
-    talk.wrote(outputs)
-    if lost:
-        talk.note(
-            f"runs lost with their processes: {lost}; all others are in {journal.path}, and the same command "
-            "with --overwrite tries these again"
-        )
-    else:
-        journal.remove()
-    return Exit.VERDICT if failed else Exit.OK
+    if dask not in (None, "local") and processes is not None:
+        raise click.UsageError("--processes are of this machine; a cluster has workers of its own")
+    from vsacli.studies.sweeps import run_study
 
-
-def _computed(
-    found: Study, part: Shard, journal: Journal, file: Staged, processes: int | None, talk: Talk
-) -> int:
-    """Compute what is missing and write the table; how many runs were lost with their processes."""
-    from vsacli.studies.sweeps import compute, missing, write
-
-    runs = part.runs(found)
-    todo = missing(found, runs, journal)
-    if len(todo) < len(runs):
-        talk.note(f"{len(runs) - len(todo):,} of {len(runs):,} runs are in {journal.path} already")
-    count = min(_processors(), 1 + len(todo) // RUNS_A_PROCESS) if processes is None else processes
-    try:
-        with talk.progress(len(todo), shown_from=0, label="runs") as progress:
-            lost = compute(found, todo, journal, count, progress.update)
-        write(found, runs, lost, journal, file, command_line=shlex.join(["vsacli", *sys.argv[1:]]))
-    except BaseException:
-        kept = f"{len(journal):,} finished runs are kept in {journal.path}"
-        talk.note(f"{kept}; the same command goes on from there")
-        raise
-    return len(lost)
+    with run_study(
+        files[0],
+        output,
+        shard=shard,
+        processes=processes,
+        dask=dask,
+        engine=engine,
+        overwrite=overwrite,
+        command_line=_command_line(),
+        progress=partial(talk.progress, shown_from=0, label="runs"),
+        tell=talk.note,
+    ) as table:
+        return _shown(table, as_json, talk)
 
 
 def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json: bool, talk: Talk) -> int:
     from vsacli.base.outputs import Outputs
+    from vsacli.results.store.stored_study import StoredStudy
     from vsacli.studies.sweeps import merge
 
     if output is None:
         raise click.UsageError("--merge needs a name for the whole table: give -o FILE")
     with Outputs(overwrite=overwrite, inputs=files) as outputs:
-        file = outputs.file(output)
-        merge(files, file, command_line=shlex.join(["vsacli", *sys.argv[1:]]))
-        summary, failed = _shown(file, as_json)
-    say(summary)
-    talk.wrote(outputs)
-    return Exit.VERDICT if failed else Exit.OK
+        merge(files, outputs.file(output), command_line=_command_line())
+    with StoredStudy(output) as table:
+        return _shown(table, as_json, talk)
 
 
-def _shown(file: Staged, as_json: bool) -> tuple[str, bool]:
-    """What a table that was written says, and whether a run in it failed."""
-    from vsacli.results.store.stored_study import StoredStudy
+def _shown(table: StoredStudy, as_json: bool, talk: Talk) -> int:
+    """Say what a table that was written has found; 3 if a run in it failed."""
     from vsacli.studies.sweeps import StudySummary
 
-    with StoredStudy(file.temporary) as table:
-        summary = StudySummary.of(table)
-    return json.dumps(summary.as_json(), indent=1) if as_json else str(summary), bool(summary.failures)
+    summary = StudySummary.of(table)
+    say(json.dumps(summary.as_json(), indent=1) if as_json else str(summary))
+    talk.note(f"wrote {table.path}")
+    return Exit.VERDICT if summary.failures else Exit.OK
 
 
-def _processors() -> int:
-    """Those that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def _command_line() -> str:
+    return shlex.join(["vsacli", *sys.argv[1:]])

@@ -1,6 +1,17 @@
 """Who carries out a computation on rows of samples: NumPy, or code from the system's C compiler."""
 
-from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, choose
+from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, choose, processors
 from vsacli.compute.engine.engines import Engine, Kernel, Tell, samples_per_pass, unheard
 
-__all__ = ["NAMES", "NUMPY", "Choice", "Engine", "Kernel", "Tell", "choose", "samples_per_pass", "unheard"]
+__all__ = [
+    "NAMES",
+    "NUMPY",
+    "Choice",
+    "Engine",
+    "Kernel",
+    "Tell",
+    "choose",
+    "processors",
+    "samples_per_pass",
+    "unheard",
+]

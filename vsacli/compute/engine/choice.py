@@ -71,7 +71,7 @@ def choose(
     from vsacli.compute.engine.compiled_engine import CompiledEngine
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
-    threads = threads or _processors()
+    threads = threads or processors()
     try:
         compiler = system_compiler()
         engine = CompiledEngine(compiler, threads, tell)
@@ -107,6 +107,6 @@ def _counted(threads: int) -> str:
     return f"{threads} threads" if threads > 1 else "1 thread"
 
 
-def _processors() -> int:
+def processors() -> int:
     """Those that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -27,7 +27,7 @@ SYNC_SECONDS = 1.0
 
 
 class Journal:
-    """Context manager that holds a journal open, and locked where the system can.
+    """Context manager that holds a journal open, and locked where the system can; an empty one is removed.
 
     Args:
         path: of the journal; it is made if it does not exist.
@@ -58,6 +58,8 @@ class Journal:
     ) -> None:
         with contextlib.suppress(OSError):
             os.fsync(self._file)
+        if not self._places:
+            self.remove()
         os.close(self._file)
 
     def __contains__(self, key: str) -> bool:

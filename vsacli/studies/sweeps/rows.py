@@ -15,7 +15,7 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.kept import columns
 from vsacli.studies.sweeps.over_time import Recorder
-from vsacli.studies.sweeps.study import Point, Study
+from vsacli.studies.sweeps.study import ChangedError, Point, Study
 from vsacli.trajectory.changes import Divided
 from vsacli.trajectory.devices import with_devices
 from vsacli.trajectory.file import declared_trajectory
@@ -23,6 +23,9 @@ from vsacli.trajectory.trajectory import Trajectory
 
 FAILED = "failed"
 """In place of the verdict of a run that could not be computed."""
+
+LOST = "the process that computed it"
+"""How the error of a run begins that was lost with its process."""
 
 
 class Row(NamedTuple):
@@ -44,10 +47,20 @@ class Row(NamedTuple):
     values: FloatArray
     curves: FloatArray
 
+    @property
+    def lost(self) -> bool:
+        """Whether it went with the process that computed it, so that another trial may do."""
+        return self.error.startswith(LOST)
+
 
 def failed(run: int, key: str, reason: str) -> Row:
     """The row of a run that could not be computed."""
     return Row(run, key, FAILED, one_line(reason), np.empty(0), np.empty(0))
+
+
+def lost(study: Study, run: int, how: str) -> Row:
+    """The row of a run whose process has ended."""
+    return failed(run, study.key(study.point(run)), f"{LOST} {how}")
 
 
 class Computer:
@@ -62,13 +75,20 @@ class Computer:
         self._read: tuple[tuple[int, str], CommandedJoints, Trajectory] | None = None
 
     def row(self, run: int) -> Row:
-        """The row of a run; no error of the run is raised."""
+        """The row of a run; no error of the run is raised.
+
+        Raises:
+            ChangedError: a file is not what it was.
+        """
         point = self._study.point(run)
         key = self._study.key(point)
         try:
             return self._computed(run, key, point)
+        except ChangedError:
+            raise
         except InputError as error:
-            return failed(run, key, str(error))
+            self._study.check_files()
+            return failed(run, key, str(self._study.as_named(error)))
         except Exception as error:  # one run must not cost the others
             return failed(run, key, f"a bug, please report it: {type(error).__name__}: {error}")
 
@@ -80,6 +100,7 @@ class Computer:
                 "joints have other names than in the robot file, so that rows would not compare"
             )
         trajectory = with_devices(self._trajectory(robot, point.trajectory, changes), robot)
+        self._study.check_read([*robot.sources, *trajectory.sources])
         computed = Run(robot, trajectory, engine=self._study.engine, threads=1)
         recorder = Recorder(self._study.over_time, self._study.file.every)
         for block in computed:

@@ -6,7 +6,7 @@ import glob
 import hashlib
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +30,10 @@ from vsacli.studies.sweeps.over_time import OverTime, over_time
 from vsacli.studies.sweeps.study_file import FORMAT, StudyFile
 from vsacli.trajectory.changes import Divided, divided
 from vsacli.trajectory.file import load_trajectory
+
+
+class ChangedError(InputError):
+    """A file is not what it was when the study was read."""
 
 
 class Point(NamedTuple):
@@ -108,26 +112,78 @@ class Study:
         robot = [source.sha256 for source in self.robot.sources]
         kept = [each.name for each in self.kept]
         curves = [self.file.every, *(each.name for each in self.over_time)]
-        computed_by = [__version__, np.__version__, self.engine, self.compiler]
-        return _digest([computed_by, robot, kept, curves, [*self._named_files()]])
+        return _digest([[*self.computed_by.values()], robot, kept, curves, [*self._named_files.values()]])
+
+    @property
+    def computed_by(self) -> dict[str, str]:
+        """What computes, with versions, by words for it: on another one rows may differ in the last digit."""
+        return {
+            "vsacli": __version__,
+            "NumPy": np.__version__,
+            "the engine": self.engine,
+            "the C compiler": self.compiler,
+        }
 
     @property
     def fingerprint(self) -> str:
         """Of the study as a whole: of all its files, and of what computes it; in hex."""
         return _digest([self.digest, [source.sha256 for source in self.sources]])
 
-    def _named_files(self) -> Iterator[str]:
-        """SHA-256 of each file that a listed value names, beside the robot or a trajectory."""
+    @cached_property
+    def _named_files(self) -> dict[str, str]:
+        """SHA-256 of each file that a listed value names, beside the robot or a trajectory, by path."""
         folders = {Path(each).parent for each in (self.robot.sources[0].path, *self.trajectories)}
-        for text in (text for each in self.dimensions for value in each.values for text in _texts_in(value)):
-            for file in sorted(folder / text for folder in folders):
-                if file.is_file():
-                    yield hashlib.sha256(file.read_bytes()).hexdigest()
+        texts = (text for each in self.dimensions for value in each.values for text in _texts_in(value))
+        files = (file for text in texts for file in sorted(folder / text for folder in folders))
+        return {str(file): hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()}
+
+    @cached_property
+    def _known(self) -> dict[str, str]:
+        """SHA-256 of every file that rows depend on, by path."""
+        return self._named_files | {source.path: source.sha256 for source in self.sources}
+
+    def check_read(self, sources: Iterable[Source]) -> None:
+        """Refuse to compute with files that were read again and are not what they were.
+
+        Raises:
+            ChangedError: one has another content than when the study was read.
+        """
+        for source in sources:
+            if self._known.get(source.path, source.sha256) != source.sha256:
+                raise _changed(source.path)
+
+    def check_files(self) -> None:
+        """Refuse to go on if a file is not what it was.
+
+        Raises:
+            ChangedError: one has another content than when the study was read, or has gone.
+        """
+        for path, sha256 in self._known.items():
+            try:
+                content = Path(path).read_bytes()
+            except OSError:
+                content = b""
+            if hashlib.sha256(content).hexdigest() != sha256:
+                raise _changed(path)
+
+    def as_named(self, error: InputError) -> InputError:
+        """An error that names files as the study does, relative to it: the same wherever it is computed."""
+        folder = Path(self.source.path).parent
+        return InputError(
+            problem._replace(file=str(Path(problem.file).relative_to(folder)))
+            if problem.file and Path(problem.file).is_relative_to(folder)
+            else problem
+            for problem in error.problems
+        )
 
     def key(self, point: Point) -> str:
         """Of all that a row depends on; in hex."""
         trajectory = [source.sha256 for source in self.trajectory_sources[point.trajectory]]
         return _digest([self.digest, trajectory, point.values])
+
+
+def _changed(path: str) -> ChangedError:
+    return ChangedError.one("was changed while the study was computed; run it again", path)
 
 
 def _texts_in(value: Any) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Processes that compute the runs of a study, each one at a time; one that is killed costs that run alone."""
+"""Processes of this machine, each with one run at a time; one that is killed costs that run alone."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from vsacli.base.errors import InputError
-from vsacli.studies.sweeps.rows import Computer, Row, failed
-from vsacli.studies.sweeps.study import Study, load_study
+from vsacli.studies.sweeps.executors.job import Job
+from vsacli.studies.sweeps.rows import Computer, Row, lost
+from vsacli.studies.sweeps.study import Study
 
 if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
 
 BEGIN = "begin"
-"""What a worker says when it has read the study, before any row."""
+"""What a process says when it has read the study, before any row."""
 
 
 class Worker:
     """A process, and the run that it computes, if it computes one."""
 
-    def __init__(self, study: Study) -> None:
+    def __init__(self, job: Job) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
-        arguments = (theirs, study.source.path, study.engine, study.fingerprint)
-        self.process: SpawnProcess = context.Process(target=_work, args=arguments, daemon=True)
+        self.process: SpawnProcess = context.Process(target=_work, args=(theirs, job), daemon=True)
         self.process.start()
         theirs.close()
         self.run: int | None = None
@@ -46,16 +46,16 @@ class Worker:
         self.process.join()
 
 
-class Workers:
+class Processes:
     """Context manager around processes that compute runs.
 
     Args:
         study: whose runs.
-        processes: how many.
+        count: how many.
     """
 
-    def __init__(self, study: Study, processes: int) -> None:
-        self._study, self._processes = study, processes
+    def __init__(self, study: Study, count: int) -> None:
+        self._study, self._job, self._count = study, Job.of(study), count
         self._workers: list[Worker] = []
 
     def __enter__(self) -> Self:
@@ -68,13 +68,9 @@ class Workers:
             worker.end()
 
     def rows(self, runs: Iterable[int]) -> Iterator[Row]:
-        """The rows of runs, in the order in which they are finished.
-
-        Raises:
-            InputError: a worker cannot read the study as it was.
-        """
+        """As of `Rows`."""
         waiting = iter(runs)
-        self._workers = [Worker(self._study) for _ in range(self._processes)]
+        self._workers = [Worker(self._job) for _ in range(self._count)]
         while self._workers:
             ready = wait([worker.connection for worker in self._workers])
             for worker in [worker for worker in self._workers if worker.connection in ready]:
@@ -99,13 +95,12 @@ class Workers:
             raise InputError.one(
                 f"a process that was to compute {how} before it had begun", self._study.source.path
             )
-        key = self._study.key(self._study.point(worker.run))
-        return failed(worker.run, key, f"{LOST} {how}")
+        return lost(self._study, worker.run, how)
 
     def _replace(self, worker: Worker) -> None:
         """Start another in the place of a worker that has gone; it asks for a run when it begins."""
         worker.end()
-        self._workers[self._workers.index(worker)] = Worker(self._study)
+        self._workers[self._workers.index(worker)] = Worker(self._job)
 
     def _go_on(self, worker: Worker, run: int | None) -> None:
         """Give a worker the next run; if there is none, it ends."""
@@ -116,24 +111,16 @@ class Workers:
             worker.end()
 
 
-LOST = "the process that computed it"
-"""How the error of a run begins that was lost with its process, and is worth another trial."""
-
-
-def _work(connection: Connection, path: str, engine: str, fingerprint: str) -> None:
+def _work(connection: Connection, job: Job) -> None:
     """What a worker does: read the study, then compute what it is told to until nobody tells it."""
     signal.signal(
         signal.SIGINT, signal.SIG_IGN
     )  # it goes to all processes of a terminal, and one ends the others
-    try:
-        study = load_study(path, engine)
-        if study.fingerprint != fingerprint:
-            raise InputError.one("one of its files was changed while it was computed; run it again", path)
-    except InputError as error:
-        connection.send(error.problems)
-        return
-    computer = Computer(study)
     with suppress(EOFError, OSError):  # whoever asked has gone
-        connection.send(BEGIN)
-        while True:
-            connection.send(computer.row(connection.recv()))
+        try:
+            computer = Computer(job.study())
+            connection.send(BEGIN)
+            while True:
+                connection.send(computer.row(connection.recv()))
+        except InputError as error:
+            connection.send(error.problems)

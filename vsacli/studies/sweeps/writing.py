@@ -1,10 +1,10 @@
-"""A study carried out: what is missing is computed and kept in the journal, then all becomes a table."""
+"""The table of a study, from the rows in its journal."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,64 +13,11 @@ from vsacli.results.store.study_table import Head, Parameter, Rows, StudyWriter
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.over_time import filled, steps_of
 from vsacli.studies.sweeps.row_values import arrays_of, width
-from vsacli.studies.sweeps.rows import FAILED, Computer, Row
+from vsacli.studies.sweeps.rows import FAILED, Row
 from vsacli.studies.sweeps.study import Study
-from vsacli.studies.sweeps.workers import LOST, Workers
 
 ROWS_AT_ONCE = 1024
 """That are written together."""
-
-
-class Shard(NamedTuple):
-    """Which part of a study is computed: part `number` of `parts`, the runs taken in turn."""
-
-    number: int = 1
-    parts: int = 1
-
-    def runs(self, study: Study) -> range:
-        """Its runs."""
-        return range(self.number - 1, study.runs, self.parts)
-
-
-def missing(study: Study, runs: Iterable[int], journal: Journal) -> list[int]:
-    """The runs whose rows are not in the journal."""
-    return [run for run in runs if study.key(study.point(run)) not in journal]
-
-
-def compute(
-    study: Study,
-    runs: Sequence[int],
-    journal: Journal,
-    processes: int,
-    done: Callable[[int], object],
-) -> dict[int, Row]:
-    """Compute runs and add their rows to the journal as they come.
-
-    Args:
-        study: the study.
-        runs: those to compute.
-        journal: gets the rows.
-        processes: how many compute; results do not depend on it.
-        done: is told how many further runs are done.
-
-    Returns:
-        The rows of runs that were lost with their process, which the journal does not get: another trial
-        may do.
-
-    Raises:
-        InputError: a process cannot read the study as it was.
-        StorageError: the disk is full or fails; the rows before are in the journal.
-    """
-    lost = {}
-    with Workers(study, min(processes, len(runs))) as workers:
-        rows = workers.rows(runs) if processes > 1 else map(Computer(study).row, runs)
-        for row in rows:
-            if row.error.startswith(LOST):
-                lost[row.run] = row
-            else:
-                journal.add(row)
-            done(1)
-    return lost
 
 
 def write(

@@ -1,0 +1,176 @@
+"""A study carried out: what is missing is computed and kept in the journal, then all becomes a table."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from vsacli.base.errors import InputError, check_path
+from vsacli.base.outputs import Outputs
+from vsacli.base.progress import Progress, unseen
+from vsacli.compute.engine import processors, unheard
+from vsacli.results.store.stored_study import StoredStudy
+from vsacli.studies.sweeps.executors import Rows, executor
+from vsacli.studies.sweeps.journal import Journal
+from vsacli.studies.sweeps.rows import Row
+from vsacli.studies.sweeps.study import Study, load_study
+from vsacli.studies.sweeps.writing import write
+
+RUNS_A_PROCESS = 25
+"""A process takes as long to begin as some 25 short runs."""
+
+
+class Shard(NamedTuple):
+    """Which part of a study is computed: part `number` of `parts`, the runs taken in turn."""
+
+    number: int = 1
+    parts: int = 1
+
+    def runs(self, study: Study) -> range:
+        """Its runs."""
+        return range(self.number - 1, study.runs, self.parts)
+
+    @property
+    def suffix(self) -> str:
+        """What the name of its table has behind that of the study."""
+        return f"-{self.number}-of-{self.parts}" if self.parts > 1 else ""
+
+
+def run_study(
+    path: str | os.PathLike[str],
+    table: str | os.PathLike[str] | None = None,
+    *,
+    shard: tuple[int, int] = (1, 1),
+    processes: int | None = None,
+    dask: str | None = None,
+    engine: str = "numpy",
+    overwrite: bool = False,
+    command_line: str = "",
+    progress: Progress = unseen,
+    tell: Callable[[str], object] = unheard,
+) -> StoredStudy:
+    """Compute the runs of a study file, and write a table with a row for each.
+
+    Finished rows are kept in a journal beside the table until that is written. Whatever ends the study, the
+    same call goes on with what is missing.
+
+    Args:
+        path: the study file.
+        table: the HDF5 file to write; by default as the study file is called, in the working folder.
+        shard: which part of how many is computed, such as (2, 8).
+        processes: how many compute; by default one a processor. Rows do not depend on it. A script that calls
+            this with more than one needs `if __name__ == "__main__":`, as the module `multiprocessing` says.
+        dask: address of the scheduler of a Dask cluster that computes instead, or "local".
+        engine: what computes, "numpy" or compiled "c".
+        overwrite: whether a table that exists may be replaced.
+        command_line: what to remember of how it was called.
+        progress: opens a bar over the runs that are missing.
+        tell: learns what is there already, and what was lost.
+
+    Returns:
+        The table, open; a context manager that closes it.
+
+    Raises:
+        InputError: a file is wrong, or nobody can compute.
+        StorageError: the table exists and must not be replaced, or the disk is full or fails.
+        TypeError: path is none.
+    """
+    check_path(path, "run_study(path)")
+    study, part = load_study(path, engine), _part(shard)
+    target = Path(f"{Path(path).stem}{part.suffix}.h5" if table is None else table)
+    with Outputs(overwrite=overwrite, inputs=[source.path for source in study.sources]) as outputs:
+        outputs.check(target)
+        with Journal(target.with_name(f"{target.name}.journal")) as journal:
+            file, runs = outputs.file(target), part.runs(study)
+            with _telling_what_is_kept(journal, tell):
+                lost = _computed(study, runs, journal, _Means(processes, dask), progress, tell)
+                write(study, runs, lost, journal, file, command_line=command_line)
+    if lost:
+        tell(
+            f"runs lost with their processes: {len(lost)}; all others are in {journal.path}, and the same "
+            "command with --overwrite tries these again"
+        )
+    else:
+        journal.remove()
+    return StoredStudy(target)
+
+
+def _part(shard: tuple[int, int]) -> Shard:
+    number, parts = shard
+    if not 1 <= number <= parts:
+        raise InputError.one(f"shard must be the number of a part and how many there are, not {shard}")
+    return Shard(number, parts)
+
+
+class _Means(NamedTuple):
+    """What may compute: processes of this machine, as many as pay if None; or a cluster."""
+
+    processes: int | None
+    dask: str | None
+
+    def of(self, study: Study, runs: int, tell: Callable[[str], object]) -> AbstractContextManager[Rows]:
+        """What computes so many runs."""
+        paying = runs if self.dask else 1 + runs // RUNS_A_PROCESS
+        count = min(processors(), paying) if self.processes is None else min(self.processes, runs)
+        return executor(study, count, self.dask, tell)
+
+
+def _computed(
+    study: Study,
+    runs: Sequence[int],
+    journal: Journal,
+    means: _Means,
+    progress: Progress,
+    tell: Callable[[str], object],
+) -> dict[int, Row]:
+    """Compute what is missing in the journal; the rows of runs that were lost with their processes."""
+    missing = [run for run in runs if study.key(study.point(run)) not in journal]
+    if len(missing) < len(runs):
+        tell(f"{len(runs) - len(missing):,} of {len(runs):,} runs are in {journal.path} already")
+    if not missing:
+        return {}
+    with progress(len(missing)) as bar, means.of(study, len(missing), tell) as rows:
+        return gather(rows(missing), journal, bar.update)
+
+
+def gather(rows: Iterable[Row], journal: Journal, done: Callable[[int], object]) -> dict[int, Row]:
+    """Add rows to the journal as they come.
+
+    Args:
+        rows: of further runs.
+        journal: gets them.
+        done: is told how many further runs are done.
+
+    Returns:
+        The rows of runs that were lost with their process, by run, which the journal does not get: another
+        trial may do.
+
+    Raises:
+        InputError: a process cannot read the study as it was.
+        StorageError: the disk is full or fails; the rows before are in the journal.
+    """
+    lost = {}
+    for row in rows:
+        if row.lost:
+            lost[row.run] = row
+        else:
+            journal.add(row)
+        done(1)
+    return lost
+
+
+@contextmanager
+def _telling_what_is_kept(journal: Journal, tell: Callable[[str], object]) -> Iterator[None]:
+    """Whatever ends the study, say what it does not cost."""
+    try:
+        yield
+    except BaseException:
+        if not len(journal):
+            raise
+        tell(
+            f"{len(journal):,} finished runs are kept in {journal.path}; the same command goes on from there"
+        )
+        raise
