@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
+from samples.remedies import pendulum, rest_to_rest
 
 from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
 from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, Speeds
@@ -62,13 +63,24 @@ def test_a_motion_that_begins_on_its_way_keeps_its_timing(arm, tmp_path):
         optimize(arm, load_trajectory(path, arm), "time", "timing")
 
 
-@pytest.mark.slow
 def test_what_nothing_holds_back_is_no_optimum():
-    arm = load_robot(REPOSITORY / "robots" / "planar_2r.yaml")
-    free = load_trajectory(REPOSITORY / "trajectories" / "planar_2r.yaml", arm)
-    found = optimize(arm, free, "time", "timing")
+    free = rest_to_rest(1.0, (1e7,), start=(0.0,), end=(0.5,), rate=100.0)
+    found = optimize(pendulum(), free, "time", "timing")
     assert not found.possible
     assert "no limit keeps the motion from being 50 times as fast" in str(found)
+
+
+@pytest.mark.slow
+def test_a_motion_that_dwells_is_held_back_by_the_ends_of_its_corridors_alone(arm):
+    """No motor has a limit, and the dwells go on as long as they were."""
+    dwelling = load_trajectory(REPOSITORY / "trajectories" / "vsa_3r_pick_and_place.yaml", arm)
+    found = optimize(arm, dwelling, "time", "timing")
+    assert found.timing.found
+    assert 1.0 < found.timing.after < 0.4 * found.timing.uniform
+    assert {name for shares in found.timing.bounding.values() for name in shares} == {
+        "lower end of the corridor"
+    }
+    assert inverse_dynamics(arm, found.trajectory).report.verdict == "ok"
 
 
 @pytest.mark.slow

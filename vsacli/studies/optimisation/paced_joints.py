@@ -45,8 +45,12 @@ class Pace:
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
         """Time, and how far the pace is below what it may be."""
-        least = np.where(self._held[instants], 1.0, FASTEST)
-        return [rows[0] / self._duration], [least - rows[0]]
+        return [rows[0] / self._duration], [least_pace(self._held)[instants] - rows[0]]
+
+
+def least_pace(held: BoolArray) -> FloatArray:
+    """As fast as is tried, (instants,), and as commanded where the motion rests on its way."""
+    return np.where(held, 1.0, FASTEST)
 
 
 class PacedJoint:

@@ -11,7 +11,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, evenly
 from vsacli.robot.model import Robot
 from vsacli.studies.optimisation.interior_point import Minimum, minimise
-from vsacli.studies.optimisation.paced_joints import CLEARANCE, FASTEST, PacedJoint
+from vsacli.studies.optimisation.paced_joints import CLEARANCE, FASTEST, PacedJoint, least_pace
 from vsacli.studies.optimisation.paced_motion import PacedMotion
 from vsacli.studies.optimisation.paced_search import STIFFER, PacedSearch, Start, instants_of
 from vsacli.studies.optimisation.paced_splines import PacedSpaces, Pacing
@@ -29,7 +29,7 @@ HALVINGS = 16
 """Halvings of the last stride: to 1e-6 of the factor."""
 
 UNBOUNDED = 1.1
-"""Multiple of the least pace that is tried, below which nothing else holds the motion back."""
+"""Multiple of the time that the least pace takes, below which nothing else holds the motion back."""
 
 SLACK = 1.02
 """How much slower than the fastest uniform motion a search begins."""
@@ -86,7 +86,8 @@ class TimingSearch(PacedSearch):
             ImpossibleError: none was found.
         """
         found = super().best()
-        if float(found.pace()(self._s).min()) < UNBOUNDED * FASTEST:
+        shortest = np.trapezoid(least_pace(self._motion.resting), self._s)
+        if found.pace().integrate(*self._span) < UNBOUNDED * shortest:
             raise ImpossibleError(
                 f"no limit keeps the motion from being {1 / FASTEST:g} times as fast; give some, such as "
                 "max_torque of the motors, or begin with a shorter duration"
