@@ -30,7 +30,7 @@ INSTANTS_PER_PIECE = 12
 """Instants of a piece at which bounds are kept, at least."""
 
 MOST_ROUNDS = 12
-"""Rounds of adding instants at which bounds are missed: a motion that dwells twice, bounded by the ends of its
+"""Rounds of adding instants at which bounds are missed: a motion with two dwells, bounded by the ends of its
 corridors alone, took seven."""
 
 ACTIVE = 1e-3
