@@ -169,7 +169,7 @@ def _corridor(figure: Figure, result: Result) -> None:
     axes.plot(result.tau_e[:, SHOULDER], result.stiffness[:, SHOULDER], color=BLACK)
     start, end = ((result.tau_e[step, SHOULDER], result.stiffness[step, SHOULDER]) for step in (0, -1))
     axes.plot(*start, "o", color=BLACK)
-    axes.annotate("start", start, (6, -3), textcoords="offset points")
+    axes.annotate("start", start, (-8, 0), ha="right", textcoords="offset points")
     axes.annotate("end: stiffer, further apart", end, (6, 4), textcoords="offset points")
     axes.annotate(f"asked for: {ASKED} N m/rad", (-148, 10 + ASKED), color=RED, va="bottom")
     axes.axhline(ASKED, color=RED, linestyle="--")

@@ -22,6 +22,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -50,14 +51,14 @@ if TYPE_CHECKING:
 @click.option(
     "--plot",
     "plot_folder",
-    metavar="FOLDER",
+    type=FOLDER,
     help="Also draw each stiffness inside its reachable range there, as png.",
 )
 @click.option("--suggest", "advise", is_flag=True, help="Also say what smallest change would mend it.")
 @click.option(
     "--write-fixed",
     "fixed",
-    metavar="FILE",
+    type=FILE,
     help="Write the first suggestion as a trajectory, with a CSV beside it for what is no formula, and as"
     " FILE-robot.yaml the robot, if its preload changes; implies --suggest.",
 )

@@ -6,6 +6,7 @@ import click
 
 from vsacli.cli.command_parts import example, overwrite_option, robot_argument
 from vsacli.cli.console import Exit, Talk, talk_options
+from vsacli.cli.file_names import FOLDER
 
 
 @click.command(
@@ -14,7 +15,7 @@ from vsacli.cli.console import Exit, Talk, talk_options
     epilog=example("vsacli codegen robots/vsa_3r.yaml -o controller"),
 )
 @robot_argument
-@click.option("-o", "--output", metavar="FOLDER", required=True, help="Folder for the code.")
+@click.option("-o", "--output", type=FOLDER, required=True, help="Folder for the code.")
 @click.option(
     "--precision",
     type=click.Choice(["double", "float"]),

@@ -13,6 +13,7 @@ import click
 from vsacli.base.errors import InputError
 from vsacli.base.streams import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say
+from vsacli.cli.file_names import FILE
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -73,8 +74,8 @@ def example(command: str) -> str:
     return f"\b\nExample:\n  {command}"
 
 
-robot_argument = click.argument("robot")
-trajectory_argument = click.argument("trajectory")
+robot_argument = click.argument("robot", type=FILE)
+trajectory_argument = click.argument("trajectory", type=FILE)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the report as JSON.")
 overwrite_option = click.option("--overwrite", is_flag=True, help="Replace files that exist.")
 deflections_option = click.option(
@@ -86,7 +87,7 @@ deflections_option = click.option(
 )
 columns_option = click.option(
     "--columns",
-    metavar="FILE",
+    type=FILE,
     help="What columns with other names stand for, and which to ignore; `vsacli info` of a recording makes "
     "such a file.",
 )

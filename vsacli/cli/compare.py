@@ -10,6 +10,7 @@ import click
 
 from vsacli.cli.command_parts import columns_option, example, json_option, overwrite_option, result_line
 from vsacli.cli.console import Talk, say, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     short_help="Compare a result with what was measured.",
     epilog=example("vsacli compare result.h5 torques.csv --plot figures"),
 )
-@click.argument("result")
-@click.argument("recording")
+@click.argument("result", type=FILE)
+@click.argument("recording", type=FILE)
 @click.option(
     "--begins-at",
     metavar="SECONDS",
@@ -31,9 +32,7 @@ if TYPE_CHECKING:
 )
 @columns_option
 @json_option
-@click.option(
-    "--plot", "folder", metavar="FOLDER", help="Save figures of measured and computed signals there."
-)
+@click.option("--plot", "folder", type=FOLDER, help="Save figures of measured and computed signals there.")
 @overwrite_option
 @talk_options
 def compare(

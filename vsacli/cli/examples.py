@@ -9,6 +9,7 @@ import click
 
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.file_names import FOLDER
 
 if TYPE_CHECKING:
     from vsacli.files.examples import Example
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     epilog=example("vsacli examples puma_560 scara_4 --copy my-robots"),
 )
 @click.argument("names", metavar="[ROBOT]...", nargs=-1)
-@click.option("--copy", "folder", metavar="FOLDER", help="Copy them there instead.")
+@click.option("--copy", "folder", type=FOLDER, help="Copy them there instead.")
 @overwrite_option
 @talk_options
 def examples(names: tuple[str, ...], folder: str | None, overwrite: bool, talk: Talk) -> None:

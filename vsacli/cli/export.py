@@ -16,6 +16,7 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Exit, Talk, talk_options, tell
+from vsacli.cli.file_names import FILE
 from vsacli.results.exports import FORMATS as OF_RESULTS
 
 if TYPE_CHECKING:
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
     short_help="Write motor torques, or other variables, for other programs.",
     epilog=example("vsacli export result.h5 --rate 250 -o torques.csv"),
 )
-@click.argument("file")
+@click.argument("file", type=FILE)
 @click.option(
-    "-o", "--output", metavar="FILE", help="File to write; by default standard output, which takes texts."
+    "-o", "--output", type=FILE, help="File to write; by default standard output, which takes texts."
 )
 @click.option(
     "--format",

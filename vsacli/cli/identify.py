@@ -18,6 +18,7 @@ from vsacli.cli.command_parts import (
     words_of,
 )
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     epilog=example("vsacli identify robots/vsa_3r.yaml record.csv -o fitted.yaml --plot figures"),
 )
 @robot_argument
-@click.argument("recordings", nargs=-1, metavar="RECORDING...")
+@click.argument("recordings", type=FILE, nargs=-1, metavar="RECORDING...")
 @click.option(
     "--fit",
     metavar="WORDS",
@@ -71,12 +72,10 @@ if TYPE_CHECKING:
 @click.option(
     "-o",
     "--output",
-    metavar="FILE",
+    type=FILE,
     help="Write the robot file with the numbers found; with --plan, the trajectory.",
 )
-@click.option(
-    "--plot", "folder", metavar="FOLDER", help="Save figures of measured and predicted torques there."
-)
+@click.option("--plot", "folder", type=FOLDER, help="Save figures of measured and predicted torques there.")
 @json_option
 @overwrite_option
 @talk_options

@@ -9,6 +9,7 @@ import click
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.file_names import FILE
 
 
 def _spring(
@@ -40,10 +41,10 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     short_help="Make a robot file from a serial chain of a URDF.",
     epilog=example("vsacli import-urdf robots/desk_arm.urdf --tip flange -o desk_arm.yaml"),
 )
-@click.argument("urdf")
+@click.argument("urdf", type=FILE)
 @click.option("--base", metavar="LINK", help="Link that stands still; by default the root.")
 @click.option("--tip", metavar="LINK", help="Link of the end effector; needed if there is a choice.")
-@click.option("-o", "--output", metavar="FILE", help="Robot file; by default URDF.yaml in this folder.")
+@click.option("-o", "--output", type=FILE, help="Robot file; by default URDF.yaml in this folder.")
 @click.option(
     "--actuator",
     type=click.Choice(tuple(ACTUATORS)),

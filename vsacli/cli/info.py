@@ -12,6 +12,7 @@ import click
 from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 
 
 @click.command(
@@ -19,8 +20,8 @@ from vsacli.cli.console import Talk, talk_options
     short_help="Show what a robot, trajectory or result holds.",
     epilog=example("vsacli info robots/vsa_3r.yaml --field joints.elbow.static_load.torque"),
 )
-@click.argument("file", required=False)
-@click.option("--robot", metavar="ROBOT", help="The robot that a trajectory is for.")
+@click.argument("file", type=FILE, required=False)
+@click.option("--robot", metavar="ROBOT", type=FILE, help="The robot that a trajectory is for.")
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 @click.option(
     "--field",
@@ -31,7 +32,7 @@ from vsacli.cli.console import Talk, talk_options
 @click.option(
     "--extract",
     "folder",
-    metavar="FOLDER",
+    type=FOLDER,
     help="Write the files that a result was computed from there instead.",
 )
 @click.option("--cache", is_flag=True, help="Show the cache of compiled code instead, and unfinished files.")

@@ -27,6 +27,7 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 from vsacli.cli.plot import draw_staged
 
 if TYPE_CHECKING:
@@ -46,13 +47,13 @@ if TYPE_CHECKING:
 @click.option(
     "-o",
     "--output",
-    metavar="FILE",
+    type=FILE,
     callback=hdf5_name,
     help="Result file; by default ROBOT-TRAJECTORY.h5 in this folder.",
 )
 @variables_option("all")
 @click.option(
-    "--plot", "plot_folder", metavar="FOLDER", help="Also draw the figures of `vsacli plot` there, as png."
+    "--plot", "plot_folder", type=FOLDER, help="Also draw the figures of `vsacli plot` there, as png."
 )
 @deflections_option
 @json_option

@@ -76,6 +76,7 @@ class SectionedGroup(click.Group):
     sections={heading: tuple(section) for heading, section in _SECTIONS.items()},
     commands=cast("MutableMapping[str, click.Command]", _COMMANDS),  # click looks commands up, no more
     context_settings={"help_option_names": ["-h", "--help"]},
+    short_help="Inverse dynamics of robots with variable stiffness actuators.",
     epilog=_EPILOG,
 )
 @click.version_option(__version__, message="%(prog)s %(version)s")

@@ -12,10 +12,9 @@ from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.file_names import FILE
 
-_output_option = click.option(
-    "-o", "--output", metavar="FILE", help="File to write; by default standard output."
-)
+_output_option = click.option("-o", "--output", type=FILE, help="File to write; by default standard output.")
 
 
 @click.group(
@@ -67,7 +66,7 @@ def robot(joints: str, actuator: str, output: str | None, overwrite: bool, talk:
     short_help="A trajectory, for a robot of yours or for a new one.",
     epilog=example("vsacli new trajectory --robot robots/rp_2.yaml -o move.yaml"),
 )
-@click.option("--robot", "robot_path", metavar="ROBOT", help="The robot that is to execute it.")
+@click.option("--robot", "robot_path", metavar="ROBOT", type=FILE, help="The robot that is to execute it.")
 @_output_option
 @overwrite_option
 @talk_options

@@ -16,6 +16,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
+from vsacli.cli.file_names import FILE
 
 
 def _share(_context: click.Context, _parameter: click.Parameter, text: str | None) -> float | None:
@@ -59,7 +60,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 @click.option(
     "-o",
     "--output",
-    metavar="FILE",
+    type=FILE,
     help="Write the best trajectory, with a CSV beside it for what is no formula.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts drawn.")

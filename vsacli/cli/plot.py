@@ -10,6 +10,7 @@ import click
 
 from vsacli.cli.command_parts import example, overwrite_option, result_line
 from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
@@ -22,9 +23,9 @@ if TYPE_CHECKING:
     short_help="Draw results and simulations, or compare several.",
     epilog=example("vsacli plot result.h5 -o figures --format pdf"),
 )
-@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
 @click.option(
-    "-o", "--output", "folder", metavar="FOLDER", default=".", help="Where to save; by default this folder."
+    "-o", "--output", "folder", type=FOLDER, default=".", help="Where to save; by default this folder."
 )
 @click.option(
     "--format",

@@ -24,6 +24,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Talk, say, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
@@ -53,6 +54,7 @@ SHOWN_FROM = 20_000
 @click.option(
     "--tolerances",
     metavar="SHARE|FILE",
+    type=FILE,
     help="How uncertain the numbers are: 5%, or a YAML file such as 'joints.*.link.mass: {normal: 2 %}'.",
 )
 @click.option(
@@ -64,11 +66,9 @@ SHOWN_FROM = 20_000
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of these draws.")
 @click.option(
-    "-o", "--output", metavar="FILE", callback=hdf5_name, help="Write the derivatives over time as HDF5."
+    "-o", "--output", type=FILE, callback=hdf5_name, help="Write the derivatives over time as HDF5."
 )
-@click.option(
-    "--plot", "folder", metavar="FOLDER", help="Save figures of the ranking, and of the bands, there."
-)
+@click.option("--plot", "folder", type=FOLDER, help="Save figures of the ranking, and of the bands, there.")
 @json_option
 @overwrite_option
 @talk_options

@@ -28,6 +28,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 from vsacli.cli.plot import draw_staged
 
 if TYPE_CHECKING:
@@ -63,10 +64,13 @@ FEEDBACK = "feedback-linearization"
 @click.option(
     "--poles",
     metavar="POLES",
+    type=FILE,
     help="Poles of the position error in 1/s, e.g. -20,-21,-10+5j,-10-5j, one number for all, or a YAML "
     "file with those of each joint; by default -20.",
 )
-@click.option("--stiffness-poles", metavar="POLES", help="Poles of the stiffness error; by default -20.")
+@click.option(
+    "--stiffness-poles", metavar="POLES", type=FILE, help="Poles of the stiffness error; by default -20."
+)
 @click.option(
     "--integral", is_flag=True, help="Add integral action, which takes one more pole of each error."
 )
@@ -125,12 +129,12 @@ FEEDBACK = "feedback-linearization"
 @click.option(
     "-o",
     "--output",
-    metavar="FILE",
+    type=FILE,
     callback=hdf5_name,
     help="Result; by default ROBOT-TRAJECTORY-simulation.h5 in this folder.",
 )
 @click.option(
-    "--plot", "plot_folder", metavar="FOLDER", help="Also draw the figures of `vsacli plot` there, as png."
+    "--plot", "plot_folder", type=FOLDER, help="Also draw the figures of `vsacli plot` there, as png."
 )
 @json_option
 @overwrite_option

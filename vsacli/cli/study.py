@@ -14,6 +14,7 @@ import click
 from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import example, hdf5_name, json_option, overwrite_option
 from vsacli.cli.console import Exit, Talk, say, talk_options
+from vsacli.cli.file_names import FILE
 
 if TYPE_CHECKING:
     from vsacli.results.store.stored_study import StoredStudy
@@ -33,9 +34,9 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
     short_help="Compute many runs: other numbers, other motions.",
     epilog=example("vsacli study yield.yaml -o yield.h5"),
 )
-@click.argument("files", metavar="STUDY", nargs=-1, required=True)
+@click.argument("files", type=FILE, metavar="STUDY", nargs=-1, required=True)
 @click.option(
-    "-o", "--output", metavar="FILE", callback=hdf5_name, help="Table; by default STUDY.h5 in this folder."
+    "-o", "--output", type=FILE, callback=hdf5_name, help="Table; by default STUDY.h5 in this folder."
 )
 @click.option(
     "--processes",

@@ -9,6 +9,7 @@ import click
 
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, Talk, talk_options
+from vsacli.cli.file_names import FILE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     short_help="Report everything that is wrong with files of any kind.",
     epilog=example("vsacli validate robots/vsa_3r.yaml trajectories/rest_to_rest.yaml"),
 )
-@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
 @click.option("--json", "as_json", is_flag=True, help="Print what is found as a JSON list.")
 @click.option(
     "--recompute",
