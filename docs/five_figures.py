@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from vsacli import Antagonistic, Result, inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.laws import SpringLaw
 from vsacli.base.arrays import FloatArray
-from vsacli.results.plots.drawing import SETTINGS
+from vsacli.results.plots.styles import SETTINGS
 
 ROOT = Path(__file__).resolve().parent.parent
 BLUE, RED, BLACK, SHADE = "#1f4fd8", "#d8261c", "black", "#d3e5f6"

@@ -19,7 +19,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.results.plots import compare_files
 from vsacli.results.store.simulation import open_stored
 
-FIGURES = ("position-error", "stiffness-error", "motor-torque")
+FIGURES = ("motion", "position-error", "stiffness-error", "motor-torque")
 JOINTS = ("base", "shoulder", "elbow")
 HEAD = """\
 format: vsacli-robot/1
@@ -97,7 +97,9 @@ def test_rigid_joints_have_no_stiffness_error(vsacli: Callable[..., Any], tmp_pa
     assert vsacli("simulate", "arm.yaml", "move.yaml", "-o", "s.h5", "--plot", ".").code == 0
     assert (tmp_path / "s-stiffness-error.png").read_bytes() == b"of another simulation"
     assert vsacli("plot", "s.h5", "-o", "later").code == 0
-    assert contents(tmp_path / "later").keys() == {"s-position-error.png", "s-motor-torque.png"}
+    assert contents(tmp_path / "later").keys() == {
+        f"s-{name}.png" for name in ("motion", "position-error", "motor-torque")
+    }
 
 
 def test_several_simulations_are_compared(
@@ -113,10 +115,10 @@ def test_a_comparison_shows_the_position_errors(tmp_path: Path, simulated: Path)
     with h5py.File(other, "r+") as file:
         file["q_error"][...] *= 2
     with open_stored(simulated / "s.h5") as first, open_stored(other) as second:
-        figure = compare_files([first, second])
+        figure = compare_files([first, second])["compare"]
     assert figure.get_suptitle() == "vsa-3r, position errors"
     error = stored(simulated / "s.h5", "q_error")
-    for joint, axes in enumerate(figure.axes):
+    for joint, axes in enumerate(figure.axes[::2]):
         assert (axes.get_title(loc="left"), axes.get_ylabel()) == (JOINTS[joint], "$q - q_d$ [rad]")
         one, two = (line.get_ydata() for line in axes.lines)
         np.testing.assert_array_equal(one, error[:, joint])

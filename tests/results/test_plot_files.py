@@ -57,7 +57,7 @@ def test_a_folder_that_is_a_file_is_a_storage_error(tmp_path: Path) -> None:
 def test_a_stored_result_is_drawn(tmp_path: Path) -> None:
     with StoredResult.open(write_result(tmp_path / "run.h5", random_block(5000, 2))) as result:
         figures = plot_stored(result)
-        comparison = compare_files([result, result])
+        comparison = compare_files([result, result])["compare"]
     assert list(figures) == ["motion", "motor-torque", "elastic-torque", "energy"]
     assert comparison.get_suptitle() == "two, motor torques"
 

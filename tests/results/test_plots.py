@@ -16,7 +16,7 @@ from samples.marks import slow
 from vsacli.base.errors import InputError
 from vsacli.results.corridors import visible_range
 from vsacli.results.plots import RESULT_DRAWINGS, compare_files, omitted_figures, plot_stored, save_figures
-from vsacli.results.plots.drawing import line_style, shortened
+from vsacli.results.plots.styles import line_style, shortened
 
 NAN = np.nan
 
@@ -287,11 +287,12 @@ def test_nothing_to_draw_is_an_error() -> None:
 def test_comparison_overlays_the_motor_torques_of_each_joint() -> None:
     soft = rest_to_rest(sigma=(850, 850), trajectory="soft")
     stiff = rest_to_rest(sigma=(1275, 1275), trajectory="stiff")
-    figure = compare_files([soft, stiff])
-    titles = [axes.get_title(loc="left") for axes in panels(figure)]
+    figure = compare_files([soft, stiff])["compare"]
+    overlaid = [axes for axes in panels(figure) if axes.get_ylabel()]
+    titles = [axes.get_title(loc="left") for axes in overlaid]
     assert titles[:3] == ["base, motor 1", "base, motor 2", "shoulder, motor 1"]
-    assert panels(figure)[3].get_ylabel() == r"$\tau_2$ [N m]"
-    black, red = curves(panels(figure)[3])
+    assert overlaid[3].get_ylabel() == r"$\tau_2$ [N m]"
+    black, red = curves(overlaid[3])
     assert (black.get_color(), black.get_linestyle(), red.get_linestyle()) == ("black", "-", "--")
     np.testing.assert_array_equal(black.get_ydata(), soft.read("tau_motor")[:, 1, 1])
     np.testing.assert_array_equal(red.get_ydata(), stiff.read("tau_motor")[:, 1, 1])
@@ -302,10 +303,10 @@ def test_comparison_spans_the_longest_run_and_shows_bands() -> None:
     short = rest_to_rest(trajectory="short")
     short.time = short.time / 2
     short.read("flags")[300:401, 0] = 1
-    figure = compare_files([short, rest_to_rest()])
-    assert panels(figure)[4].get_xlim() == (0, 4)
+    figure = compare_files([short, rest_to_rest()])["compare"]
+    assert panels(figure)[-1].get_xlim() == (0, 4)
     np.testing.assert_allclose(bands(panels(figure)[0]), [(1.4975, 2.0)])
-    assert bands(panels(figure)[2]) == []
+    assert bands(panels(figure)[4]) == []
 
 
 @pytest.mark.parametrize(
@@ -317,7 +318,7 @@ def test_comparison_spans_the_longest_run_and_shows_bands() -> None:
     ],
 )
 def test_equal_trajectory_names_are_told_apart(paths: tuple[str, str], labels: list[str]) -> None:
-    assert legend_labels(compare_files([rest_to_rest(path=path) for path in paths])) == labels
+    assert legend_labels(compare_files([rest_to_rest(path=path) for path in paths])["compare"]) == labels
 
 
 def test_results_of_different_joints_are_refused() -> None:

@@ -16,7 +16,7 @@ STIFFNESS_K, STIFFNESS_KC, MOTOR_INERTIA = 400.0, 2000.0, 3.2
 class Result:
     """What the figures ask of a stored result; it holds the variables it is given."""
 
-    kind = "result"
+    kind, command = "result", "invdyn"
     complete = True
     declared = VARIABLES
 
@@ -36,6 +36,7 @@ class Result:
         self.joint_names = ("base", "shoulder", "elbow") if types == "RRR" else many
         self.joint_types = tuple({"R": "revolute", "P": "prismatic"}[letter] for letter in types)
         self.actuators = tuple(actuators or ["antagonistic"] * len(types))
+        self.bounds: dict[str, np.ndarray] = {}
         self.time = time
         self.samples = time.size
         self._values = variables
@@ -43,6 +44,9 @@ class Result:
 
     def existing(self, variable: Variable) -> np.ndarray:
         return np.array(existing(variable, self.actuators))
+
+    def limits(self, name: str) -> np.ndarray:
+        return self.bounds.get(name, np.full((len(self.joint_names), 1, 2), np.nan))
 
     def has(self, variable: Variable) -> bool:
         return variable.requires in OF_ANY_ROBOT

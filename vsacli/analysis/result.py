@@ -17,7 +17,7 @@ from vsacli.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray
 
-    from vsacli.results.plots.figures import Figures
+    from vsacli.results.plots.drawings import Figures
 
 
 class Shown:

@@ -16,7 +16,7 @@ from vsacli.results.store.reader import StoredResult, open_one_of
 if TYPE_CHECKING:
     import xarray
 
-    from vsacli.results.plots.figures import Figures
+    from vsacli.results.plots.drawings import Figures
 
 
 class ResultFile(Shown, StoredResult):

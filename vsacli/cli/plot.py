@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from vsacli.cli.command_parts import example, overwrite_option, result_line
+from vsacli.cli.command_parts import example, overwrite_option, result_line, words_of
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
 
@@ -35,17 +36,43 @@ if TYPE_CHECKING:
     show_default=True,
     help="Format of the figures; html is one page of everything.",
 )
+@click.option("--from", "start", metavar="SECONDS", type=float, help="First time to show.")
+@click.option("--to", "end", metavar="SECONDS", type=float, help="Last time to show.")
+@click.option(
+    "--joints",
+    metavar="NAMES",
+    callback=words_of("shoulder,elbow"),
+    help="Only these joints, e.g. shoulder,elbow.",
+)
+@click.option(
+    "--variables",
+    metavar="NAMES",
+    callback=words_of("theta,dtheta"),
+    help="A figure of each of these variables instead, e.g. theta,dtheta.",
+)
 @overwrite_option
 @talk_options
-def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool, talk: Talk) -> None:
+def plot(
+    files: tuple[str, ...],
+    folder: str,
+    file_format: str,
+    start: float | None,
+    end: float | None,
+    joints: tuple[str, ...] | None,
+    variables: tuple[str, ...] | None,
+    overwrite: bool,
+    talk: Talk,
+) -> None:
     """Draw the figures of a result or a simulation, or compare several of a kind.
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
-    <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give <stem>-losses if the
-    robot has dry friction or dampers, and <stem>-motor-current and <stem>-motor-voltage if its motors have
-    what that takes; results of robots with dampers <stem>-damper. Two or more FILEs give one figure
-    <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid joint by
-    joint.
+    <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
+    <stem>-losses if the robot has dry friction or dampers, and <stem>-motor-current and <stem>-motor-voltage
+    if its motors have what that takes; results of robots with dampers <stem>-damper. Two or more FILEs give
+    one figure <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid
+    joint by joint, and what they differ by from the first.
+
+    With --variables the figures are called <stem>-theta or <stem>-<stem>-compare-theta.
 
     The table of a study gives <stem>-margin, over the numbers that vary, <stem>-pareto, cost over margin, and
     <stem>-feasibility, the share of runs with at least a margin; of several tables the latter are compared.
@@ -56,18 +83,53 @@ def plot(files: tuple[str, ...], folder: str, file_format: str, overwrite: bool,
     """
     from vsacli.base.outputs import Outputs
 
+    shown = _Shown(joints or (), _span(start, end), variables)
     with Outputs(overwrite=overwrite, inputs=files) as outputs:
         if file_format == "html":
             from vsacli.cli.plot_page import write_page
 
+            if shown != _EVERYTHING:
+                raise click.UsageError("a page shows all joints, variables and times, and zooms in itself")
             write_page([Path(file) for file in files], Path(folder), outputs, talk)
         elif _are_studies(files):
+            if shown != _EVERYTHING:
+                raise click.UsageError("times, joints and variables can be chosen of results, not of studies")
             _draw_studies([Path(file) for file in files], Path(folder), file_format, outputs)
         elif len(files) == 1:
-            _draw_file(Path(files[0]), Path(folder), file_format, outputs, talk)
+            _draw_file(Path(files[0]), shown, Path(folder), file_format, outputs, talk)
         else:
-            _draw_comparison([Path(file) for file in files], Path(folder), file_format, outputs, talk)
+            _draw_comparison([Path(file) for file in files], shown, Path(folder), file_format, outputs, talk)
     talk.wrote(outputs)
+
+
+class _Shown(NamedTuple):
+    """What of files is drawn: of these joints, all if there are none, from one time to another."""
+
+    joints: tuple[str, ...]
+    span: tuple[float, float]
+    variables: tuple[str, ...] | None
+
+    def of(self, stored: StoredResult) -> StoredResult:
+        """The part of an open file that is drawn; the file itself if that is all of it."""
+        from vsacli.results.store.excerpt import Excerpt
+
+        everything = not self.joints and self.span == _EVERYTHING.span
+        return stored if everything else Excerpt(stored, self.joints, self.span)
+
+
+_EVERYTHING = _Shown((), (-math.inf, math.inf), None)
+
+
+def _span(start: float | None, end: float | None) -> tuple[float, float]:
+    """The times between which is drawn.
+
+    Raises:
+        click.UsageError: there are none.
+    """
+    span = (-math.inf if start is None else start, math.inf if end is None else end)
+    if not span[0] <= span[1]:
+        raise click.UsageError(f"--from {span[0]:g} has to lie before --to {span[1]:g}")
+    return span
 
 
 def _are_studies(files: tuple[str, ...]) -> bool:
@@ -93,15 +155,19 @@ def _draw_studies(paths: list[Path], folder: Path, file_format: str, outputs: Ou
     FigureFiles(figures, folder, stem, file_format, outputs).save(figures)
 
 
-def _draw_file(path: Path, folder: Path, file_format: str, outputs: Outputs, talk: Talk) -> None:
+def _draw_file(
+    path: Path, shown: _Shown, folder: Path, file_format: str, outputs: Outputs, talk: Talk
+) -> None:
     """Draw the figures of one file."""
-    from vsacli.results.plots import FigureFiles, drawable_figures, drawings_of
+    from vsacli.results.plots import FigureFiles, chosen_figures
     from vsacli.results.store.simulation import open_stored
 
     with open_stored(path) as stored:
         talk.detail(result_line(stored))
-        drawn = drawable_figures(drawings_of(stored), stored.variables, path)
-        _draw(stored, path, FigureFiles(drawn, folder, path.stem, file_format, outputs), talk)
+        part = shown.of(stored)
+        names = chosen_figures(part, shown.variables)
+        figures = FigureFiles(names, folder, path.stem, file_format, outputs)
+        _draw(part, path, figures, talk, shown.variables)
 
 
 def draw_staged(file: Staged, figures: FigureFiles, talk: Talk) -> None:
@@ -112,23 +178,32 @@ def draw_staged(file: Staged, figures: FigureFiles, talk: Talk) -> None:
         _draw(stored, file.path, figures, talk)
 
 
-def _draw(stored: StoredResult, path: Path, figures: FigureFiles, talk: Talk) -> None:
+def _draw(
+    stored: StoredResult,
+    path: Path,
+    figures: FigureFiles,
+    talk: Talk,
+    variables: tuple[str, ...] | None = None,
+) -> None:
     """Draw the figures of an open file and say which it has not the variables for."""
     from vsacli.results.plots import drawings_of, omitted_figures, plot_stored
 
-    for reason in omitted_figures(drawings_of(stored), stored.variables).values():
-        talk.note(f"{path}: {reason}")
-    figures.save(plot_stored(stored))
+    if variables is None:
+        for reason in omitted_figures(drawings_of(stored), stored.variables).values():
+            talk.note(f"{path}: {reason}")
+    figures.save(plot_stored(stored, variables))
 
 
-def _draw_comparison(paths: list[Path], folder: Path, file_format: str, outputs: Outputs, talk: Talk) -> None:
-    from vsacli.results.plots import COMPARISON, FigureFiles, compare_files
+def _draw_comparison(
+    paths: list[Path], shown: _Shown, folder: Path, file_format: str, outputs: Outputs, talk: Talk
+) -> None:
+    from vsacli.results.plots import FigureFiles, compare_files, comparison_names
     from vsacli.results.store.simulation import open_stored
 
     stem = "-".join(path.stem for path in paths)
-    files = FigureFiles([COMPARISON], folder, stem, file_format, outputs)
+    files = FigureFiles(comparison_names(shown.variables), folder, stem, file_format, outputs)
     with ExitStack() as stack:
         opened = [stack.enter_context(open_stored(path)) for path in paths]
         for each in opened:
             talk.detail(result_line(each))
-        files.save({COMPARISON: compare_files(opened)})
+        files.save(compare_files([shown.of(each) for each in opened], shown.variables))

@@ -8,25 +8,25 @@ except OSError as error:
     reason = "Matplotlib has no folder for its files; name one by the environment variable MPLCONFIGDIR"
     raise StorageError("figures", f"cannot be drawn: {reason}") from error
 
-from vsacli.results.plots.comparison import COMPARISON, compare_files
+from vsacli.results.plots.comparison import COMPARISON, compare_files, comparison_names
 from vsacli.results.plots.corridor_figure import (
     FEASIBILITY,
     FEASIBILITY_VARIABLES,
     check_drawable,
     plot_feasibility,
 )
+from vsacli.results.plots.drawings import drawable_figures, omitted_figures
 from vsacli.results.plots.figures import (
     RESULT_DRAWINGS,
-    drawable_figures,
+    chosen_figures,
     drawings_of,
-    omitted_figures,
     plot_stored,
     result_drawings,
-    simulation_drawings,
 )
 from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
 from vsacli.results.plots.measured_figure import MeasuredCurve, measured_figure
 from vsacli.results.plots.sensitivity_figures import Bar, Torque, band_figure, ranking_figure
+from vsacli.results.plots.simulation_figures import simulation_drawings
 from vsacli.results.plots.study_figures import compared_studies, study_figures
 
 __all__ = [
@@ -41,8 +41,10 @@ __all__ = [
     "Torque",
     "band_figure",
     "check_drawable",
+    "chosen_figures",
     "compare_files",
     "compared_studies",
+    "comparison_names",
     "drawable_figures",
     "drawings_of",
     "measured_figure",

@@ -1,12 +1,12 @@
-"""Several files of a kind on the same axes.
+"""Several files of a kind on the same axes, and below by how much they differ from the first.
 
-Of results the motor torques, after Fig. 4 of Buondonno & De Luca (2016), of simulations the position errors.
+Of results the motor torques, after Fig. 4 of Buondonno & De Luca (2016), of simulations the position errors,
+unless other variables are asked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,28 +14,33 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vsacli.base.arrays import BoolArray
+from vsacli.base import units
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.units import POSITION, TORQUE
-from vsacli.base.variables import MOTORS
-from vsacli.results.curves import Failures, read_curves
-from vsacli.results.plots.drawing import draw_bands, draw_curve, house_style, line_handle, line_style
+from vsacli.results.curves import Curves, Failures, read_curves
+from vsacli.results.plots.drawing import ZERO, draw_bands, draw_curve
+from vsacli.results.plots.labels import Label, label, motor_labels, variable_labels
 from vsacli.results.plots.panels import (
     PANEL_WIDTH,
-    Label,
+    AxesGrid,
     add_title,
     complete,
     folding,
     joint_panels,
     missing_variables,
 )
-from vsacli.results.several import check_comparable, distinct_labels
+from vsacli.results.plots.scale import GROWING, Peaked, cut_peaks
+from vsacli.results.plots.styles import house_style, line_handle, line_style
+from vsacli.results.plots.variable_figures import drawable_variables
+from vsacli.results.several import Difference, check_comparable, distinct_labels
 from vsacli.results.store.reader import StoredResult
 
 COMPARISON = "compare"
 """Name of the figure; the file is called `<stem>-compare`."""
 
 MOST_ROWS = 7
+HEIGHTS = (1.6, 0.9)
+"""Inches: of a panel, and of that below with the differences."""
 
 
 class _Compared(NamedTuple):
@@ -44,68 +49,73 @@ class _Compared(NamedTuple):
     Attributes:
         variable: the variable, a column of panels for each of its curves.
         words: for the title of the figure.
-        columns: what the title of a panel adds to the name of its joint.
         labels: of the axes.
     """
 
     variable: str
     words: str
-    columns: Sequence[str]
     labels: Sequence[Label]
 
 
-def _torque_label(motor: int, joint_type: str) -> str:
-    return rf"$\tau_{motor}$ [{TORQUE.unit(joint_type)}]"
-
-
-def _error_label(joint_type: str) -> str:
-    return f"$q - q_d$ [{POSITION.unit(joint_type)}]"
-
-
 _COMPARED = {
-    "result": _Compared(
-        "tau_motor",
-        "motor torques",
-        [f", motor {motor}" for motor in MOTORS],
-        [partial(_torque_label, motor) for motor in MOTORS],
-    ),
-    "simulation": _Compared("q_error", "position errors", [""], [_error_label]),
+    "result": _Compared("tau_motor", "motor torques", motor_labels(r"$\tau_{motor}$", units.TORQUE)),
+    "simulation": _Compared("q_error", "position errors", [label("$q - q_d$", units.POSITION)]),
 }
 
 
-def compare_files(files: Sequence[StoredResult]) -> Figure:
+def comparison_names(variables: Sequence[str] | None) -> list[str]:
+    """Names of the figures that compare these variables, or what is compared if none are asked for."""
+    return [COMPARISON] if variables is None else [f"{COMPARISON}-{variable}" for variable in variables]
+
+
+def compare_files(files: Sequence[StoredResult], variables: Sequence[str] | None = None) -> dict[str, Figure]:
     """Overlay results, or simulations, of the same joints: a row of panels per joint, a column per curve.
 
+    Args:
+        files: open, all of a kind.
+        variables: names of those to compare, by default one that depends on the kind.
+
+    Returns:
+        The figures by name, see `comparison_names`.
+
     Raises:
-        InputError: the files are of different kinds or have different joints, or one was written without the
+        InputError: the files are of different kinds or have different joints, or one was written without a
             variable that is compared.
     """
     check_comparable(files)
-    compared = _COMPARED[files[0].kind]
+    if variables is None:
+        several = [_COMPARED[files[0].kind]]
+    else:
+        for file in files:
+            chosen = drawable_variables(file, variables)
+        several = [_Compared(each.name, each.long_name, variable_labels(each)) for each in chosen]
     for file in files:
-        _check_holds(file, compared)
+        _check_holds(file, several)
     with house_style():
-        return _comparison(files, compared)
+        drawn = [_comparison(files, compared) for compared in several]
+    names = comparison_names(None if variables is None else [each.variable for each in several])
+    return dict(zip(names, drawn, strict=True))
 
 
-def _check_holds(file: StoredResult, compared: _Compared) -> None:
-    if compared.variable not in file.variables:
-        raise InputError.one(missing_variables(COMPARISON, [compared.variable]), file.path)
+def _check_holds(file: StoredResult, several: Sequence[_Compared]) -> None:
+    missing = [each.variable for each in several if each.variable not in file.variables]
+    if missing:
+        raise InputError.one(missing_variables(COMPARISON, missing), file.path)
 
 
 def _comparison(results: Sequence[StoredResult], compared: _Compared) -> Figure:
     there = _curves(results, compared.variable)
     joints, columns = there.shape
     rows, folds = folding(joints, MOST_ROWS)
-    width = max(2, folds * columns) * PANEL_WIDTH
-    figure = Figure((width, 1.6 * rows + 1.2), layout="constrained")
+    figure = Figure((max(2, folds * columns) * PANEL_WIDTH, sum(HEIGHTS) * rows + 1.2), layout="constrained")
     time = np.sort(np.concatenate([result.time[[0, -1]] for result in results]))
-    grid = joint_panels(figure.add_gridspec()[0], time, there, MOST_ROWS)
-    panels = [row[exists].tolist() for row, exists in zip(grid, there, strict=True)]
-    _annotate(panels, results[0], compared)
+    grid = joint_panels(figure.add_gridspec()[0], time, there, MOST_ROWS, HEIGHTS)
+    over, apart = grid[::2], grid[1::2]
+    _annotate(over, there, results[0], compared)
     handles = [line_handle(line_style(index), label) for index, label in enumerate(distinct_labels(results))]
-    for index, result in enumerate(results):
-        handles += _overlay(panels, result, index, compared.variable)
+    failures = [Failures.of(result) for result in results]
+    handles += _overlay(over, there, results, failures, compared.variable)
+    handles += _draw_differences(apart, there, results, failures, compared)
     robots = " / ".join(dict.fromkeys(result.robot_name for result in results))
     return complete(figure, f"{robots}, {compared.words}", handles)
 
@@ -117,19 +127,87 @@ def _curves(results: Sequence[StoredResult], variable: str) -> BoolArray:
     return np.asarray(there)[:, :columns]
 
 
-def _annotate(panels: list[list[Axes]], result: StoredResult, compared: _Compared) -> None:
-    for row, name, joint_type in zip(panels, result.joint_names, result.joint_types, strict=True):
-        for axes, column, label in zip(row, compared.columns, compared.labels, strict=False):
-            add_title(axes, f"{name}{column}")
-            axes.set_ylabel(label(joint_type))
+def _annotate(panels: AxesGrid, there: BoolArray, result: StoredResult, compared: _Compared) -> None:
+    several = len(compared.labels) > 1
+    for joint, curve in np.argwhere(there).tolist():
+        axes: Axes = panels[joint, curve]
+        add_title(axes, result.joint_names[joint] + (f", motor {curve + 1}" if several else ""))
+        axes.set_ylabel(compared.labels[curve](result.joint_types[joint]))
 
 
-def _overlay(panels: list[list[Axes]], result: StoredResult, index: int, variable: str) -> list[Artist]:
-    """Draw one of the results over all panels; returns what a legend shows for its bands."""
-    failures = Failures.of(result)
+def _overlay(
+    panels: AxesGrid,
+    there: BoolArray,
+    results: Sequence[StoredResult],
+    failures: Sequence[Failures],
+    variable: str,
+) -> list[Artist]:
+    """Draw the results over each other; returns what a legend shows besides their lines."""
+    joints = [read_curves(result, [variable]) for result in results]
     handles: list[Artist] = []
-    for joint, curves in enumerate(read_curves(result, [variable])):
-        for axes, values in zip(panels[joint], curves.values, strict=False):
-            draw_curve(axes, curves.time, values, index, line_style(index))
-            handles += draw_bands(axes, failures.time, *failures.among([joint]))
+    for joint, curve in np.argwhere(there).tolist():
+        axes = panels[joint, curve]
+        peaked = []
+        for index, (of_result, failed) in enumerate(zip(joints, failures, strict=True)):
+            curves, style = of_result[joint], line_style(index)
+            handles += draw_curve(axes, curves[curve], index, style)
+            calm = failed.calm(joint, curves.time)
+            peaked.append(Peaked(curves.time, curves.values[curve], style.color, calm))
+        if variable in GROWING:
+            handles += cut_peaks(axes, peaked)
+        for failed in failures:
+            handles += draw_bands(axes, failed.time, *failed.among([joint]))
     return handles
+
+
+class _Apart(NamedTuple):
+    """What one of the results differs by from the first, of each joint, and its root mean square."""
+
+    number: int
+    joints: Sequence[Curves]
+    rms: Sequence[Sequence[float]]
+
+
+def _draw_differences(
+    panels: AxesGrid,
+    there: BoolArray,
+    results: Sequence[StoredResult],
+    failures: Sequence[Failures],
+    compared: _Compared,
+) -> list[Artist]:
+    """Draw what the others differ by from the first, where they have times in common."""
+    several = [(index, Difference(result, results[0])) for index, result in enumerate(results)][1:]
+    apart = [
+        _Apart(index, read_curves(each, [compared.variable]), _by_curve(each.rms(compared.variable)))
+        for index, each in several
+        if each.time.size
+    ]
+    handles: list[Artist] = []
+    for joint, curve in np.argwhere(there).tolist():
+        axes = panels[joint, curve]
+        unit = results[0].declared[compared.variable].quantity.unit(results[0].joint_types[joint])
+        rms = [each.rms[joint][curve] for each in apart]
+        add_title(axes, _difference_words(rms, unit))
+        axes.axhline(0.0, **ZERO)
+        peaked = []
+        for each in apart:
+            curves, style = each.joints[joint], line_style(each.number)
+            handles += draw_curve(axes, curves[curve], each.number, style)
+            calm = failures[0].calm(joint, curves.time) & failures[each.number].calm(joint, curves.time)
+            peaked.append(Peaked(curves.time, curves.values[curve], style.color, calm))
+        if compared.variable in GROWING and peaked:
+            handles += cut_peaks(axes, peaked)
+    return handles
+
+
+def _difference_words(rms: Sequence[float], unit: str) -> str:
+    """The title of a panel with differences."""
+    if not any(value >= 0 for value in rms):
+        return "no values in common"
+    return f"difference, rms {', '.join(f'{value:.3g}' for value in rms)} {unit}"
+
+
+def _by_curve(rms: FloatArray) -> Sequence[Sequence[float]]:
+    """(joints, curves)."""
+    by_curve: list[list[float]] = rms.reshape(len(rms), -1).tolist()
+    return by_curve

@@ -16,8 +16,9 @@ from vsacli.base.errors import InputError
 from vsacli.base.units import STIFFNESS
 from vsacli.results.corridors import BOUNDS, compliant_joints, visible_range
 from vsacli.results.curves import Curves, Failures, read_curves
-from vsacli.results.plots.drawing import draw_bands, draw_curve, house_style, line_style
+from vsacli.results.plots.drawing import draw_bands, draw_curve, draw_limits
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, folding, joint_panels, result_title
+from vsacli.results.plots.styles import house_style, line_style
 from vsacli.results.store.reader import StoredResult
 
 FEASIBILITY = "feasibility"
@@ -41,9 +42,11 @@ def draw_corridors(place: SubplotSpec, result: StoredResult, failures: Failures)
     joints = compliant_joints(result.actuators)
     curves = read_curves(result, ["stiffness", *bounds])
     panels = joint_panels(place, failures.time, np.ones((len(joints), 1), dtype=bool), MOST_ROWS)[:, 0]
+    limits = result.limits("stiffness")
     handles: list[Artist] = []
     for joint, axes in zip(joints, panels, strict=True):
         handles += _draw_stiffness(axes, curves[joint], joint)
+        handles += draw_limits(axes, {joint: limits[joint, 0]})
         handles += draw_bands(axes, failures.time, *failures.among([joint]))
         add_title(axes, result.joint_names[joint])
         axes.set_ylabel(rf"$\sigma$ [{STIFFNESS.unit(result.joint_types[joint])}]")
@@ -54,17 +57,17 @@ def _draw_stiffness(axes: Axes, curves: Curves, joint: int) -> list[Artist]:
     command, *bounds = curves.values
     bottom, top = visible_range(command, *bounds)
     axes.set_ylim(bottom, top)
-    draw_curve(axes, curves.time, command, joint, line_style(joint))
+    handles = draw_curve(axes, curves[0], joint, line_style(joint))
     if not bounds:
-        return []
+        return handles
     lower, upper = bounds
     carried = ~np.isnan(lower)
     if not carried.any():
-        return []
+        return handles
     axes.fill_between(curves.time, np.maximum(lower, bottom), np.minimum(upper, top), carried, **_AREA)
     for bound in bounds:
         axes.plot(curves.time, np.where(np.isinf(bound), np.nan, bound), **_EDGE)
-    return [Patch(**_AREA, label="reachable")]
+    return [*handles, Patch(**_AREA, label="reachable")]
 
 
 def check_drawable(actuators: Sequence[str]) -> None:

@@ -1,17 +1,10 @@
-"""What every panel is drawn with: line styles, fonts, curves that break at gaps, bands where steps fail.
-
-The first line styles are the paper's, continued to any number of joints.
-"""
+"""Curves that break at gaps, their limits and deviations, bands where steps fail."""
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -19,90 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.results.curves import Curve
 from vsacli.results.envelopes import marked_spans
-
-if TYPE_CHECKING:
-    from matplotlib.typing import RcKeyType
-
-SETTINGS: dict[RcKeyType, Any] = {
-    "font.size": 10,
-    "axes.titlesize": 10,
-    "axes.labelsize": 10,
-    "legend.fontsize": 9.5,
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
-    "lines.linewidth": 1.5,
-    "lines.markersize": 5,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.formatter.useoffset": False,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.xmargin": 0.0,
-    "grid.color": "0.9",
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-    "legend.handlelength": 2.8,
-    "legend.columnspacing": 1.6,
-    "figure.constrained_layout.h_pad": 0.06,
-    "savefig.dpi": 220,
-    "pdf.fonttype": 42,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "vsacli",
-}
-
-LONGEST_LABEL = 36
-"""Characters of a name that fit into a legend."""
-
-# Black, red and blue are the paper's; with the others each remains apart for colour-blind readers.
-_COLORS = ("black", "#d8261c", "#1f4fd8", "#009e73", "#e69f00", "#9b4f96", "#56b4e9", "#8c564b")
-# One more than the colours, so that the pairs repeat only after 72 joints.
-_STROKES = (
-    ("-", ""),
-    ("--", ""),
-    ("-", "+"),
-    ("-.", ""),
-    (":", ""),
-    ("-", "o"),
-    ("--", "s"),
-    ("-", "x"),
-    ("-.", "^"),
-)
-
-
-@dataclass(frozen=True)
-class LineStyle:
-    """Colour, dashes and marker of a line, in matplotlib's words."""
-
-    color: str
-    linestyle: str
-    marker: str
-
-    @property
-    def words(self) -> dict[str, Any]:
-        """Keyword arguments of a line."""
-        return {**dataclasses.asdict(self), "markerfacecolor": "none"}
-
-
-def line_style(index: int) -> LineStyle:
-    """Style of the joint (or result) `index` from 0: solid black, dashed red, blue with +, and so on."""
-    return LineStyle(_COLORS[index % len(_COLORS)], *_STROKES[index % len(_STROKES)])
-
-
-def shortened(name: str, length: int = LONGEST_LABEL) -> str:
-    """A name cut in its middle to a length a figure can hold; names often differ at their ends."""
-    tail = length // 2
-    return name if len(name) <= length else name[: length - tail - 1] + "…" + name[-tail:]
-
-
-@contextmanager
-def house_style() -> Iterator[None]:
-    """Draw with these settings alone, whatever a matplotlibrc on this machine says."""
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(SETTINGS)
-        yield
-
+from vsacli.results.plots.styles import LineStyle, line_style
 
 MARKERS_PER_CURVE = 8
 MARKER_STAGGER = 0.37
@@ -114,28 +26,46 @@ _SPREAD: dict[str, Any] = {"alpha": 0.3, "linewidth": 0}
 _SINGULAR_BAND = {"facecolor": "none", "edgecolor": "0.45", "linewidth": 0.8, "hatch": "////", "zorder": 0.6}
 
 
+ZERO: dict[str, Any] = {"color": "0.6", "linewidth": 0.8}
+"""Line of what differences and margins are seen against."""
+
 _LIMIT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (1, 2))}
 
-LIMIT_SIGHT = 1.5
-"""Limits beyond what is shown by this factor are not drawn: curves would become flat."""
+LIMIT_SIGHT = 0.5
+"""Share of the height of a panel beyond it within which limits are still drawn: farther ones would leave
+curves less than half of it."""
+
+LIMIT_ROOM = 0.05
+"""Free space behind a limit, as a share of that sight."""
+
+_ENVELOPE: dict[str, Any] = {"alpha": 0.3, "linewidth": 0.5}
 
 
-def draw_curve(axes: Axes, time: FloatArray, values: FloatArray, index: int, style: LineStyle) -> None:
+def draw_curve(axes: Axes, curve: Curve, index: int, style: LineStyle) -> list[Artist]:
     """Draw a curve that breaks at NaN; a point alone between two gaps becomes a dot.
+
+    Of one whose samples would make a blot of a line, their mean and what they span.
 
     Args:
         axes: where to draw.
-        time: (points,), s.
-        values: (points,).
+        curve: of a joint or result.
         index: number of the curve in its panel, which places its markers.
         style: colour, dashes and marker.
+
+    Returns:
+        What a legend shows besides the line.
     """
+    time, values = (curve.time, curve.values) if curve.envelope is None else curve.envelope[:2]
     markers = _marker_points(time, index * MARKER_STAGGER % 1)
     axes.plot(time, values, **style.words, markevery=markers)
     gap = np.pad(np.isnan(values), 1, constant_values=True)
     alone = ~gap[1:-1] & gap[:-2] & gap[2:]
     if alone.any():
         axes.plot(time[alone], values[alone], color=style.color, linestyle="none", marker=".", markersize=4)
+    if curve.envelope is None:
+        return []
+    axes.fill_between(time, curve.envelope.low, curve.envelope.high, color=style.color, **_ENVELOPE)
+    return [Patch(color="0.5", **_ENVELOPE, label="smallest to largest")]
 
 
 def _marker_points(time: FloatArray, shift: float) -> list[int]:
@@ -162,29 +92,30 @@ def draw_uncertainty(
     return [Patch(facecolor="0.5", **_SPREAD, label="two standard deviations")]
 
 
-def draw_limits(axes: Axes, bounds: Mapping[int, float]) -> list[Artist]:
-    """Draw what the size of curves is bounded by, those that are in sight or nearly so.
+def draw_limits(axes: Axes, ranges: Mapping[int, FloatArray]) -> list[Artist]:
+    """Draw what curves are bounded by, as far as it is in sight or nearly so.
 
     Args:
         axes: where to draw, with all curves.
-        bounds: by number of the curve, which gives the colour; not finite where there is none.
+        ranges: lower and upper bound by number of the curve, which gives the colour; not finite where there
+            is none.
 
     Returns:
         What a legend shows for them.
     """
     low, high = axes.get_ylim()
-    seen = LIMIT_SIGHT * max(-low, high)
-    drawn = {index: bound for index, bound in bounds.items() if bound <= seen}
-    for index, bound in drawn.items():
-        for end in (-bound, bound):
-            if low - (high - low) / 2 <= end <= high + (high - low) / 2:
-                axes.axhline(end, color=line_style(index).color, **_LIMIT)
-    return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if drawn else []
-
-
-def line_handle(style: LineStyle, label: str) -> Artist:
-    """What a legend shows for a curve."""
-    return Line2D([], [], **style.words, label=label)
+    reach = LIMIT_SIGHT * (high - low)
+    seen = {
+        (index, float(end))
+        for index, ends in ranges.items()
+        for end in ends
+        if low - reach <= end <= high + reach
+    }
+    for index, end in sorted(seen):
+        axes.axhline(end, color=line_style(index).color, **_LIMIT)
+        low, high = min(low, end - LIMIT_ROOM * reach), max(high, end + LIMIT_ROOM * reach)
+    axes.set_ylim(low, high)
+    return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if seen else []
 
 
 def draw_bands(axes: Axes, time: FloatArray, infeasible: BoolArray, singular: BoolArray) -> list[Artist]:

@@ -2,157 +2,88 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
-from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from vsacli.base.errors import InputError
-from vsacli.base.units import CURRENT, DAMPING, ENERGY, POSITION, POWER, STIFFNESS, TORQUE, VOLTAGE, Quantity
-from vsacli.base.variables import MOTORS, VARIABLES, Variable
+from vsacli.base.variables import VARIABLES, Variable
 from vsacli.results.corridors import compliant_joints
 from vsacli.results.curves import Failures
 from vsacli.results.plots.corridor_figure import MOST_ROWS, draw_corridors
-from vsacli.results.plots.drawing import house_style
-from vsacli.results.plots.panels import (
-    GROUP_HEIGHT,
-    MOTOR_LABELS,
-    PANEL_WIDTH,
-    Label,
-    complete,
-    draw_groups,
-    folding,
-    force,
-    grouped_figure,
-    missing_variables,
-    panel_groups,
-    result_title,
+from vsacli.results.plots.drawings import Drawing, Figures, drawable_figures
+from vsacli.results.plots.groups import GROUP_HEIGHT, draw_groups, grouped_figure, legend_width
+from vsacli.results.plots.labels import (
+    CURRENTS,
+    DAMPER_TORQUES,
+    DAMPINGS,
+    ELASTIC_ENERGIES,
+    ELASTIC_TORQUES,
+    LOSSES,
+    MOTOR_TORQUES,
+    POSITIONS,
+    VOLTAGES,
+    WORK,
 )
+from vsacli.results.plots.panels import PANEL_WIDTH, complete, folding, panel_groups, result_title
+from vsacli.results.plots.simulation_figures import simulation_drawings
+from vsacli.results.plots.styles import house_style
+from vsacli.results.plots.variable_figures import draw_variable, drawable_variables
 from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.simulation import StoredSimulation
 
 NARROW_WIDTH = 2.5
 """Inches: a stiffness panel where there are several columns of them."""
-
-
-Figures: TypeAlias = dict[str, Figure]
-"""By name, such as "motion"."""
-
-
-class Drawing(NamedTuple):
-    """How a figure is drawn, and the variables without which it cannot be."""
-
-    needs: tuple[str, ...]
-    draw: Callable[[StoredResult, Failures], Figure]
-
-
-def drawable_figures(
-    drawings: Mapping[str, Drawing], variables: Collection[str], path: str | Path = ""
-) -> list[str]:
-    """Names of the figures that can be drawn from these variables.
-
-    Raises:
-        InputError: there is none; `path` is the file it names.
-    """
-    omitted = omitted_figures(drawings, variables)
-    if len(omitted) == len(drawings):
-        raise InputError.one("nothing can be plotted: " + "; ".join(omitted.values()), path)
-    return [name for name in drawings if name not in omitted]
-
-
-def omitted_figures(drawings: Mapping[str, Drawing], variables: Collection[str]) -> dict[str, str]:
-    """Figures that cannot be drawn from these variables, by name, each with the reason as a sentence."""
-    reasons = {}
-    for name, drawing in drawings.items():
-        missing = [variable for variable in drawing.needs if variable not in variables]
-        if missing:
-            reasons[name] = missing_variables(name, missing)
-    return reasons
 
 
 def _motion(result: StoredResult, failures: Failures) -> Figure:
     """Fig. 1: positions at the left, stiffness at the right if any joint has one."""
     compliant = compliant_joints(result.actuators)
     if not compliant:
-        return grouped_figure(result, failures, "q", [_position_label])
+        return grouped_figure(result, failures, "q", [POSITIONS])
     rows, folds = folding(len(compliant), MOST_ROWS)
     widths = (PANEL_WIDTH, PANEL_WIDTH if folds == 1 else NARROW_WIDTH * folds)
-    height = max(GROUP_HEIGHT * len(panel_groups(result.joint_types)), 1.4 * rows)
-    figure = Figure((sum(widths), height + 1), layout="constrained")
+    groups = len(panel_groups(result.joint_types))
+    size = (sum(widths) + legend_width(result), max(GROUP_HEIGHT * groups, 1.4 * rows) + 1)
+    figure = Figure(size, layout="constrained")
     grid = figure.add_gridspec(1, 2, width_ratios=widths)
-    handles = draw_groups(grid[0], result, failures, "q", [_position_label])
+    handles = draw_groups(grid[0], result, failures, "q", [POSITIONS])
     handles += draw_corridors(grid[1], result, failures)
     return complete(figure, result_title(result), handles)
 
 
 def _motor_torque(result: StoredResult, failures: Failures) -> Figure:
     """Fig. 2: motor 1 at the left, motor 2 at the right."""
-    return grouped_figure(result, failures, "tau_motor", MOTOR_LABELS)
+    return grouped_figure(result, failures, "tau_motor", MOTOR_TORQUES)
 
 
 def _elastic_torque(result: StoredResult, failures: Failures) -> Figure:
     """Fig. 3."""
-    return grouped_figure(result, failures, "tau_e", [_elastic_label])
+    return grouped_figure(result, failures, "tau_e", [ELASTIC_TORQUES])
 
 
 def _energy(result: StoredResult, failures: Failures) -> Figure:
     """Energy in the springs at the left, if there are any; beside it what each motor has worked."""
     motors = int(np.count_nonzero(np.any(result.existing(result.declared["motor_energy"]), axis=0)))
     if not compliant_joints(result.actuators):
-        return grouped_figure(result, failures, "motor_energy", _WORK_LABELS)
+        return grouped_figure(result, failures, "motor_energy", WORK)
     height = GROUP_HEIGHT * len(panel_groups(result.joint_types)) + 1
     figure = Figure(((1 + motors) * PANEL_WIDTH, height), layout="constrained")
     grid = figure.add_gridspec(1, 2, width_ratios=(1, motors))
-    handles = draw_groups(grid[0], result, failures, "elastic_energy", [_elastic_energy_label])
-    handles += draw_groups(grid[1], result, failures, "motor_energy", _WORK_LABELS)
+    handles = draw_groups(grid[0], result, failures, "elastic_energy", [ELASTIC_ENERGIES], named=False)
+    handles += draw_groups(grid[1], result, failures, "motor_energy", WORK)
     return complete(figure, result_title(result), handles)
 
 
-def _position_label(joint_type: str) -> str:
-    return f"joint position $q$ [{POSITION.unit(joint_type)}]"
-
-
-def _elastic_label(joint_type: str) -> str:
-    return rf"elastic {force(joint_type)} $\tau_e$ [{TORQUE.unit(joint_type)}]"
-
-
-def _elastic_energy_label(_joint_type: str) -> str:
-    return f"elastic energy [{ENERGY}]"
-
-
-def _work_label(motor: int, _joint_type: str) -> str:
-    return f"work of motor {motor} [{ENERGY}]"
-
-
-_WORK_LABELS = [partial(_work_label, motor) for motor in MOTORS]
-
-
 def _losses(result: StoredResult, failures: Failures) -> Figure:
-    return grouped_figure(result, failures, "dissipated_power", [_loss_label])
-
-
-def _loss_label(_joint_type: str) -> str:
-    return f"friction and damping [{POWER}]"
+    return grouped_figure(result, failures, "dissipated_power", [LOSSES])
 
 
 def _current(result: StoredResult, failures: Failures) -> Figure:
-    return grouped_figure(result, failures, "current", _CURRENT_LABELS, "max_current")
+    return grouped_figure(result, failures, "current", CURRENTS)
 
 
 def _voltage(result: StoredResult, failures: Failures) -> Figure:
-    return grouped_figure(result, failures, "voltage", _VOLTAGE_LABELS, "max_voltage")
-
-
-def _electrical_label(letter: str, quantity: Quantity, motor: int, joint_type: str) -> str:
-    words = {"i": "current", "u": "voltage"}[letter]
-    return f"{words} of motor {motor}, ${letter}_{motor}$ [{quantity.unit(joint_type)}]"
-
-
-_CURRENT_LABELS = [partial(_electrical_label, "i", CURRENT, motor) for motor in MOTORS]
-_VOLTAGE_LABELS = [partial(_electrical_label, "u", VOLTAGE, motor) for motor in MOTORS]
+    return grouped_figure(result, failures, "voltage", VOLTAGES)
 
 
 def _damper(result: StoredResult, failures: Failures) -> Figure:
@@ -160,17 +91,9 @@ def _damper(result: StoredResult, failures: Failures) -> Figure:
     height = GROUP_HEIGHT * len(panel_groups(result.joint_types)) + 1
     figure = Figure((2 * PANEL_WIDTH, height), layout="constrained")
     grid = figure.add_gridspec(1, 2)
-    handles = draw_groups(grid[0], result, failures, "damping", [_damping_label])
-    handles += draw_groups(grid[1], result, failures, "tau_damper", [_damper_label])
+    handles = draw_groups(grid[0], result, failures, "damping", [DAMPINGS], named=False)
+    handles += draw_groups(grid[1], result, failures, "tau_damper", [DAMPER_TORQUES])
     return complete(figure, result_title(result), handles)
-
-
-def _damping_label(joint_type: str) -> str:
-    return f"damping $d$ [{DAMPING.unit(joint_type)}]"
-
-
-def _damper_label(joint_type: str) -> str:
-    return rf"{force(joint_type)} of the damper [{TORQUE.unit(joint_type)}]"
 
 
 RESULT_DRAWINGS: dict[str, Drawing] = {
@@ -195,56 +118,38 @@ def result_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
     }
 
 
-def simulation_drawings(there: Callable[[Variable], bool]) -> dict[str, Drawing]:
-    """The figures of a simulation, by name, of a robot one of whose joints has what they show."""
-    return {
-        name: _drawing(variable, *look)
-        for name, (variable, *look) in _FIGURES.items()
-        if there(StoredSimulation.declared[variable])
-    }
-
-
-def _drawing(variable: str, labels: Sequence[Label], limit: str = "") -> Drawing:
-    def draw(simulation: StoredResult, failures: Failures) -> Figure:
-        return grouped_figure(simulation, failures, variable, labels, limit)
-
-    return Drawing((variable,), draw)
-
-
-def _position_error(joint_type: str) -> str:
-    return f"position error $q - q_d$ [{POSITION.unit(joint_type)}]"
-
-
-def _stiffness_error(joint_type: str) -> str:
-    return rf"stiffness error $\sigma - \sigma_d$ [{STIFFNESS.unit(joint_type)}]"
-
-
-_FIGURES: dict[str, tuple[Any, ...]] = {
-    "position-error": ("q_error", [_position_error]),
-    "stiffness-error": ("stiffness_error", [_stiffness_error]),
-    "motor-torque": ("tau_motor_actual", MOTOR_LABELS),
-    "losses": ("dissipated_power_actual", [_loss_label]),
-    "motor-current": ("current_actual", _CURRENT_LABELS, "max_current"),
-    "motor-voltage": ("voltage_actual", _VOLTAGE_LABELS, "max_voltage"),
-}
-"""Variable, labels, and the limit if there is one."""
-
-
 def drawings_of(stored: StoredResult) -> Mapping[str, Drawing]:
     """The figures that a file of its kind has, by name."""
-    if isinstance(stored, StoredSimulation):
+    if stored.kind == "simulation":
         return simulation_drawings(lambda variable: bool(stored.existing(variable).any()))
     return result_drawings(stored.has)
 
 
-def plot_stored(stored: StoredResult) -> Figures:
-    """Draw the figures of a result or a simulation by name, all but the `omitted_figures`.
+def chosen_figures(stored: StoredResult, variables: Sequence[str] | None) -> list[str]:
+    """Names of the figures that can be drawn: those of these variables, or else those that files have.
 
     Raises:
-        InputError: nothing can be drawn from what is stored.
+        InputError: there is no curve of one of the variables, or of none if they are not asked for.
     """
-    drawings = drawings_of(stored)
-    names = drawable_figures(drawings, stored.variables, stored.path)
+    if variables is None:
+        return drawable_figures(drawings_of(stored), stored.variables, stored.path)
+    return [variable.name for variable in drawable_variables(stored, variables)]
+
+
+def plot_stored(stored: StoredResult, variables: Sequence[str] | None = None) -> Figures:
+    """Draw the figures of a result or a simulation by name, all but the `omitted_figures`.
+
+    Args:
+        stored: the open file, or an excerpt.
+        variables: names of those to draw instead, each in a figure that is called after it.
+
+    Raises:
+        InputError: nothing can be drawn from what is stored, or there is no curve of one of the variables.
+    """
+    names = chosen_figures(stored, variables)
     with house_style():
         failures = Failures.of(stored)
+        if variables is not None:
+            return {name: draw_variable(stored.declared[name], stored, failures) for name in names}
+        drawings = drawings_of(stored)
         return {name: drawings[name].draw(stored, failures) for name in names}

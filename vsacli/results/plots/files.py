@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
@@ -10,7 +9,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from vsacli.base.outputs import Outputs
-from vsacli.results.plots.drawing import house_style
+from vsacli.results.plots.styles import house_style
 
 FORMATS = ("png", "pdf", "svg")
 
@@ -76,7 +75,6 @@ def save_figures(
 
 def _rendered(figure: Figure, file_format: str) -> bytes:
     buffer = BytesIO()
-    with house_style(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # a name in letters that the font has not
+    with house_style():
         figure.savefig(buffer, format=file_format, metadata=_METADATA[file_format])
     return buffer.getvalue()

@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.envelopes import FULL_DETAIL, column_starts, kept_samples
-from vsacli.results.plots.drawing import draw_curve, house_style, line_handle, line_style
+from vsacli.results.curves import Curve
+from vsacli.results.plots.drawing import ZERO, draw_curve
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, joint_panels
+from vsacli.results.plots.styles import DIFFERENCE, house_style, line_handle, line_style
 
 MOST_ROWS = 8
 ROW_HEIGHT = 1.6
@@ -49,26 +51,23 @@ def measured_figure(curves: Sequence[MeasuredCurve], title: str) -> Figure:
         panels = joint_panels(
             figure.add_gridspec()[0], span, np.ones((len(curves), 2), dtype=bool), MOST_ROWS
         )
-        for curve, (over, apart) in zip(curves, panels, strict=True):
-            _draw(over, apart, curve)
         handles = [
             line_handle(line_style(index), name) for index, name in enumerate(("computed", "measured"))
         ]
+        for curve, (over, apart) in zip(curves, panels, strict=True):
+            handles += _draw(over, apart, curve)
         return complete(figure, title, handles)
 
 
-def _draw(over: Axes, apart: Axes, curve: MeasuredCurve) -> None:
+def _draw(over: Axes, apart: Axes, curve: MeasuredCurve) -> list[Artist]:
+    """Draw both panels of a signal; returns what a legend shows besides the lines."""
+    handles = []
     for index, values in ((1, curve.measured), (0, curve.computed)):
-        draw_curve(over, *_reduced(curve.time, values), index, line_style(index))
-    draw_curve(apart, *_reduced(curve.time, curve.measured - curve.computed), 1, line_style(1))
+        handles += draw_curve(over, Curve.reduced(curve.time, values), index, line_style(index))
+    apart.axhline(0.0, **ZERO)
+    difference = Curve.reduced(curve.time, curve.measured - curve.computed)
+    handles += draw_curve(apart, difference, 0, DIFFERENCE)
     add_title(over, curve.name)
     add_title(apart, f"difference, rms {curve.rms:.3g} {curve.unit}")
     over.set_ylabel(f"[{curve.unit}]")
-
-
-def _reduced(time: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What of a long curve can be seen."""
-    if time.size <= FULL_DETAIL:
-        return time, values
-    kept = kept_samples(values, column_starts(time))
-    return time[kept], values[kept]
+    return handles

@@ -1,10 +1,9 @@
-"""Panels, labels, legend and title of a figure, for any number of joints; those of one unit share panels."""
+"""Panels, legend and title of a figure, for any number of joints."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,20 +12,12 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
+from matplotlib.legend import Legend
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.units import TIME, TORQUE
-from vsacli.base.variables import MOTORS, deviation
-from vsacli.results.curves import Failures, read_curves
-from vsacli.results.plots.drawing import (
-    draw_bands,
-    draw_curve,
-    draw_limits,
-    draw_uncertainty,
-    line_handle,
-    line_style,
-    shortened,
-)
+from vsacli.base.units import TIME
+from vsacli.results.plots.letters import make_legible
+from vsacli.results.plots.styles import shortened
 from vsacli.results.store.reader import StoredResult
 
 PANEL_WIDTH = 3.0
@@ -35,8 +26,12 @@ PANEL_WIDTH = 3.0
 LATE = 1e5
 """First time, s, from which on ticks count from it: their digits would not fit side by side."""
 
+FINE, FEW_TICKS = 0.1, 4
+"""Length of a span, s, below which the digits of more than so many ticks would not fit side by side."""
+
 JOINTS_PER_PANEL = 7
-TITLE_LENGTH = 70
+TITLE_LENGTH, LABEL_BESIDE = 70, 16
+"""Characters of a title, and of a name beside a panel."""
 
 _INCHES_PER_CHARACTER = 0.07
 _INCHES_PER_HANDLE = 0.7
@@ -61,25 +56,35 @@ def folding(joints: int, most_rows: int) -> tuple[int, int]:
     return math.ceil(joints / folds), folds
 
 
-def joint_panels(place: SubplotSpec, time: FloatArray, present: BoolArray, most_rows: int) -> AxesGrid:
-    """Panels of each joint, (joints, columns), with a common time axis from column to column.
+def joint_panels(
+    place: SubplotSpec,
+    time: FloatArray,
+    present: BoolArray,
+    most_rows: int,
+    heights: Sequence[float] = (1.0,),
+) -> AxesGrid:
+    """Panels of each joint, (joints * heights, columns), with a common time axis in each column.
 
     Args:
         place: where they go.
         time: what the time axes span, ascending, s.
         present: (joints, columns), which panels there are, one joint below the other; others are removed.
         most_rows: joints below each other before the next begins beside them.
+        heights: of the panels that a joint has, one below the other, relative to each other.
     """
     joints, columns = present.shape
     rows, folds = folding(joints, most_rows)
-    grid = place.subgridspec(rows, folds * columns).subplots(squeeze=False)
-    panels = grid.reshape(rows, folds, columns).swapaxes(0, 1).reshape(-1, columns)
-    for unused in panels[joints:].flat:
+    each = len(heights)
+    places = place.subgridspec(rows * each, folds * columns, height_ratios=[*heights] * rows)
+    grid = places.subplots(squeeze=False).reshape(rows * each, folds, columns)
+    panels = grid.swapaxes(0, 1).reshape(-1, columns)
+    for unused in panels[joints * each :].flat:
         unused.remove()
-    for first in range(0, joints, rows):
-        fold = slice(first, min(first + rows, joints))
+    present = np.repeat(present, each, axis=0)
+    for first in range(0, len(present), rows * each):
+        fold = slice(first, min(first + rows * each, len(present)))
         share_time(panels[fold], present[fold], time)
-    return panels[:joints]
+    return panels[: joints * each]
 
 
 def share_time(panels: AxesGrid, present: BoolArray, time: FloatArray) -> None:
@@ -103,6 +108,8 @@ def _share_time(column: Sequence[Axes], time: FloatArray) -> None:
         column[-1].xaxis.set_major_formatter(lambda tick, _: f"{tick - whole:g}")
     if time[-1] > time[0]:
         column[-1].set_xlim(time[0], time[-1])
+        if time[-1] - time[0] < FINE:
+            column[-1].locator_params(axis="x", nbins=FEW_TICKS)
 
 
 def add_title(axes: Axes, title: str) -> None:
@@ -110,18 +117,31 @@ def add_title(axes: Axes, title: str) -> None:
     axes.set_title(shortened(title), loc="left", parse_math=False)
 
 
+def add_legend(axes: Axes, handles: Sequence[Artist]) -> None:
+    """Name these beside a panel, at its right."""
+    labels = [shortened(str(handle.get_label()), LABEL_BESIDE) for handle in handles]
+    legend = axes.legend(handles, labels, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    _take_literally(legend)
+
+
 def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
     """Add the title and, below all panels, one legend with each label once in as many columns as fit."""
     figure.suptitle(shortened(title, TITLE_LENGTH), fontsize=11, parse_math=False)
     by_label = {str(handle.get_label()): handle for handle in handles}
-    labels = [shortened(label) for label in by_label]
-    width = _INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * max(map(len, labels))
-    rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
-    columns = math.ceil(len(labels) / rows)
-    legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)
+    if by_label:
+        labels = [shortened(label) for label in by_label]
+        width = _INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * max(map(len, labels))
+        rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
+        columns = math.ceil(len(labels) / rows)
+        legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)
+        _take_literally(legend)
+    make_legible(figure)
+    return figure
+
+
+def _take_literally(legend: Legend) -> None:
     for text in legend.get_texts():
         text.set_parse_math(False)
-    return figure
 
 
 def result_title(result: StoredResult) -> str:
@@ -134,76 +154,3 @@ def missing_variables(figure: str, variables: Sequence[str]) -> str:
     """The sentence for a figure that cannot be drawn."""
     needed = " and ".join(variables)
     return f"figure {figure} needs {needed}, which this result was written without (--variables)"
-
-
-GROUP_HEIGHT = 2.3
-"""Inches."""
-
-Label = Callable[[str], str]
-"""Label of an axis for a type of joint."""
-
-
-def grouped_figure(
-    result: StoredResult, failures: Failures, name: str, labels: Sequence[Label], limit: str = ""
-) -> Figure:
-    """A figure of one variable that some joint has, with a column of panels for each of its curves.
-
-    Args:
-        result: the file.
-        failures: its steps that cannot be done.
-        name: of the variable.
-        labels: of the axes, for each curve.
-        limit: constant of the motors that bounds the size of the variable, if one does.
-    """
-    height = GROUP_HEIGHT * len(panel_groups(result.joint_types)) + 1
-    figure = Figure((2 * PANEL_WIDTH, height), layout="constrained")
-    handles = draw_groups(figure.add_gridspec()[0], result, failures, name, labels, limit)
-    return complete(figure, result_title(result), handles)
-
-
-def draw_groups(
-    place: SubplotSpec,
-    result: StoredResult,
-    failures: Failures,
-    name: str,
-    labels: Sequence[Label],
-    limit: str = "",
-) -> list[Artist]:
-    """Draw a variable, a row of panels for each group of joints that have it; returns what a legend shows."""
-    there = result.existing(result.declared[name])
-    drawn = np.flatnonzero(there.any(axis=0)).tolist()
-    groups = [group for group in panel_groups(result.joint_types) if there[group].any()]
-    bounds = result.motor_constant(limit) if limit else None
-    uncertain = deviation(name) in result.variables
-    joints = read_curves(result, [name, deviation(name)] if uncertain else [name])
-    panels = place.subgridspec(len(groups), len(drawn)).subplots(squeeze=False)
-    handles = [line_handle(line_style(joint), name) for joint, name in enumerate(result.joint_names)]
-    for group, row in zip(groups, panels, strict=True):
-        for curve, axes in zip(drawn, row, strict=True):
-            present = [joint for joint in group if there[joint, curve]]
-            for joint in present:
-                draw_curve(axes, joints[joint].time, joints[joint].values[curve], joint, line_style(joint))
-            for joint in present if uncertain else ():
-                curves, deviations = np.split(joints[joint].values, 2)
-                handles += draw_uncertainty(
-                    axes, joints[joint].time, curves[curve], deviations[curve], line_style(joint)
-                )
-            if bounds is not None:
-                handles += draw_limits(axes, {joint: bounds[joint, curve] for joint in present})
-            handles += draw_bands(axes, failures.time, *failures.among(group))
-            axes.set_ylabel(labels[curve](result.joint_types[group[0]]))
-    share_time(panels, np.array([there[group][:, drawn].any(axis=0) for group in groups]), failures.time)
-    return handles
-
-
-def force(joint_type: str) -> str:
-    """What a joint of this type is moved by."""
-    return "torque" if joint_type == "revolute" else "force"
-
-
-def _motor_label(motor: int, joint_type: str) -> str:
-    return rf"motor {force(joint_type)} $\tau_{motor}$ [{TORQUE.unit(joint_type)}]"
-
-
-MOTOR_LABELS: tuple[Label, ...] = tuple(partial(_motor_label, motor) for motor in MOTORS)
-"""Of the axes for the torques, or forces, of the motors."""

@@ -13,8 +13,10 @@ from matplotlib.patches import Patch
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import TORQUE
 from vsacli.base.variables import MOTORS
-from vsacli.results.plots.drawing import draw_curve, draw_uncertainty, house_style, line_handle, line_style
+from vsacli.results.curves import Curve
+from vsacli.results.plots.drawing import draw_curve, draw_uncertainty
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, joint_panels
+from vsacli.results.plots.styles import house_style, line_handle, line_style
 
 MOST_ROWS = 7
 ROW_HEIGHT, BAR_HEIGHT = 1.6, 0.28
@@ -72,7 +74,7 @@ def band_figure(time: FloatArray, torques: Sequence[Torque], title: str) -> Figu
         handles = [line_handle(line_style(0), "computed")]
         for torque in torques:
             axes = panels[joints.index(torque.joint)][torque.motor - 1]
-            draw_curve(axes, time, torque.values, 0, line_style(0))
+            handles += draw_curve(axes, Curve(time, torque.values), 0, line_style(0))
             handles += draw_uncertainty(axes, time, torque.values, torque.deviation, line_style(1))
             _show_all(axes, torque)
             add_title(axes, f"{torque.joint}, motor {torque.motor}")

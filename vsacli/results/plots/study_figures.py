@@ -13,8 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.plots.drawing import house_style, line_handle, line_style, shortened
+from vsacli.results.plots.drawing import ZERO
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete
+from vsacli.results.plots.styles import house_style, line_handle, line_style, shortened
 from vsacli.results.store.stored_study import StoredStudy
 from vsacli.results.study_points import StudyPoints
 
@@ -64,7 +65,7 @@ def _over_numbers(points: StudyPoints) -> Figure:
     panels = figure.subplots(rows, len(paths), squeeze=False, sharex="col", sharey="row")
     for column, path in zip(panels.T, paths, strict=True):
         _scatter(column[0], points, points.varying[path], 100 * points.margin)
-        column[0].axhline(0.0, color="0.4", linewidth=0.8)
+        column[0].axhline(0.0, **ZERO)
         _name_worst(column[0], points, points.varying[path])
         if points.cost is not None:
             _scatter(column[1], points, points.varying[path], points.cost[1])
@@ -170,7 +171,7 @@ def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str]) -> Figur
         style = replace(line_style(index), marker="").words
         axes.step(100 * margins, 100 * shares, where="pre", **style)
         handles.append(Line2D([], [], **style, label=_share(points, label)))
-    axes.axvline(0.0, color="0.4", linewidth=0.8)
+    axes.axvline(0.0, **ZERO)
     axes.set_xlabel("smallest margin [%]")
     axes.set_ylabel("runs with at least this margin [%]")
     axes.set_ylim(0, 103)

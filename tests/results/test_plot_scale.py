@@ -1,0 +1,108 @@
+"""What sets the scale of a panel: limits in sight do, peaks of nearly singular steps do not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from samples.figures import Result, rest_to_rest
+
+from vsacli.base.flags import Flag
+from vsacli.results.plots import compare_files, plot_stored
+
+
+def legend(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def limit_lines(axes: Axes) -> list[float]:
+    return sorted(line.get_ydata()[0] for line in axes.lines if len(line.get_xdata()) == 2)
+
+
+def peaked(peak: float = 1e4, flags: int = Flag.NEAR_SINGULAR) -> Result:
+    """A motion with a peak of the base's first motor at 1 s, flagged for a tenth of a second."""
+    result = rest_to_rest(401)
+    result.read("tau_motor")[95:105, 0, 0] = peak * np.exp(-((np.arange(10) - 5.0) ** 2))
+    result.read("flags")[95:105, 0] = flags
+    return result
+
+
+def test_a_near_singular_peak_is_cut_off_and_its_height_is_written() -> None:
+    figure = plot_stored(peaked())["motor-torque"]
+    first, second = figure.axes
+    calm = np.delete(peaked().read("tau_motor")[..., 0], np.s_[95:105], axis=0)
+    low, high = first.get_ylim()
+    assert low < calm.min() < calm.max() < high < 1.2 * calm.max()
+    assert [text.get_text() for text in first.texts] == ["10000"]
+    assert not second.texts
+    (mark,) = (line for line in first.lines if line.get_marker() == "^")
+    assert mark.get_xdata() == [1.0]
+    assert legend(figure)[-1] == "cut off, near-singular"
+
+
+def test_peaks_downwards_are_marked_below() -> None:
+    first = plot_stored(peaked(-1e4))["motor-torque"].axes[0]
+    assert [text.get_text() for text in first.texts] == ["-10000"]
+    assert [line.get_marker() for line in first.lines].count("v") == 1
+
+
+@pytest.mark.parametrize(
+    ("peak", "flags"), [(1e4, 0), (1e4, Flag.MOTOR_TORQUE_LIMIT), (90.0, Flag.NEAR_SINGULAR)]
+)
+def test_other_peaks_are_shown_whole(peak: float, flags: int) -> None:
+    figure = plot_stored(peaked(peak, flags))["motor-torque"]
+    assert figure.axes[0].get_ylim()[1] > peak
+    assert "cut off, near-singular" not in legend(figure)
+
+
+def test_a_run_that_is_near_singular_throughout_is_shown_whole() -> None:
+    result = peaked()
+    result.read("flags")[:] = Flag.NEAR_SINGULAR
+    assert plot_stored(result)["motor-torque"].axes[0].get_ylim()[1] > 1e4
+
+
+def test_what_does_not_grow_near_singular_steps_is_shown_whole() -> None:
+    result = rest_to_rest(401)
+    result.read("flags")[10:, :] = Flag.NEAR_SINGULAR
+    low, high = plot_stored(result)["motion"].axes[0].get_ylim()
+    assert low < -1.0
+    assert high > 1.5
+
+
+def test_a_comparison_cuts_off_peaks_and_those_of_the_differences() -> None:
+    figure = compare_files([peaked(), rest_to_rest(401)])["compare"]
+    over, apart = figure.axes[0], figure.axes[2]
+    assert over.get_ylim()[1] < 200
+    assert apart.get_ylim()[0] > -10
+    peak = rest_to_rest(401).read("tau_motor")[100, 0, 0] - 1e4
+    assert apart.texts[0].get_text() == f"{peak:.0f}"
+
+
+def test_limits_in_sight_are_drawn_and_within_the_panel() -> None:
+    result = rest_to_rest(401)
+    result.bounds["tau_motor"] = np.tile([-120.0, 120.0], (3, 2, 1))
+    result.bounds["q"] = np.array([[[-np.inf, 1.6]], [[-40.0, 40.0]], [[np.nan, np.nan]]])
+    figures = plot_stored(result)
+    first, second = figures["motor-torque"].axes
+    assert limit_lines(first) == [120.0] * 3
+    assert first.get_ylim()[1] > 120
+    assert limit_lines(second) == [-120.0] * 3
+    assert limit_lines(figures["motion"].axes[0]) == [1.6]
+    assert "limit" in legend(figures["motion"])
+
+
+def test_limits_far_off_do_not_flatten_curves() -> None:
+    result = rest_to_rest(401)
+    before = plot_stored(result)["motor-torque"].axes[0].get_ylim()
+    result.bounds["tau_motor"] = np.tile([-1000.0, 1000.0], (3, 2, 1))
+    figure = plot_stored(result)["motor-torque"]
+    assert figure.axes[0].get_ylim() == before
+    assert "limit" not in legend(figure)
+
+
+def test_limits_of_the_stiffness_are_drawn_in_its_corridor() -> None:
+    result = rest_to_rest(401)
+    result.bounds["stiffness"] = np.array([[[810.0, 1300.0]]] * 3)
+    base = plot_stored(result)["motion"].axes[1]
+    assert limit_lines(base) == [810.0, 1300.0]

@@ -1,0 +1,95 @@
+"""A part of a result or simulation: some of its joints, over a stretch of time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.units import time_text
+from vsacli.base.variables import OF_ANY_ROBOT, Variable
+from vsacli.results.store.reader import StoredResult
+
+Span = tuple[float, float]
+"""First and last time of a stretch, both included, s."""
+
+WHOLE: Span = (-math.inf, math.inf)
+
+
+class Excerpt(StoredResult):
+    """Some joints of an open file over a stretch of time, read as if the file held nothing else.
+
+    Args:
+        whole: the open file, which has to stay open.
+        joints: names, base to tip whatever their order here; all if there are none.
+        span: the stretch of time.
+
+    Raises:
+        InputError: a joint is not one of the file's, or no step lies in the stretch.
+    """
+
+    def __init__(self, whole: StoredResult, joints: Sequence[str] = (), span: Span = WHOLE) -> None:
+        vars(self).update(vars(whole))  # all but what follows is that of the whole file
+        self.kind, self.command, self.declared = whole.kind, whole.command, whole.declared
+        self._original, self._steps, self._joints = whole, _steps(whole, span), _numbers(whole, joints)
+        self.time = whole.time[self._steps]
+        self.samples = self.time.size
+        self.complete = whole.complete or self._steps.stop < whole.samples
+        self.joint_names, self.joint_types, self.actuators = (
+            tuple(labels[joint] for joint in self._joints)
+            for labels in (whole.joint_names, whole.joint_types, whole.actuators)
+        )
+
+    def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
+        """Steps start..stop-1 of the stretch; see `StoredResult.read`."""
+        first = self._steps.start
+        end = self.samples if stop is None else min(stop, self.samples)
+        values = self._original.read(name, first + start, first + end)
+        return values[:, self._joints] if "joint" in self.declared[name].dims else values
+
+    def motor_constant(self, name: str) -> FloatArray:
+        """As of the whole file, of these joints."""
+        return self._original.motor_constant(name)[self._joints]
+
+    def limits(self, name: str) -> FloatArray:
+        """As of the whole file, of these joints."""
+        return self._original.limits(name)[self._joints]
+
+    def existing(self, variable: Variable) -> BoolArray:
+        """As of the whole file, of these joints."""
+        return self._original.existing(variable)[self._joints]
+
+    def has(self, variable: Variable) -> bool:
+        """Whether the variable is one of these joints, as far as that depends on the robot file."""
+        one_of_them = variable.requires in OF_ANY_ROBOT or bool(self.existing(variable).any())
+        return one_of_them and super().has(variable)
+
+
+def _steps(whole: StoredResult, span: Span) -> slice:
+    """The steps in a stretch of time."""
+    time, (first, last) = whole.time, span
+    start, stop = np.searchsorted(time, first), np.searchsorted(time, last, side="right")
+    if start >= stop:
+        steps = f"{whole.samples} steps go {_words((float(time[0]), float(time[-1])))}"
+        raise InputError.one(f"has no step {_words(span)}; its {steps}", whole.path)
+    return slice(int(start), int(stop))
+
+
+def _words(span: Span) -> str:
+    ends = zip(("from", "to"), span, strict=True)
+    return " ".join(f"{word} {time_text(time)}" for word, time in ends if not math.isinf(time))
+
+
+def _numbers(whole: StoredResult, joints: Sequence[str]) -> list[int]:
+    """Numbers of the joints, ascending."""
+    unknown = [name for name in joints if name not in whole.joint_names]
+    if unknown:
+        raise InputError(
+            Problem(str(whole.path), 0, f"has no joint {name!r}{did_you_mean(name, whole.joint_names)}")
+            for name in unknown
+        )
+    return [number for number, name in enumerate(whole.joint_names) if not joints or name in joints]
