@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 PROGRESS_FROM = 100_000
 """Steps from which on a run is long enough for a progress bar."""
 
+LOOKING_FROM = 20_000_000
+"""Bytes of a recording from which on looking at them takes longer than a second."""
+
 WRITING_FROM = 2_000_000
 """Samples from which on writing them takes longer than a second, as CSV."""
 
@@ -122,6 +125,10 @@ class Talk:
     def fitting(self, samples: int) -> AbstractContextManager[Any]:
         """The same over the samples of all components that splines are fitted to."""
         return self.progress(samples, label="fitting")
+
+    def looking(self, size: int) -> AbstractContextManager[Any]:
+        """The same over the bytes of a recording that is looked at."""
+        return self.progress(size, shown_from=LOOKING_FROM, label="looking")
 
     def writing(self, samples: int) -> AbstractContextManager[Any]:
         """The same over the samples of all variables that are written."""

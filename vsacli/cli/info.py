@@ -21,7 +21,9 @@ from vsacli.cli.file_names import FILE, FOLDER
     epilog=example("vsacli info robots/vsa_3r.yaml --field joints.elbow.static_load.torque"),
 )
 @click.argument("file", type=FILE, required=False)
-@click.option("--robot", metavar="ROBOT", type=FILE, help="The robot that a trajectory is for.")
+@click.option(
+    "--robot", metavar="ROBOT", type=FILE, help="The robot that a trajectory is for, or a recording of."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 @click.option(
     "--field",
@@ -48,10 +50,12 @@ def info(
     clear: bool,
     talk: Talk,
 ) -> None:
-    """Show what a FILE holds: a robot, a trajectory, a result or a simulation.
+    """Show what a FILE holds: a robot, a trajectory, a recording, a result or a simulation.
 
     Of a robot, Denavit-Hartenberg rows, links, actuators, reach, static load and reachable stiffness; of a
-    trajectory, ranges and peaks; of a result or a simulation, provenance, variables and report; of the table
+    trajectory, ranges and peaks; of a recording, a CSV file of any columns, these, its rate, what a sensor or
+    a log file spoiled, and a trajectory file to begin with (--field trajectory, or --field mapping for
+    --columns of other commands); of a result or a simulation, provenance, variables and report; of the table
     of a study, what it found, provenance and what varies.
 
     With --cache, show where compiled code is kept and how much of it, and what interrupted commands have
@@ -69,7 +73,7 @@ def info(
     else:
         from vsacli.files.info import describe_file
 
-        _show(describe_file(file, robot), as_json, field)
+        _show(describe_file(file, robot, talk.looking), as_json, field)
 
 
 def _show(description: dict[str, Any], as_json: bool, field: str | None) -> None:

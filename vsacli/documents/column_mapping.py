@@ -110,9 +110,10 @@ class ColumnMapping:
         return bool(self.columns or self.ignore)
 
     @property
-    def by_number(self) -> bool:
-        """Whether all columns are given by their numbers, so that no header is needed."""
-        return bool(self.columns) and all(isinstance(each.column, int) for each in self.columns.values())
+    def numbers(self) -> tuple[int, ...]:
+        """The numbers of the columns if all are given so, and no header is needed; else nothing."""
+        numbers = tuple(each.column for each in self.columns.values() if isinstance(each.column, int))
+        return numbers if len(numbers) == len(self.columns) else ()
 
     def applied(self, header: Header, known: Collection[str] | None, file: str) -> ChosenColumns:
         """The columns of a table to read.

@@ -124,7 +124,7 @@ def read_table(
     check_input_file(name, MAX_BYTES)
     try:
         with open(place_of(name), "rb") as content:
-            header = header_of(content, name, strict=not mapping, numbered=mapping.by_number)
+            header = header_of(content, name, strict=not mapping, numbered=mapping.numbers)
             digest, text = _survey(content, name)
         chosen = mapping.applied(header, known, name)
         values, first_stamp = _values(name, header, chosen, empty_cells)

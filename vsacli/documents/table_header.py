@@ -7,7 +7,7 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from io import TextIOWrapper
 from typing import BinaryIO, NamedTuple
 
@@ -52,8 +52,8 @@ def split_heading(text: str) -> tuple[str, str | None]:
     return match["name"], match["unit"]
 
 
-def read_header(path: str | os.PathLike[str]) -> Header:
-    """The header of a CSV file, whatever its columns are called.
+def read_header(path: str | os.PathLike[str], numbered: Sequence[int] = ()) -> Header:
+    """The header of a CSV file, whatever its columns are called; `numbered` as of `header_of`.
 
     Raises:
         InputError: the file cannot be read, or does not begin as a table does.
@@ -62,19 +62,19 @@ def read_header(path: str | os.PathLike[str]) -> Header:
     check_input_file(name, MAX_BYTES)
     try:
         with open(place_of(name), "rb") as content:
-            return header_of(content, name, strict=False)
+            return header_of(content, name, strict=False, numbered=numbered)
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
 
 
-def header_of(content: BinaryIO, name: str, *, strict: bool = True, numbered: bool = False) -> Header:
+def header_of(content: BinaryIO, name: str, *, strict: bool = True, numbered: Sequence[int] = ()) -> Header:
     """The header of a table.
 
     Args:
         content: the file, read from its beginning.
         name: its path, for messages.
         strict: whether each column must have a name of its own.
-        numbered: whether the first line may be a row, since columns are known by their numbers.
+        numbered: numbers of columns, from 1, that need no name: if all hold numbers, the line is a row.
 
     Raises:
         InputError: with everything that is wrong with the line.
@@ -89,7 +89,8 @@ def header_of(content: BinaryIO, name: str, *, strict: bool = True, numbered: bo
     bare = _QUOTED.sub("", text)
     separator = next((mark for mark in SEPARATORS if mark in bare), SEPARATORS[-1])
     columns = tuple(cell.strip() for cell in cells_of(text.rstrip("\r\n"), separator))
-    if numbered and any(map(is_number, columns)):
+    numbers = [is_number(cell.replace(",", "," if separator == "," else ".")) for cell in columns]
+    if numbered and all(numbers[place - 1] for place in numbered if place <= len(columns)):
         return Header(0, separator, ("",) * len(columns))
     number = number if line else 1
     problems = [Problem(name, number, message) for message in _problems(line, columns, comment, strict)]

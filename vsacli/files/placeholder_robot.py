@@ -27,6 +27,9 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
 MOST_JOINTS = 1000
+NUMBERED = (1,)
+"""Of columns that a header need not name: a first line that begins with a number is none."""
+
 _POSITION_SUFFIX, _STIFFNESS_SUFFIX, _DAMPING_SUFFIX = ".q", ".stiffness", ".damping"
 
 
@@ -53,7 +56,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
         InputError: the file, or a CSV file that it names, cannot be read.
     """
     if is_table(path):
-        columns = read_header(path).columns
+        columns = read_header(path, NUMBERED).columns
         names = _of_columns(columns) or _numbered(1)
         stiffened = _of_suffix(columns, _STIFFNESS_SUFFIX, names) or tuple(names)
         damped = _of_suffix(columns, _DAMPING_SUFFIX, names)
@@ -63,7 +66,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     columns = tuple(
         column
         for file, mapped in _tables(root).items()
-        for column in (*mapped, *read_header(folder / file).columns)
+        for column in (*mapped, *read_header(folder / file, NUMBERED).columns)
     )
     positions, stiffnesses, dampings = (
         [node for quantity, node in survey if quantity == wanted]

@@ -184,6 +184,11 @@ def _stiffness(robot: Robot) -> Values:
     }
 
 
+def first_stiffnesses(robot: Robot) -> dict[str, float]:
+    """For each joint whose stiffness is commanded one that it can have while it carries its load."""
+    return dict(_stiffness(robot).get("start", {}))
+
+
 def _stiffnesses(joint: Joint, load: float, q: float) -> tuple[float, float]:
     """Two that are reachable while the joint carries its load at q; if none is, while it carries nothing."""
     ranges = stiffness_ranges(joint, load, q)

@@ -10,6 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import json_value
+from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import orders_of_derivation
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
@@ -27,12 +28,13 @@ from vsacli.trajectory.trajectory import Trajectory
 BLOCK_SAMPLES = 8192
 
 
-def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
-    """What a robot, trajectory, result or simulation file holds, as JSON values in SI units.
+def describe_file(path: str, robot_path: str | None = None, progress: Progress = unseen) -> dict[str, Any]:
+    """What a robot, trajectory, recording, result or simulation file holds, as JSON values in SI units.
 
     Args:
         path: the file.
-        robot_path: the robot that a trajectory is for, if its joints shall have their names.
+        robot_path: the robot that a trajectory is for, or a recording of, whose names its joints shall have.
+        progress: opens a bar over the bytes of a recording that are looked at.
 
     Raises:
         InputError: the file is of another kind, or cannot be used.
@@ -40,8 +42,10 @@ def describe_file(path: str, robot_path: str | None = None) -> dict[str, Any]:
     match recognise(path):
         case FileKind.ROBOT:
             return describe_robot(load_robot(path))
-        case FileKind.TRAJECTORY | FileKind.TABLE:
+        case FileKind.TRAJECTORY:
             return _described_trajectory(path, robot_path)
+        case FileKind.TABLE:
+            return _described_table(path, robot_path, progress)
         case FileKind.RESULT | FileKind.SIMULATION:
             with open_stored(path) as result:
                 return describe_result(result)
@@ -59,6 +63,16 @@ def described_value(description: dict[str, Any], field: str) -> Any:
         InputError: nothing is there; says what is, and the nearest name.
     """
     return find(json_value(description), field)
+
+
+def _described_table(path: str, robot_path: str | None, progress: Progress) -> dict[str, Any]:
+    """A CSV file: a trajectory if its columns have the names for it, else a recording."""
+    from vsacli.files.recordings import describe_recording, is_trajectory
+
+    robot = None if robot_path is None else load_robot(robot_path)
+    if is_trajectory(path, robot or placeholder_robot(path).robot):
+        return _described_trajectory(path, robot_path)
+    return describe_recording(path, robot, progress)
 
 
 def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:

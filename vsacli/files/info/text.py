@@ -11,6 +11,7 @@ from vsacli.base.signals import COMMANDED
 from vsacli.base.tables import aligned
 from vsacli.base.units import DAMPING, POSITION, STIFFNESS, TORQUE
 from vsacli.documents.changes import written
+from vsacli.files import recordings
 from vsacli.files.info.study_info import KIND, study_lines
 from vsacli.files.stored_reports import stored_report
 
@@ -210,4 +211,5 @@ _RENDERERS: dict[str, Callable[[Description], Iterator[str]]] = {
     "simulation": _result,
     "cache": _cache,
     KIND: study_lines,
+    recordings.KIND: recordings.recording_lines,
 }

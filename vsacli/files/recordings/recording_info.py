@@ -1,0 +1,240 @@
+"""What a CSV file from elsewhere holds, as JSON values: columns, rate, health, a mapping to begin with."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.errors import InputError
+from vsacli.base.progress import Progress, unseen
+from vsacli.base.signals import STIFFNESS
+from vsacli.base.texts import for_yaml
+from vsacli.base.unit_expressions import conversion_factor
+from vsacli.documents.column_mapping import REST, TIME, ColumnMapping, MappedColumn
+from vsacli.documents.columns_file import FORMAT
+from vsacli.documents.table import Table, read_table
+from vsacli.documents.table_header import read_header, split_heading
+from vsacli.files.recordings.first_rows import FirstRows, read_first_rows
+from vsacli.files.recordings.guesses import TAKEN, Guess, guesses
+from vsacli.files.recordings.mapping_text import mapping_lines
+from vsacli.files.recordings.times import TimeColumn, time_column
+from vsacli.robot.commanded_joints import CommandedJoints
+from vsacli.robot.model import Robot
+from vsacli.trajectory import file as trajectory_file
+from vsacli.trajectory.recorded.columns import column_layout
+from vsacli.trajectory.recorded.even_stamps import elapsed_times
+from vsacli.trajectory.recorded.health import column_faults
+from vsacli.trajectory.recorded.recording import NEEDED
+from vsacli.trajectory.recorded.stamps import stamp_faults
+
+TOGETHER = 16
+"""Columns that are read at a time: a million rows of them take 128 MB, however wide the table is."""
+
+AS_WRITTEN = "-"
+"""In place of a unit: numbers are shown as they stand."""
+
+FEWEST_ROWS = 10
+"""Numbers of a column below which nothing is said of its health."""
+
+
+def describe_recording(
+    path: str | os.PathLike[str], robot: Robot | None = None, progress: Progress = unseen
+) -> dict[str, Any]:
+    """What a CSV file holds, whatever its columns are called, as JSON values.
+
+    Args:
+        path: the file.
+        robot: that was recorded, to whose joints columns are assigned.
+        progress: opens a bar over the numbers that are looked at.
+
+    Raises:
+        InputError: it is no table.
+    """
+    rows = read_first_rows(path)
+    joint_names = robot.joint_names if robot else ()
+    time = time_column(rows)
+    found = guesses(rows, time, joint_names)
+    surveyed = _Survey(rows, time, found, progress)
+    taken = [guess for guess in found if guess.quantity in TAKEN]
+    stamps = {time.place, time.nanoseconds} - {None} if time else set()
+    leaves_out = len(stamps | {guess.place for guess in taken}) < len(rows.columns)
+    lines = list(mapping_lines(time, found, joint_names, leaves_out))
+    return {
+        "kind": "recording",
+        "name": Path(path).name,
+        "rows": surveyed.rows,
+        "time": surveyed.time,
+        "columns": surveyed.columns,
+        "warnings": surveyed.warnings,
+        "mapping": "\n".join([f"format: {FORMAT}", *lines]),
+        "trajectory": "\n".join(_trajectory(Path(path).name, lines, taken, robot)),
+    }
+
+
+def _trajectory(
+    file: str, mapping: Sequence[str], taken: Sequence[Guess], robot: Robot | None
+) -> Iterator[str]:
+    """A trajectory file that takes the positions from the recording."""
+    yield f"format: {trajectory_file.FORMAT}"
+    yield "name: recorded"
+    yield "position:"
+    yield "  type: csv"
+    yield f"  file: {for_yaml(file)}"
+    yield from (f"  {line}" for line in mapping)
+    if any(guess.quantity == STIFFNESS.key for guess in taken):
+        yield f"stiffness: {{type: csv, file: {for_yaml(file)}}}"
+        return
+    stiffnesses = {}
+    if robot is not None:
+        from vsacli.files.templates import first_stiffnesses
+
+        stiffnesses = first_stiffnesses(robot)
+    if stiffnesses:
+        values = ", ".join(f"{name}: {value:g}" for name, value in stiffnesses.items())
+        yield f"stiffness: {{type: constant, value: {{{values}}}}}  # to begin with; choose yours"
+    elif robot is None:
+        yield "# stiffness: {type: constant, value: ...}  # N m/rad, of joints of variable stiffness"
+
+
+class _Survey:
+    """All rows of the columns of numbers, a few columns at a time.
+
+    Attributes:
+        rows: how many there are.
+        time: what is known of the stamps; None without any.
+        columns: what is known of each.
+        warnings: on their health.
+    """
+
+    def __init__(
+        self, rows: FirstRows, time: TimeColumn | None, found: Sequence[Guess], progress: Progress
+    ) -> None:
+        self._rows, self._time = rows, time
+        self._guesses = {guess.place: guess for guess in found}
+        self.rows = 0
+        self.time: dict[str, Any] | None = None
+        self.warnings: list[str] = []
+        stamps = () if time is None else (time.place, time.nanoseconds)
+        numbers = [place for place in rows.of_numbers if place not in stamps]
+        numbers.sort(key=lambda place: place not in self._guesses)
+        self.columns = [self._unread(place) for place in range(len(rows.columns))]
+        size = os.path.getsize(rows.path) if rows.path != "-" else 0
+        with progress(size) as bar:
+            for first in range(0, max(1, len(numbers)), TOGETHER):
+                part = numbers[first : first + TOGETHER]
+                self._look(part, self._read(part))
+                bar.update(size * len(part) // max(1, len(numbers)))
+
+    def _unread(self, place: int) -> dict[str, Any]:
+        filled = self._rows.filled(place)
+        kind = "text" if filled else "nothing"
+        if self._time is not None and place in (self._time.place, self._time.nanoseconds):
+            kind = "time"
+        return {
+            "number": place + 1,
+            "name": self._rows.columns[place],
+            "holds": kind,
+            "first": filled[0] if filled else None,
+            "min": math.nan,
+            "max": math.nan,
+            "rows": None,
+        }
+
+    def _read(self, places: Sequence[int]) -> Table:
+        columns = {str(place): MappedColumn(column=place + 1, unit=AS_WRITTEN) for place in places}
+        if self._time is not None:
+            rest = self._time.nanoseconds
+            unit = self._time.source.unit or ("s" if rest is None else None)
+            at = None if rest is None else rest + 1
+            columns[TIME] = MappedColumn(column=self._time.place + 1, unit=unit, nanoseconds=at)
+        return read_table(self._rows.path, ColumnMapping(columns, REST), set(columns), empty_cells=True)
+
+    def _look(self, places: Sequence[int], table: Table) -> None:
+        self.rows = len(table.values)
+        headings = [split_heading(heading)[0] for heading in table.columns]
+        shown = next((place for place in places if place in self._guesses), None)
+        stamps = self._stamps(table, None if shown is None else headings.index(str(shown)))
+        for place in places:
+            values = table.values[:, headings.index(str(place))]
+            there = np.isfinite(values)
+            described = self.columns[place]
+            described |= {
+                "holds": "numbers",
+                "min": float(values[there].min(initial=math.inf)) if there.any() else math.nan,
+                "max": float(values[there].max(initial=-math.inf)) if there.any() else math.nan,
+                "rows": int(np.count_nonzero(there)),
+            }
+            if stamps is not None and np.count_nonzero(there) >= FEWEST_ROWS and not _counts(values[there]):
+                self._judge(place, stamps[there], values[there], table, np.flatnonzero(there))
+
+    def _stamps(self, table: Table, signal: int | None) -> FloatArray | None:
+        """Times of the rows, s; None if they do not increase.
+
+        Described at the first look, in the rows in which a signal has numbers: others are of another topic.
+        """
+        at = next((i for i, name in enumerate(table.columns) if split_heading(name)[0] == TIME), None)
+        if at is None or self._time is None:
+            return None
+        unit = split_heading(table.columns[at])[1] or "s"
+        stamps = table.values[:, at] * conversion_factor(unit, "s")
+        rising = bool(np.all(np.diff(stamps) > 0))
+        if self.time is None:
+            own = stamps if signal is None else stamps[np.isfinite(table.values[:, signal])]
+            self.time = self._described(own, unit, table.first_stamp)
+            file = Path(self._rows.path).name
+            if rising and len(own) > 1:
+                self.warnings += [f"{file}: time {fault.message}" for fault in stamp_faults(own)]
+            elif len(stamps) > 1:
+                row = int(np.argmin(np.diff(stamps) > 0)) + 1
+                self.warnings.append(
+                    f"{file}:{table.line_of(row)}: the time does not increase: {stamps[row]:.9g} s follows "
+                    f"{stamps[row - 1]:.9g} s; records must be in order, and no stamp twice"
+                )
+        return stamps if rising else None
+
+    def _described(self, stamps: FloatArray, unit: str, first_stamp: int | None) -> dict[str, Any]:
+        assert self._time is not None, "see _stamps"
+        steps = np.diff(stamps) if len(stamps) > 1 else np.array([math.nan])
+        duration = float(stamps[-1] - stamps[0])
+        return {
+            "column": self._rows.columns[self._time.place] or self._time.place + 1,
+            "unit": unit,
+            "first": float(stamps[0]) if first_stamp is None else first_stamp,
+            "duration": duration,
+            "rate": 1 / float(np.median(steps)) if np.median(steps) > 0 else math.nan,
+            "step": {
+                "min": float(steps.min()),
+                "median": float(np.median(steps)),
+                "max": float(steps.max()),
+            },
+        }
+
+    def _judge(
+        self, place: int, stamps: FloatArray, values: FloatArray, table: Table, rows: IndexArray
+    ) -> None:
+        guess = self._guesses.get(place)
+        angle = guess is not None and guess.quantity == "q"
+        name = self._rows.columns[place] or f"column {place + 1}"
+        for first, sentence in column_faults(stamps, elapsed_times(stamps), values, angle=angle):
+            line = table.line_of(int(rows[first]))
+            self.warnings.append(f"{Path(self._rows.path).name}:{line}: {name} {sentence}")
+
+
+def _counts(values: FloatArray) -> bool:
+    """Whether these are whole numbers that never fall, as of a counter: no signal of a sensor."""
+    return bool(np.all(values == np.round(values)) and np.all(np.diff(values) >= 0))
+
+
+def is_trajectory(path: str, robot: Robot) -> bool:
+    """Whether the columns of a CSV file are, by their names, a trajectory of a robot."""
+    try:
+        column_layout(read_header(path).columns, CommandedJoints.of(robot), NEEDED, path)
+    except InputError:
+        return False
+    return True
