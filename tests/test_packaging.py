@@ -1,4 +1,4 @@
-"""The wheel holds the package, its type marker and the examples, and nothing else."""
+"""What is released: a wheel, the source that makes the same wheel, and a recipe that says the same."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ import os
 import re
 import subprocess
 import sys
+import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from samples.command_line import contents
 
 import vsacli
@@ -19,14 +22,34 @@ import vsacli
 REPOSITORY = Path(__file__).parents[1]
 
 
+def built(target: str, tree: Path, folder: Path) -> Path:
+    """A wheel or a source distribution of a tree, built without network."""
+    build = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(folder)]
+    subprocess.run(build, cwd=tree, check=True, capture_output=True)
+    [path] = folder.iterdir()
+    return path
+
+
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.Path:
-    """The wheel of this tree, built without network."""
-    folder = tmp_path_factory.mktemp("wheel")
-    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
-    subprocess.run(build, cwd=REPOSITORY, check=True, capture_output=True)
-    [path] = folder.glob("*.whl")
-    return zipfile.Path(path)
+def wheel_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built("wheel", REPOSITORY, tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture
+def wheel(wheel_file: Path) -> zipfile.Path:
+    """The wheel of this tree."""
+    return zipfile.Path(wheel_file)
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The source distribution of this tree, unpacked."""
+    path = built("sdist", REPOSITORY, tmp_path_factory.mktemp("sdist"))
+    folder = tmp_path_factory.mktemp("unpacked")
+    with tarfile.open(path) as archive:
+        archive.extractall(folder, filter="data")
+    [tree] = folder.iterdir()
+    return tree
 
 
 def files_below(folder: Path, pattern: str) -> set[str]:
@@ -93,6 +116,44 @@ def test_the_readme_is_the_description(wheel: zipfile.Path) -> None:
     [metadata] = [name for name in wheel.root.namelist() if name.endswith(".dist-info/METADATA")]
     text = wheel.root.read(metadata).decode("utf-8")
     assert (REPOSITORY / "README.md").read_text(encoding="utf-8") in text
+
+
+@pytest.mark.slow
+def test_the_source_holds_what_a_clone_does_and_nothing_that_was_made(source: Path) -> None:
+    found = {path.relative_to(source).parts[0] for path in source.iterdir()}
+    folders = {"docs", "robots", "tests", "trajectories", "vsacli"}
+    assert found == folders | {".gitignore", "PKG-INFO", "README.md", "pyproject.toml"}
+    for folder in folders:
+        there = contents(REPOSITORY / folder).items()
+        assert contents(source / folder) == {name: text for name, text in there if "__pycache__" not in name}
+
+
+@pytest.mark.slow
+def test_the_source_makes_the_same_wheel(source: Path, wheel_file: Path, tmp_path: Path) -> None:
+    assert built("wheel", source, tmp_path).read_bytes() == wheel_file.read_bytes()
+
+
+def test_the_conda_recipe_says_what_the_project_says() -> None:
+    recipe = yaml.safe_load((REPOSITORY / "docs" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
+    configuration = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
+    project = configuration["project"]
+    context = recipe["context"]
+    assert context == {"version": vsacli.__version__, "python_min": project["requires-python"].strip(">=")}
+    required = {f"python >={context['python_min']}", *map(conda_name, project["dependencies"])}
+    assert {
+        each.replace("${{ python_min }}", context["python_min"]) for each in recipe["requirements"]["run"]
+    } == required
+    assert {*map(conda_name, configuration["build-system"]["requires"])} <= {*recipe["requirements"]["host"]}
+    assert recipe["build"]["python"]["entry_points"] == [
+        f"{name} = {target}" for name, target in project["scripts"].items()
+    ]
+    assert recipe["about"]["summary"] == project["description"]
+    assert recipe["about"]["license"] == project["license"]
+
+
+def conda_name(requirement: str) -> str:
+    """A requirement as conda writes it, whose `matplotlib` brings Qt."""
+    return requirement.replace(">=", " >=").replace("matplotlib ", "matplotlib-base ")
 
 
 def test_installing_gives_the_command() -> None:
