@@ -90,7 +90,8 @@ def plot(
 
             if shown != _EVERYTHING:
                 raise click.UsageError("a page shows all joints, variables and times, and zooms in itself")
-            write_page([Path(file) for file in files], Path(folder), outputs, talk)
+            paths = [Path(file) for file in files]
+            write_page(paths, Path(folder), outputs, talk, studies=_are_studies(files))
         elif _are_studies(files):
             if shown != _EVERYTHING:
                 raise click.UsageError("times, joints and variables can be chosen of results, not of studies")

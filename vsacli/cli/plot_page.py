@@ -17,20 +17,24 @@ LONG_PAGE = 2_000_000
 """Samples, of all files together, from which on a page takes so long that its progress is shown."""
 
 
-def write_page(paths: list[Path], folder: Path, outputs: Outputs, talk: Talk) -> None:
-    """Write the page of results, or of simulations.
+def write_page(paths: list[Path], folder: Path, outputs: Outputs, talk: Talk, *, studies: bool) -> None:
+    """Write the page of results, of simulations, or of studies.
 
     Raises:
         InputError: nothing can be drawn from these files, they do not belong together, or what a page needs
             is not installed.
         StorageError: the page cannot be written.
     """
+    outputs.folder(folder)
+    page = outputs.file(folder / f"{'-'.join(path.stem for path in paths)}.html")
+    page.write_text(_studies(paths) if studies else _results(paths, talk))
+
+
+def _results(paths: list[Path], talk: Talk) -> str:
     from vsacli.files.stored_reports import stored_report
     from vsacli.results.pages import result_page
     from vsacli.results.store.simulation import open_stored
 
-    outputs.folder(folder)
-    page = outputs.file(folder / f"{'-'.join(path.stem for path in paths)}.html")
     with ExitStack() as stack:
         files = [stack.enter_context(open_stored(path)) for path in paths]
         for each in files:
@@ -42,4 +46,16 @@ def write_page(paths: list[Path], folder: Path, outputs: Outputs, talk: Talk) ->
             shown_from = 0 if samples >= LONG_PAGE else variables + 1
             return talk.progress(variables, shown_from=shown_from, label="drawing")
 
-        page.write_text(result_page(files, reports, progress))
+        return result_page(files, reports, progress)
+
+
+def _studies(paths: list[Path]) -> str:
+    from vsacli.base.tables import ReportText
+    from vsacli.results.pages import study_page
+    from vsacli.results.store.stored_study import StoredStudy
+    from vsacli.studies.sweeps import StudySummary
+
+    with ExitStack() as stack:
+        tables = [stack.enter_context(StoredStudy(path)) for path in paths]
+        summaries = [str(StudySummary.of(table)).splitlines() for table in tables]
+        return study_page(tables, [ReportText(first, [], rest) for first, *rest in summaries])

@@ -5,5 +5,6 @@ acts is in `page.html`, `page.css` and the scripts beside them.
 """
 
 from vsacli.results.pages.result_page import result_page
+from vsacli.results.pages.study_page import study_page
 
-__all__ = ["result_page"]
+__all__ = ["result_page", "study_page"]

@@ -27,7 +27,8 @@ class Facts(NamedTuple):
     Attributes:
         title: what was run.
         label: short, to tell it from the others on the page.
-        verdict: one word, as in the report.
+        verdict: as in the report.
+        tone: "good", "fair" or "bad".
         report: what the command printed that made it.
         provenance: pairs of a word and what it says.
         inputs: the files that were read.
@@ -36,6 +37,7 @@ class Facts(NamedTuple):
     title: str
     label: str
     verdict: str
+    tone: str
     report: ReportText
     provenance: Sequence[tuple[str, str]]
     inputs: Sequence[InputText]

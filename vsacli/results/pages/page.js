@@ -11,7 +11,7 @@
   });
   byId("library").textContent = data.library;
   if (data.kind !== "over time") return;
-  byId("stage").hidden = false;
+  byId("stage").hidden = byId("keys").hidden = false;
 
   function addSections() {
     for (const { heading, shown, charts } of data.sections) {

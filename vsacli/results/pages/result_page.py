@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from vsacli.base.progress import Bar, Progress, unseen
 from vsacli.base.tables import ReportText
-from vsacli.base.texts import one_line
 from vsacli.results.pages.chain_motion import chain_motion
-from vsacli.results.pages.document import LARGEST_SHOWN, Facts, InputText, rendered
+from vsacli.results.pages.document import Facts, rendered
+from vsacli.results.pages.facts import input_text, provenance_rows
 from vsacli.results.pages.packing import Packed
 from vsacli.results.pages.result_charts import ResultCharts
 from vsacli.results.pages.sections import Section
 from vsacli.results.pages.stretches import doubtful, troubles
 from vsacli.results.several import check_comparable, distinct_labels
-from vsacli.results.store.inputs import StoredInput
 from vsacli.results.store.reader import StoredResult
+
+FAIR = ("over_limit", "doubtful", "strayed")
+"""Verdicts on what was computed all the same."""
 
 
 def result_page(
@@ -90,23 +91,6 @@ def _facts(file: StoredResult, label: str, report: ReportText) -> Facts:
     ended = "" if file.complete else ", ended early"
     title = f"{file.robot_name}, {label}: {file.samples} steps{ended}"
     inputs = [input_text(each) for each in file.inputs()]
-    return Facts(title, label, file.verdict, report, provenance_rows(file.provenance()), inputs)
-
-
-def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Pairs of a word and what it says of how a file was made; inputs are left out."""
-    rows = []
-    for name, value in provenance.items():
-        if name != "inputs" and value not in ("", {}):
-            text = value if isinstance(value, str) else json.dumps(value)
-            rows.append((name.replace("_", " "), text))
-    changed = {each["path"]: each["changes"] for each in provenance["inputs"] if "changes" in each}
-    return rows + [(f"--set of {path}", json.dumps(changes)) for path, changes in changed.items()]
-
-
-def input_text(file: StoredInput) -> InputText:
-    """An input as a page shows it."""
-    text = None if file.content is None else file.content.decode("utf-8", "backslashreplace")
-    if text is not None:
-        text = None if len(text) > LARGEST_SHOWN else "\n".join(map(one_line, text.splitlines()))
-    return InputText(one_line(file.path), file.sha256, text)
+    tone = "good" if file.verdict == "ok" else "fair" if file.verdict in FAIR else "bad"
+    provenance = provenance_rows(file.provenance())
+    return Facts(title, label, file.verdict.replace("_", " "), tone, report, provenance, inputs)

@@ -1,0 +1,92 @@
+"""The page of the table of a study, or of several: margin and cost of each run, over what varies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from vsacli.base.arrays import IndexArray, evenly
+from vsacli.base.tables import ReportText
+from vsacli.base.texts import one_line
+from vsacli.results.pages.document import Facts, rendered
+from vsacli.results.pages.facts import input_text
+from vsacli.results.pages.packing import Packed
+from vsacli.results.store.stored_study import StoredStudy
+from vsacli.results.study_points import StudyPoints
+
+MOST_RUNS = 20_000
+"""Points of a plot; with more a browser is slow, and they hide one another."""
+
+
+def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> str:
+    """The page of tables of studies, as HTML.
+
+    Args:
+        tables: open.
+        reports: what each study found.
+
+    Raises:
+        InputError: a table has no margins, or no rows, or is damaged; or what a page needs is not installed.
+    """
+    packed = Packed()
+    labels = [table.study_name for table in tables]
+    data = {
+        "kind": "study",
+        "studies": [
+            _study(StudyPoints(table), table, label, packed)
+            for table, label in zip(tables, labels, strict=True)
+        ],
+    }
+    facts = [_facts(table, report) for table, report in zip(tables, reports, strict=True)]
+    return rendered(", ".join(dict.fromkeys(labels)), facts, data, packed)
+
+
+def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) -> dict[str, Any]:
+    """What scripts have to know of a study; arrays are of the runs that are drawn."""
+    drawn = _drawn(points)
+    verdicts = table.texts("verdict")
+    margins, shares = points.exceedance
+    kept = evenly(len(margins), MOST_RUNS)
+    return {
+        "label": label,
+        "of": len(points.runs),
+        "runs": [int(run) for run in points.runs[drawn]],
+        "verdicts": [verdicts[row] for row in drawn],
+        "feasible": packed.add(points.feasible[drawn]),
+        "margin": packed.add(100 * points.margin[drawn]),
+        "cost": None if points.cost is None else packed.add(points.cost[1][drawn]),
+        "cost_words": "" if points.cost is None else points.cost[0],
+        "front": [] if points.cost is None else np.searchsorted(drawn, points.front).tolist(),
+        "worst": np.searchsorted(drawn, points.worst).tolist(),
+        "varying": [
+            {"path": path, "unit": points.unit(path), "values": packed.add(values[drawn])}
+            for path, values in points.varying.items()
+        ],
+        "share": points.share,
+        "exceeded": packed.add(100 * margins[kept]),
+        "exceeding": packed.add(100 * shares[kept]),
+    }
+
+
+def _drawn(points: StudyPoints) -> IndexArray:
+    """The rows that are drawn: all, or so many, the worst and the front among them."""
+    chosen = [evenly(len(points.runs), MOST_RUNS), points.worst]
+    if points.cost is not None:
+        chosen.append(points.front)
+    return np.unique(np.concatenate(chosen))
+
+
+def _facts(table: StoredStudy, report: ReportText) -> Facts:
+    made = table.provenance()
+    feasible = int(StudyPoints(table).feasible.sum())
+    return Facts(
+        title=f"{table.study_name}: {table.rows} runs of {table.robot_name}",
+        label=table.study_name,
+        verdict=f"{feasible} of {table.rows} feasible",
+        tone="good" if feasible == table.rows else "fair" if feasible else "bad",
+        report=report,
+        provenance=[(name.replace("_", " "), one_line(text)) for name, text in made.items() if text],
+        inputs=[input_text(each) for each in table.inputs()],
+    )
