@@ -43,6 +43,7 @@ from vsacli.documents.plausibility import Rule
 from vsacli.files.examples import Example, examples, examples_root, opening_comment
 from vsacli.robot.file import RobotFile
 from vsacli.robot.plausibility import ROBOT_RULES
+from vsacli.studies.sizing import CatalogueMotor
 from vsacli.studies.sweeps.kept import KEPT
 from vsacli.studies.sweeps.study_file import StudyFile
 from vsacli.trajectory.file import content
@@ -53,11 +54,11 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 ROBOT = ROOT / "robots" / "vsa_3r.yaml"
 IMAGES = ROOT / "docs" / "images"
 
-DRAWING = ("gallery.md", "studies.md")
+DRAWING = ("gallery.md", "sizing.md", "studies.md")
 """Pages whose commands draw the figures of the tool, wherever they are shown."""
 
 FILE_OR_COMMANDS = re.compile(
-    r"(?:^Save as `(?P<name>\S+)`:\n\n)?^```(?:yaml|sh)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
+    r"(?:^Save as `(?P<name>\S+)`:\n\n)?^```(?:yaml|csv|sh)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
 )
 IMAGE = re.compile(r"\]\(images/(\S+\.png)\)")
 
@@ -144,6 +145,12 @@ def pole_fields() -> str:
 def study_fields() -> str:
     """Fields of a study file."""
     return record_sections(StudyFile)
+
+
+def motor_columns() -> str:
+    """Columns of a catalogue of motors."""
+    rows = record_sections(CatalogueMotor)
+    return rows.replace("| key | value |", "| column | value |", 1)
 
 
 def study_columns() -> str:
@@ -293,6 +300,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "column-fields": column_fields,
     "pole-fields": pole_fields,
     "study-fields": study_fields,
+    "motor-columns": motor_columns,
     "study-columns": study_columns,
     "robot-rules": robot_rules,
     "trajectory-rules": trajectory_rules,

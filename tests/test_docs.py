@@ -38,7 +38,7 @@ LONG = (
     *("cli.md", "energy.md", "gallery.md", "identification.md", "mending-a-motion.md", "optimisation.md"),
     *("python.md", "quickstart.md", "reading-a-verdict.md"),
     *("recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "simulation.md", "studies.md"),
-    *("suggestions.md", "urdf.md"),
+    *("sizing.md", "suggestions.md", "urdf.md"),
 )
 """Pages whose examples take more than a second."""
 
@@ -112,8 +112,8 @@ def run_shell(line: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 
 def made_on_other_pages(folder: Path) -> None:
-    """What help texts take for granted: studies, and the record that the page on identification makes."""
-    for name in ("identification.md", "studies.md"):
+    """What help texts take for granted: studies, motors, and the record that is identified."""
+    for name in ("identification.md", "sizing.md", "studies.md"):
         for block in blocks(REPOSITORY / "docs" / name):
             if saved := SAVED_AS.search(block.before):
                 (folder / saved[1]).write_text(block.text)

@@ -22,6 +22,14 @@ DEG = math.pi / 180
         ("deg/s2", "rad/s^2", DEG),
         ("deg/s/s", "rad/s^2", DEG),
         ("rev/min", "rad/s", 2 * math.pi / 60),
+        ("rpm", "rad/s", 2 * math.pi / 60),
+        ("g cm^2", "kg m^2", 1e-7),
+        ("g·cm²", "kg m^2", 1e-7),
+        ("N m s^2", "kg m^2", 1),
+        ("mNm/A", "N m/A", 1e-3),
+        ("mΩ", "ohm", 1e-3),
+        ("Ω", "ohm", 1),
+        ("V/A", "ohm", 1),
         ("ms", "s", 1e-3),
         ("mm", "m", 1e-3),
         ("mm/ms^2", "m/s^2", 1e3),
@@ -58,7 +66,7 @@ def test_every_unit_of_the_tool_is_understood(name, joint):
 )
 def test_what_is_no_unit_is_refused_with_those_that_are(text):
     with pytest.raises(
-        InputError, match=r"is not understood; expected rad or the like, made of rad, deg, rev, m,"
+        InputError, match=r"is not understood; expected rad or the like, made of rad, deg, rev, rpm, m,"
     ):
         conversion_factor(text, "rad")
 

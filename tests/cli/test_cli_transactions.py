@@ -70,6 +70,9 @@ TASKS = {
     ),
     "optimize": Task(("optimize", ROBOT, "move.yaml", "-o", "best.yaml")),
     "identify": Task(("identify", ROBOT, "record.csv", "-o", "fitted.yaml", "--plot", "figures")),
+    "size": Task(
+        ("size", ROBOT, "move.yaml", "--catalogue", "motors.csv", "-o", "s.yaml", "--plot", "drives")
+    ),
     "export": Task(("export", "given.h5", "-o", "torques.csv")),
     "new robot": Task(("new", "robot", "--joints", "RR", "-o", "arm.yaml")),
     "new trajectory": Task(("new", "trajectory", "--robot", ROBOT, "-o", "rise.yaml")),
@@ -193,6 +196,7 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> MakeStage:
         edited(
             REST_TO_REST, inputs / f"{name}.yaml", ("rate: 1000 ", "rate: 10 "), ("end: 1275", f"end: {end}")
         )
+    (inputs / "motors.csv").write_text(GENERIC)
     arm = load_robot(ROBOT)
     moved = Excitation([0, 0, 0], [0.4] * 3, [1400] * 3, [300] * 3, rate=50)
     excited(arm, moved).noisy(seed=0).write(inputs / "record.csv", arm)

@@ -137,6 +137,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
     ("compare", "RESULT", "OUT/table.csv"),
     ("optimize", "ROBOT", "MOVE", "-o", "OUT/best.yaml"),
     ("sensitivity", "ROBOT", "MOVE", "--parameters", "joints.base.link.mass"),
+    ("size", "ROBOT", "MOVE"),
     ("info", "RESULT"),
     ("info", "RESULT", "--json"),
     ("info", "RESULT", "--extract", "OUT/inputs"),

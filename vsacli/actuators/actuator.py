@@ -65,6 +65,24 @@ class Carried(NamedTuple):
     tau_spring: FloatArray
 
 
+class SpringLoad(NamedTuple):
+    """What one of an actuator's springs bears, or all springs of a mechanism; arrays (samples,).
+
+    Attributes:
+        name: which it is.
+        deflection: of the spring; of a mechanism, between motor 1 and link.
+        torque: that of the deflection.
+        energy: in it, J.
+        max_deflection: largest admissible |deflection|.
+    """
+
+    name: str
+    deflection: FloatArray
+    torque: FloatArray
+    energy: FloatArray
+    max_deflection: float
+
+
 class Actuator(ABC):
     """What drives a joint: motors, and springs between them and the link.
 
@@ -178,6 +196,13 @@ class Actuator(ABC):
     @abstractmethod
     def spring_rates(self, of_joint: OfJoint) -> FloatArray:
         """Rate of tau_spring of each motor, (motors, samples), from the other variables of the joint."""
+
+    def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
+        """What its springs bear, from the other variables of the joint; of those behind motor 1 together."""
+        if not self.sprung:
+            return ()
+        loaded = of_joint["phi"][0], of_joint["tau_spring"][0], of_joint["elastic_energy"]
+        return (SpringLoad("springs", *loaded, self.max_deflections[0]),)
 
     def carried(self, of_joint: OfJoint) -> Carried:
         """What the springs carry by their laws, from the motion of joint and motors."""

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
+from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants, SpringLoad
 from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.pair import PairSolution
@@ -172,6 +172,18 @@ class Antagonistic(Actuator):
         apart, drifting = (of_joint[name][0] - of_joint[name][1] for name in ("phi", "dphi"))
         rate: FloatArray = self.coupling.stiffness(apart) * drifting
         return rates + np.stack((rate, -rate))
+
+    def spring_loads(self, of_joint: OfJoint) -> tuple[SpringLoad, ...]:
+        """Each spring by itself, and one between the motors."""
+        phi = of_joint["phi"]
+        sides = enumerate(zip(self.laws, phi, self.max_deflections, strict=True), 1)
+        springs = [(f"spring {side}", *spring) for side, spring in sides]
+        if self.coupling is not None:
+            springs.append(("coupling", self.coupling, phi[0] - phi[1], math.inf))
+        return tuple(
+            SpringLoad(name, deflection, law.torque(deflection), law.energy(deflection), bound)
+            for name, law, deflection, bound in springs
+        )
 
     def carried(self, of_joint: OfJoint) -> Carried:
         """Sums over both springs, (14)."""

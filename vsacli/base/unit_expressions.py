@@ -13,6 +13,7 @@ BASES: dict[str, tuple[float, dict[str, int]]] = {
     "rad": (1.0, {"rad": 1}),
     "deg": (math.pi / 180, {"rad": 1}),
     "rev": (2 * math.pi, {"rad": 1}),
+    "rpm": (2 * math.pi / 60, {"rad": 1, "s": -1}),
     "m": (1.0, {"m": 1}),
     "cm": (1e-2, {"m": 1}),
     "mm": (1e-3, {"m": 1}),
@@ -30,10 +31,14 @@ BASES: dict[str, tuple[float, dict[str, int]]] = {
     "Nmm": (1e-3, {"N": 1, "m": 1}),
     "J": (1.0, {"N": 1, "m": 1}),
     "W": (1.0, {"N": 1, "m": 1, "s": -1}),
+    "kg": (1.0, {"N": 1, "m": -1, "s": 2}),
+    "g": (1e-3, {"N": 1, "m": -1, "s": 2}),
     "A": (1.0, {"A": 1}),
     "mA": (1e-3, {"A": 1}),
     "V": (1.0, {"V": 1}),
     "mV": (1e-3, {"V": 1}),
+    "ohm": (1.0, {"V": 1, "A": -1}),
+    "mohm": (1e-3, {"V": 1, "A": -1}),
 }
 """Size in SI and dimensions of each symbol; an angle counts as a dimension, so that N m is not N m/rad."""
 
@@ -41,7 +46,18 @@ MAX_LENGTH = 40
 """Characters of a unit; a longer one is none."""
 
 _SPELLINGS = str.maketrans(
-    {"·": "*", ".": "*", "°": "deg", "²": "^2", "³": "^3", "⁴": "^4", "μ": "u", "µ": "u"}
+    {
+        "·": "*",
+        ".": "*",
+        "°": "deg",
+        "²": "^2",
+        "³": "^3",
+        "⁴": "^4",
+        "μ": "u",
+        "µ": "u",
+        "Ω": "ohm",
+        "\u2126": "ohm",
+    }
 )
 _TOKENS = re.compile(r"[A-Za-z]+|[0-9]+|[*/^()]")
 

@@ -41,7 +41,7 @@ class Exit(enum.IntEnum):
     VERDICT = (
         3,
         "done, but steps are infeasible, singular or over a limit, records doubtful, numbers left open, "
-        "simulations astray, or runs of a study failed",
+        "simulations astray, motors too weak, or runs of a study failed",
     )
     STORAGE = 4, "a file cannot be read or written (disk full, permission); the target is untouched"
     HUNG_UP = 129, "ended by SIGHUP, as when a terminal is closed; the target is untouched"
@@ -65,6 +65,8 @@ EXIT_OF_VERDICT = {
     "doubtful": Exit.VERDICT,
     "misfit": Exit.VERDICT,
     "untold": Exit.VERDICT,
+    "insufficient": Exit.VERDICT,
+    "incomplete": Exit.VERDICT,
     "self_check_failed": Exit.BUG,
 }
 """Exit code of a run by the verdict of its report."""

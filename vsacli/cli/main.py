@@ -32,6 +32,7 @@ _SECTIONS = {
         "identify": "vsacli.cli.identify:identify",
         "study": "vsacli.cli.study:study",
         "optimize": "vsacli.cli.optimize:optimize",
+        "size": "vsacli.cli.size:size",
     },
     "Results": {
         "plot": "vsacli.cli.plot:plot",

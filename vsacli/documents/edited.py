@@ -89,10 +89,27 @@ def _edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
         node = found
     here = dict(_entries(node)).get(key)
     if here is not None:
-        return here.start_mark.index, here.end_mark.index, _written(value)
+        return _replacement(node, here, _written(value))
     if not isinstance(node, yaml.MappingNode):
         raise InputError.one(f"{'.'.join(words)}: there is no {key!r}")
     return _insertion(node, f"{key}: {_written(value)}")
+
+
+def _replacement(node: yaml.Node, here: yaml.Node, written: str) -> tuple[int, int, str]:
+    """A text in place of an entry of a node; behind the key if that is a block of lines."""
+    block = isinstance(here, yaml.CollectionNode) and not here.flow_style
+    if block and isinstance(node, yaml.MappingNode):
+        key = next(key for key, entry in node.value if entry is here)
+        return key.end_mark.index, _end(here), f": {written}"
+    return here.start_mark.index, _end(here), written
+
+
+def _end(node: yaml.Node) -> int:
+    """Where the text of a node ends: a block that of its last entry, before what follows on that line."""
+    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        return _end(last[1] if isinstance(last, tuple) else last)
+    return node.end_mark.index
 
 
 def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
@@ -109,4 +126,6 @@ def _written(value: Any) -> str:
             return "{" + ", ".join(f"{key}: {_written(each)}" for key, each in value.items()) + "}"
         case str():
             return value if value.isidentifier() else for_yaml(value)
+        case list():
+            return "[" + ", ".join(map(_written, value)) + "]"
     return json.dumps(value)

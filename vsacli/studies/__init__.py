@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from vsacli.studies.optimisation import Optimum, optimize
     from vsacli.studies.remedies import suggest
     from vsacli.studies.sensitivities import Sensitivity, sensitivity
+    from vsacli.studies.sizing import Sizing, size_drives
 
 __all__ = [
     "Comparison",
@@ -18,12 +19,14 @@ __all__ = [
     "Identification",
     "Optimum",
     "Sensitivity",
+    "Sizing",
     "compare",
     "excitation_text",
     "identify",
     "optimize",
     "plan_excitation",
     "sensitivity",
+    "size_drives",
     "suggest",
 ]
 __getattr__, __dir__ = lazy_exports(__name__)

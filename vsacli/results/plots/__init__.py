@@ -27,6 +27,7 @@ from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
 from vsacli.results.plots.measured_figure import MeasuredCurve, measured_figure
 from vsacli.results.plots.sensitivity_figures import Bar, Torque, band_figure, ranking_figure
 from vsacli.results.plots.simulation_figures import simulation_drawings
+from vsacli.results.plots.sizing_figure import Bounds, TorqueSpeed, torque_speed_figure
 from vsacli.results.plots.study_figures import compared_studies, study_figures
 
 __all__ = [
@@ -36,9 +37,11 @@ __all__ = [
     "FORMATS",
     "RESULT_DRAWINGS",
     "Bar",
+    "Bounds",
     "FigureFiles",
     "MeasuredCurve",
     "Torque",
+    "TorqueSpeed",
     "band_figure",
     "check_drawable",
     "chosen_figures",
@@ -56,4 +59,5 @@ __all__ = [
     "save_figures",
     "simulation_drawings",
     "study_figures",
+    "torque_speed_figure",
 ]

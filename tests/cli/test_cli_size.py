@@ -1,0 +1,125 @@
+"""`vsacli size`: exit codes, what is said where, what is written."""
+
+import json
+
+import pytest
+from samples.catalogues import GENERIC
+from samples.command_line import REPOSITORY, ROBOT, edited
+
+ARM = REPOSITORY / "robots" / "hardening_1r.yaml"
+SWING = REPOSITORY / "trajectories" / "hardening_1r.yaml"
+
+
+@pytest.fixture
+def motors(tmp_path):
+    path = tmp_path / "motors.csv"
+    path.write_text(GENERIC)
+    return path
+
+
+def test_a_motor_is_chosen_drawn_and_put_into_the_robot_file(vsacli, motors):
+    done = vsacli(
+        "size", ARM, SWING, "--catalogue", motors, "--gear", "60..160", "-o", "s.yaml", "--plot", "f"
+    )
+    assert done.code == 0, done.err
+    assert "motors.csv (6 motors) has one for the motor, chosen by least copper loss" in done.out
+    assert done.err == "wrote s.yaml\nwrote f/hardening_1r-hardening_1r-torque-speed.png\n"
+    assert vsacli("validate", "s.yaml").code == 0
+    assert vsacli("invdyn", "s.yaml", SWING, "-o", "r.h5").code == 0
+
+
+def test_a_list_of_gears_and_several_motions_as_json(vsacli, motors, motion):
+    soft = REPOSITORY / "trajectories" / "rest_to_rest_soft.yaml"
+    done = vsacli(
+        "size", ROBOT, motion, soft, "--catalogue", motors, "--gear", "50,80", "--gear", "base=120", "--json"
+    )
+    assert done.code == 0, done.err
+    report = json.loads(done.out)
+    assert report["format"] == "vsacli-sizing/1"
+    assert [each["trajectory"] for each in report["trajectories"]] == ["rest-to-rest", "rest-to-rest-soft"]
+    assert {each["choices"][0]["ratio"] for each in report["motors"][:2]} == {120}
+    assert {each["choices"][0]["ratio"] for each in report["motors"][2:]} <= {50, 80}
+    assert report["motors"][0]["asked"]["load"]["trajectory"] == "rest-to-rest"
+
+
+def test_nothing_that_does_is_told_with_what_is_nearest(vsacli, motors, tmp_path):
+    weak = edited(
+        motors, tmp_path / "weak.csv", ("\nflat-90", "\n# "), ("\nframe", "\n# "), ("\nflat-60", "\n# ")
+    )
+    weak.write_text(weak.read_text().replace("frame-85", "# ", 1))
+    done = vsacli("size", ARM, SWING, "--catalogue", weak, "--gear", "5", "-o", "s.yaml")
+    assert done.code == 3
+    assert "has none that does" in done.out
+    assert "no motor does; nearest is flat-45 with the gear 5, which would use" in done.out
+    assert "s.yaml is not written: there is no motor for elbow 1" in done.err
+    assert not (tmp_path / "s.yaml").exists()
+
+
+def test_steps_that_cannot_be_done_are_left_out_and_told(vsacli, too_soft):
+    done = vsacli("size", ROBOT, too_soft)
+    assert done.code == 3
+    assert (
+        "of 401 steps cannot be done and are left out, so that this is not for the whole motion" in done.out
+    )
+
+
+def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
+    arm = REPOSITORY / "robots" / "planar_2r.yaml"
+    swing = REPOSITORY / "trajectories" / "planar_2r.yaml"
+    assert vsacli("size", arm, swing).code == 0
+    weak = edited(arm, tmp_path / "weak.yaml", ("gear_ratio: 100", "gear_ratio: 100, max_torque: 5"))
+    done = vsacli("size", weak, swing)
+    assert done.code == 3
+    assert "its limits do not suffice, it would use" in done.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--gear", "50"], "gears and a criterion are for motors of a catalogue; give one"),
+        (["--minimize", "mass"], "gears and a criterion are for motors of a catalogue; give one"),
+        (["-o", "s.yaml"], "--output is for the motors chosen from a catalogue"),
+        (["--catalogue", "motors.csv", "--gear", "50,x"], "expected ratios such as 50,80,100, or a range"),
+        (["--catalogue", "motors.csv", "--gear", "160..50"], "is empty; the smaller one comes first"),
+        (["--catalogue", "motors.csv", "--gear", "0"], "must be positive and finite"),
+        (["--catalogue", "motors.csv", "--gear", "hip=5"], "there is no joint 'hip'; valid: elbow"),
+        (
+            ["--catalogue", "motors.csv", "--gear", "5", "--gear", "6"],
+            "the gears of all joints were given already",
+        ),
+        (["--catalogue", "absent.csv"], "absent.csv: no such file"),
+        (["--catalogue", str(ARM)], "expected commas, semicolons or tabs between the columns"),
+    ],
+)
+@pytest.mark.usefixtures("motors")
+def test_what_is_refused(vsacli, arguments, message):
+    done = vsacli("size", ARM, SWING, *arguments)
+    assert done.code == 2
+    assert message in done.err
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        ("m,1e-4,,,,,,,", "nothing bounds its torque: give one of continuous_torque, max_torque"),
+        ("m,-1e-4,1,,,,,,", "inertia: must be positive, not -0.0001"),
+        ("m,1e-4,1,,,,0.5,,", "resistance: needs torque_constant, too"),
+        ("m,1e-4,1,,,0.1,,,24", "max_voltage: needs resistance, too"),
+        ("m,1e-4,1,2,,,,,,", "expected 9 values"),
+    ],
+)
+def test_what_is_wrong_with_a_motor(vsacli, tmp_path, row, message):
+    header = "name,inertia,continuous_torque,max_torque,max_velocity,torque_constant"
+    header += ",resistance,max_current,max_voltage"
+    (tmp_path / "m.csv").write_text(f"{header}\n{row}\n")
+    done = vsacli("size", ARM, SWING, "--catalogue", "m.csv")
+    assert done.code == 2
+    assert done.err.startswith("m.csv:2: ")
+    assert message in done.err
+
+
+def test_a_file_that_exists_is_refused_before_anything_is_computed(vsacli, motors, tmp_path):
+    (tmp_path / "s.yaml").write_text("mine")
+    done = vsacli("size", ARM, SWING, "--catalogue", motors, "-o", "s.yaml")
+    assert done.code == 4
+    assert (tmp_path / "s.yaml").read_text() == "mine"

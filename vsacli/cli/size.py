@@ -1,0 +1,119 @@
+"""`vsacli size`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from vsacli.cli.command_parts import example, json_option, overwrite_option, robot_argument, run_stem
+from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
+
+if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs
+    from vsacli.results.plots import TorqueSpeed
+    from vsacli.studies.sizing import MotorSizing, Sizing
+
+
+@click.command(
+    "size",
+    short_help="Size motors, gears and springs for motions.",
+    epilog=example(
+        "vsacli size robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --catalogue motors.csv --gear 50..160"
+    ),
+)
+@robot_argument
+@click.argument("trajectories", nargs=-1, required=True, metavar="TRAJECTORY...")
+@click.option(
+    "--catalogue",
+    metavar="FILE",
+    help="Motors to choose from, a CSV file; by default the robot's own motors are held to their limits.",
+)
+@click.option(
+    "--gear",
+    "gears",
+    metavar="[JOINT=]RATIOS",
+    multiple=True,
+    help="Gears for them, e.g. 50,80,100 or 30..160 or, for one joint, slide=500..3000; by default any.",
+)
+@click.option(
+    "--minimize",
+    type=click.Choice(["copper", "utilisation", "mass"]),
+    help="What the best choice has least of: heat in its windings, the share of its limits that it uses, or "
+    "mass. By default the first if the catalogue says enough for it, else the second.",
+)
+@click.option("-o", "--output", metavar="FILE", help="Write the robot file with the motors chosen.")
+@click.option("--plot", "folder", metavar="FOLDER", help="Save a figure of torques over speeds there.")
+@json_option
+@overwrite_option
+@talk_options
+def size(
+    robot: str,
+    trajectories: tuple[str, ...],
+    catalogue: str | None,
+    gears: tuple[str, ...],
+    minimize: str | None,
+    output: str | None,
+    folder: str | None,
+    as_json: bool,
+    overwrite: bool,
+    talk: Talk,
+) -> int:
+    """Say what TRAJECTORIES ask of motors, gears and springs of ROBOT, and which of a catalogue would do.
+
+    Peaks are the largest of all trajectories, root mean squares are over all of them, one after the other as
+    a cycle that repeats. Motors are held to their peak and continuous torque or current, speed and voltage.
+
+    Exit code 3 if nothing does for some motor, or if steps were left out since they cannot be done.
+    """
+    if catalogue is None and output is not None:
+        raise click.UsageError("--output is for the motors chosen from a catalogue: give --catalogue")
+    from vsacli.base.outputs import Outputs
+    from vsacli.robot.file import load_robot
+    from vsacli.studies.sizing import size_drives, sized_text
+    from vsacli.trajectory.file import load_trajectory
+
+    loaded = load_robot(robot)
+    motions = [load_trajectory(path, loaded, progress=talk.fitting) for path in trajectories]
+    sources = [*loaded.sources, *(source for motion in motions for source in motion.sources)]
+    inputs = [*(source.path for source in sources), *([] if catalogue is None else [catalogue])]
+    with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
+        if output is not None:
+            outputs.check(output)
+        with talk.progress(sum(motion.samples for motion in motions)) as progress:
+            found = size_drives(loaded, motions, catalogue, gears, minimize, progress=progress.update)
+        if output is not None and found.lacking:
+            talk.note(f"{output} is not written: there is no motor for {found.lacking[0].name}")
+        elif output is not None:
+            outputs.file(output).write_text(sized_text(loaded, found, Path(output).parent))
+        if folder is not None:
+            _draw(found, folder, run_stem(robot, trajectories[0]), outputs)
+    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    talk.wrote(outputs)
+    return EXIT_OF_VERDICT[found.verdict]
+
+
+def _draw(found: Sizing, folder: str, stem: str, outputs: Outputs) -> None:
+    """Torque over speed of every motor of which something is known."""
+    from vsacli.results.plots import FigureFiles, torque_speed_figure
+
+    files = FigureFiles(["torque-speed"], folder, stem, "png", outputs)
+    motors = [_torque_speed(motor) for motor in found.motors if motor.points is not None]
+    files.save({"torque-speed": torque_speed_figure(motors, found.title)})
+
+
+def _torque_speed(motor: MotorSizing) -> TorqueSpeed:
+    from vsacli.results.plots import Bounds, TorqueSpeed
+
+    points, shaft = motor.points, motor.shaft
+    assert points is not None, "as of every motor of which something is known"
+    assert shaft is not None, "likewise"
+    runs = {
+        name: (points.velocities[motor.demand.run == index], points.torques[motor.demand.run == index])
+        for index, name in enumerate(motor.demand.trajectories)
+    }
+    constants = {name: getattr(shaft, name) for name in Bounds._fields}
+    rms = points.rms_velocity, points.rms_torque
+    return TorqueSpeed(motor.title, *motor.units, Bounds(**constants), runs, rms)

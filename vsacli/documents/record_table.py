@@ -1,0 +1,167 @@
+"""Records from the rows of a CSV table: a column for each declared field, texts among them."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from vsacli.base.did_you_mean import nearest
+from vsacli.base.errors import InputError
+from vsacli.base.unit_expressions import conversion_factor
+from vsacli.documents import tree
+from vsacli.documents.fields import REQUIRED, Kind, Number, declared
+from vsacli.documents.kinds.nested import read_record
+from vsacli.documents.source import Problems, Source, read_source
+from vsacli.documents.table_header import Header, cells_of, header_of, split_heading
+from vsacli.documents.table_rows import filled_lines
+from vsacli.documents.tree import INVALID, Scope
+
+MAX_BYTES = 50_000_000
+"""Of a file, whose rows become objects; a hundred thousand rows have some ten million."""
+
+_Record = TypeVar("_Record")
+
+
+class RecordTable(NamedTuple, Generic[_Record]):
+    """What was read.
+
+    Attributes:
+        records: a record for each row.
+        lines: of the file, in which they stand.
+        others: names of the columns that no field is called after, which were left out.
+        source: the file.
+    """
+
+    records: tuple[_Record, ...]
+    lines: tuple[int, ...]
+    others: tuple[str, ...]
+    source: Source
+
+
+class _Columns(NamedTuple):
+    """What the columns of a table are.
+
+    Attributes:
+        width: how many there are.
+        places: index of the column of each field that has one.
+        factors: what numbers of a field are multiplied by to be in SI units.
+        others: names of the columns that belong to no field.
+    """
+
+    width: int
+    places: dict[str, int]
+    factors: dict[str, float]
+    others: list[str]
+
+
+def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) -> RecordTable[_Record]:
+    """Read a CSV file into records.
+
+    The first line names the columns: names of fields in any order, a unit in brackets behind those of numbers
+    that are not in SI units. A tab, semicolon or comma in it is the separator. Cells may be in double quotes;
+    one that is empty leaves a field to its default. From `#` to the end of a line is a comment.
+
+    Args:
+        path: the file, UTF-8.
+        cls: the record class.
+        unique: name of the field that tells records apart.
+
+    Raises:
+        InputError: with file and line of everything that is wrong.
+    """
+    source, text = read_source(path, MAX_BYTES)
+    problems = Problems(source.path)
+    header = header_of(BytesIO(text.encode()), source.path)
+    columns = _columns(header, cls, problems)
+    problems.check()
+    records: dict[int, _Record] = {}
+    first: dict[Any, int] = {}
+    for number, content in filled_lines(text.splitlines(), header.line):
+        cells = [cell.strip() for cell in cells_of(content, header.separator)]
+        if not any(cells):
+            continue
+        record = _record(cells, columns, cls, Scope(problems, {}, {}), number)
+        if record is not None:
+            records[number] = record
+            key = getattr(record, unique)
+            if first.setdefault(key, number) != number:
+                problems.add(number, f"{unique} {tree.quoted(key)} stands in line {first[key]} already")
+    problems.check()
+    if not records:
+        raise InputError.one("there are no rows below the header", source.path)
+    return RecordTable(tuple(records.values()), tuple(records), tuple(columns.others), source)
+
+
+def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
+    """Where the columns of a header belong; those of no field are left out, unless one is nearly meant."""
+    fields = declared(cls)
+    columns = _Columns(len(header.columns), {}, {}, [])
+    meant = set()
+    for index, (name, unit) in enumerate(map(split_heading, header.columns)):
+        if name in columns.places:
+            problems.add(header.line, f"column {name!r} appears more than once")
+        elif name in fields:
+            columns.places[name] = index
+            columns.factors[name] = _factor(name, unit, fields[name][0].kind, header.line, problems)
+        else:
+            columns.others.append(name)
+            near = nearest(name, fields)
+            if near is not None:
+                problems.add(header.line, f"unknown column {tree.quoted(name)}; did you mean {near!r}?")
+                meant.add(near)
+    for name, (field, default) in fields.items():
+        if default is REQUIRED and name not in columns.places and name not in meant:
+            problems.add(header.line, f"there is no column {name!r} ({field.doc})")
+    return columns
+
+
+def _factor(name: str, unit: str | None, kind: Kind, line: int, problems: Problems) -> float:
+    if unit is None:
+        return 1.0
+    try:
+        if not isinstance(kind, Number):
+            raise InputError.one("holds texts, which have no unit")
+        expected = Scope(problems, {}, {}).unit(kind.unit)
+        return 1.0 if unit == expected else conversion_factor(unit, expected)
+    except InputError as error:
+        problems.add(line, f"column {name!r}: {error}")
+        return math.nan
+
+
+def _record(
+    cells: Sequence[str], columns: _Columns, cls: type[_Record], scope: Scope, line: int
+) -> _Record | None:
+    """The record of a row; None if its problems were noted."""
+    if len(cells) != columns.width:
+        hint = "; names with the separator in them go in double quotes" if len(cells) > columns.width else ""
+        scope.problems.add(
+            line, f"expected {columns.width} values as in the header, found {len(cells)}{hint}"
+        )
+        return None
+    given = {
+        field: tree.Scalar(line, _in_si(cells[index], columns.factors[field]), plain=False)
+        for field, index in columns.places.items()
+        if cells[index]
+    }
+    missing = [
+        name for name, (_, default) in declared(cls).items() if default is REQUIRED and name not in given
+    ]
+    for name in missing:
+        scope.problems.add(line, f"column {name!r} is empty")
+    if missing:
+        return None
+    record = read_record(cls, tree.Mapping(line, given, dict.fromkeys(given, line)), "", scope)
+    return None if record is INVALID else record
+
+
+def _in_si(cell: str, factor: float) -> str:
+    """The text of a number, converted; what is none stays, and is told of by who reads it."""
+    if factor == 1:
+        return cell
+    try:
+        return repr(float(cell) * factor)
+    except ValueError:
+        return cell

@@ -1,0 +1,179 @@
+"""Torque over speed of each motor, within what it can give for a moment and on average."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from vsacli.base.arrays import FloatArray
+from vsacli.results.plots.drawing import house_style, line_style
+from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete
+
+PANEL_HEIGHT = 2.1
+"""Inches."""
+
+MOST_ROWS = 6
+"""Of two panels, before the next begin beside them."""
+
+SIGHT = 6.0
+"""Limits beyond what is used by this factor are out of sight, so that the motion stays in sight."""
+
+ROOM = 1.08
+"""By which axes go beyond what they show."""
+
+POINTS = 400
+"""Of the edge of what a motor can give."""
+
+PEAK_LOOK: dict[str, Any] = {"facecolor": "#e8eef9", "linewidth": 0.0}
+CONTINUOUS_LOOK: dict[str, Any] = {"facecolor": "#c3d4f1", "linewidth": 0.0}
+RMS_LOOK: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "D",
+    "markersize": 6,
+    "color": "white",
+    "markeredgecolor": "black",
+}
+EDGE, BRAKING = "0.35", 0.3
+
+
+class Bounds(NamedTuple):
+    """What a motor is held to, infinite where by nothing.
+
+    Attributes:
+        max_torque, continuous_torque: largest, and of the root mean square.
+        max_velocity: largest speed.
+        max_voltage: largest voltage.
+        torque_constant, resistance: which make a voltage of torque and speed.
+    """
+
+    max_torque: float
+    continuous_torque: float
+    max_velocity: float
+    max_voltage: float
+    torque_constant: float
+    resistance: float
+
+    def torque_at(self, speed: FloatArray) -> FloatArray:
+        """The largest torque that drives at a speed; NaN where it cannot turn so fast."""
+        torque = np.full_like(speed, self.max_torque)
+        if math.isfinite(self.max_voltage):
+            left = self.max_voltage - self.torque_constant * speed
+            by_voltage = (
+                left * self.torque_constant / self.resistance
+                if self.resistance
+                else np.where(left >= 0, math.inf, -math.inf)
+            )
+            torque = np.minimum(torque, by_voltage)
+        return np.where((speed <= self.max_velocity) & (torque >= 0), torque, np.nan)
+
+
+class TorqueSpeed(NamedTuple):
+    """A motor over some motions.
+
+    Attributes:
+        title: of its panel.
+        torque_unit, velocity_unit: of what follows.
+        bounds: of the motor.
+        runs: by trajectory its velocities and torques, each (samples,).
+        rms: root mean squares of velocity and torque over all of them.
+    """
+
+    title: str
+    torque_unit: str
+    velocity_unit: str
+    bounds: Bounds
+    runs: Mapping[str, tuple[FloatArray, FloatArray]]
+    rms: tuple[float, float]
+
+
+def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
+    """A panel for each motor: sizes of torque over sizes of speed, paler where it brakes."""
+    with house_style():
+        folds = math.ceil(len(motors) / (2 * MOST_ROWS))
+        columns = min(2 * folds, len(motors))
+        rows = math.ceil(len(motors) / columns)
+        figure = Figure(
+            (max(PANEL_WIDTH * columns, 2 * PANEL_WIDTH), PANEL_HEIGHT * rows + 1.1), layout="constrained"
+        )
+        panels = figure.subplots(rows, columns, squeeze=False).flatten()
+        for unused in panels[len(motors) :]:
+            unused.remove()
+        names = list(dict.fromkeys(name for motor in motors for name in motor.runs))
+        handles: list[Artist] = [
+            Line2D([], [], color=line_style(at).color, label=name) for at, name in enumerate(names)
+        ]
+        for axes, motor in zip(panels, motors, strict=False):
+            handles += _draw(axes, motor, names)
+        return complete(figure, title, handles)
+
+
+def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
+    """A panel; returns what a legend shows for it."""
+    speeds, torques = (np.concatenate([np.abs(run[part]) for run in motor.runs.values()]) for part in (0, 1))
+    right = _end(float(speeds.max()), [min(motor.bounds.max_velocity, _fastest(motor.bounds))])
+    top = _end(float(torques.max()), [motor.bounds.max_torque, motor.bounds.continuous_torque])
+    handles = _draw_bounds(axes, motor.bounds, right, top)
+    for name, (velocity, torque) in motor.runs.items():
+        _draw_run(axes, velocity, torque, line_style(names.index(name)).color)
+    axes.plot(*motor.rms, **RMS_LOOK, zorder=5)
+    handles.append(Line2D([], [], **RMS_LOOK, label="root mean square"))
+    if any((velocity * torque < 0).any() for velocity, torque in motor.runs.values()):
+        handles.append(Line2D([], [], color="black", alpha=BRAKING, label="while it brakes"))
+    axes.set_xlim(0, right)
+    axes.set_ylim(0, top)
+    add_title(axes, motor.title)
+    axes.set_xlabel(f"speed [{motor.velocity_unit}]")
+    axes.set_ylabel(f"torque [{motor.torque_unit}]" if motor.torque_unit != "N" else "force [N]")
+    return handles
+
+
+def _end(used: float, bounds: Sequence[float]) -> float:
+    """Where an axis ends: beyond what is used, and beyond bounds that are in sight."""
+    seen = [bound for bound in bounds if bound <= SIGHT * used]
+    return ROOM * max([used, *seen]) or 1.0
+
+
+def _fastest(bounds: Bounds) -> float:
+    """The speed at which the voltage leaves no torque."""
+    return bounds.max_voltage / bounds.torque_constant if math.isfinite(bounds.max_voltage) else math.inf
+
+
+def _draw_bounds(axes: Axes, bounds: Bounds, right: float, top: float) -> list[Artist]:
+    speed = np.linspace(0, right, POINTS)
+    edge = bounds.torque_at(speed)
+    handles: list[Artist] = []
+    if np.isinf(edge).all():
+        return handles
+    axes.fill_between(speed, np.minimum(edge, 2 * top), **PEAK_LOOK, zorder=0.4)
+    handles.append(Patch(**PEAK_LOOK, label="within the limits"))
+    if math.isfinite(bounds.continuous_torque):
+        lasting = np.minimum(edge, bounds.continuous_torque)
+        axes.fill_between(speed, np.minimum(lasting, 2 * top), **CONTINUOUS_LOOK, zorder=0.5)
+        handles.append(Patch(**CONTINUOUS_LOOK, label="continuously"))
+    axes.plot(speed, np.minimum(edge, 2 * top), color=EDGE, linewidth=1.0)
+    last = speed[np.isfinite(edge)]
+    if last.size and last[-1] < right * (1 - 1 / POINTS):
+        axes.plot([last[-1]] * 2, [0, min(edge[np.isfinite(edge)][-1], 2 * top)], color=EDGE, linewidth=1.0)
+    return handles
+
+
+def _draw_run(axes: Axes, velocity: FloatArray, torque: FloatArray, color: str) -> None:
+    """Sizes of torque over sizes of speed, dark where the motor drives."""
+    drives = velocity * torque >= 0
+    for shown, alpha, order in ((~drives, BRAKING, 2), (drives, 1.0, 3)):
+        axes.plot(
+            np.where(shown, np.abs(velocity), np.nan),
+            np.where(shown, np.abs(torque), np.nan),
+            color=color,
+            alpha=alpha,
+            zorder=order,
+            linewidth=1.2,
+        )

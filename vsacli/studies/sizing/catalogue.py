@@ -1,0 +1,148 @@
+"""A catalogue of motors: a CSV file with what data sheets say of each, on the motor's own shaft."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from vsacli.base import units
+from vsacli.base.errors import FieldProblem
+from vsacli.documents.fields import (
+    NON_NEGATIVE,
+    POSITIVE,
+    Check,
+    Name,
+    check_fields,
+    number,
+    value,
+)
+from vsacli.documents.record_table import RecordTable, read_records
+from vsacli.studies.sizing.shaft import Shaft
+
+_TORQUE, _VELOCITY, _DAMPING = (
+    units.constant(quantity.revolute) for quantity in (units.TORQUE, units.VELOCITY, units.DAMPING)
+)
+"""A shaft turns, whatever the joint does."""
+_SHARE = Check(lambda value: 0 < value <= 1, "above 0 and at most 1")
+_BEARING = ("continuous_torque", "max_torque", "continuous_current", "max_current")
+_NEEDED = {
+    "resistance": ("torque_constant",),
+    "continuous_current": ("torque_constant",),
+    "max_current": ("torque_constant",),
+    "max_voltage": ("torque_constant", "resistance"),
+}
+"""What must be given, too, where a column is."""
+
+
+@dataclass(frozen=True)
+class CatalogueMotor:
+    """A row of a catalogue: a motor, which may have a gear already."""
+
+    name: str = value(Name(), "name of the motor, each once")
+    inertia: float = number(units.INERTIA, "inertia of the rotor", check=POSITIVE)
+    continuous_torque: float | None = number(
+        _TORQUE, "largest root mean square of the torque", check=POSITIVE, default=None
+    )
+    max_torque: float | None = number(_TORQUE, "largest |torque|", check=POSITIVE, default=None)
+    max_velocity: float | None = number(_VELOCITY, "largest |speed|", check=POSITIVE, default=None)
+    torque_constant: float | None = number(
+        units.TORQUE_CONSTANT, "torque over current, and so voltage over speed", check=POSITIVE, default=None
+    )
+    resistance: float | None = number(
+        units.RESISTANCE,
+        "resistance of the windings; needs torque_constant",
+        check=NON_NEGATIVE,
+        default=None,
+    )
+    continuous_current: float | None = number(
+        units.CURRENT,
+        "largest root mean square of the current; needs torque_constant",
+        check=POSITIVE,
+        default=None,
+    )
+    max_current: float | None = number(
+        units.CURRENT, "largest |current|; needs torque_constant", check=POSITIVE, default=None
+    )
+    max_voltage: float | None = number(
+        units.VOLTAGE,
+        "largest |voltage|; needs torque_constant and resistance",
+        check=POSITIVE,
+        default=None,
+    )
+    damping: float = number(_DAMPING, "viscous damping", check=NON_NEGATIVE, default=0.0)
+    coulomb: float = number(_TORQUE, "dry friction against the motion", check=NON_NEGATIVE, default=0.0)
+    gear_ratio: float | None = number(
+        units.GEAR_RATIO,
+        "turns of the motor to one of the joint, or rad to 1 m, if it has a gear; else gears are looked for",
+        check=POSITIVE,
+        default=None,
+    )
+    gear_efficiency: float = number(
+        units.DIMENSIONLESS,
+        "share of the power that its gear passes on, in either direction",
+        check=_SHARE,
+        default=1.0,
+    )
+    mass: float | None = number(units.MASS, "mass of the motor with its gear", check=POSITIVE, default=None)
+
+    def __post_init__(self) -> None:
+        check_fields(self, *self._missing(), *self._stuck())
+
+    def _missing(self) -> Iterator[FieldProblem]:
+        """What cannot do without other columns."""
+        for name, needed in _NEEDED.items():
+            missing = [key for key in needed if getattr(self, key) is None]
+            if getattr(self, name) is not None and missing:
+                yield FieldProblem((name,), f"needs {' and '.join(missing)}, too")
+        if all(getattr(self, name) is None for name in _BEARING):
+            yield FieldProblem((), f"nothing bounds its torque: give one of {', '.join(_BEARING)}")
+
+    def _stuck(self) -> Iterator[FieldProblem]:
+        """Friction that the motor cannot overcome, by its torque or by its voltage."""
+        if (
+            self.coulomb
+            and not any(True for _ in self._missing())
+            and self.coulomb >= self.shaft.stall_torque
+        ):
+            reason = f"must be below the {self.shaft.stall_torque:.4g} N m that the motor can give at all"
+            yield FieldProblem(("coulomb",), reason)
+
+    @property
+    def shaft(self) -> Shaft:
+        """The motor as it is looked at here."""
+        constant = math.nan if self.torque_constant is None else self.torque_constant
+        return Shaft(
+            inertia=self.inertia,
+            damping=self.damping,
+            backward=self.coulomb,
+            forward=self.coulomb,
+            offset=0.0,
+            max_torque=_smallest(self.max_torque, self.max_current, constant),
+            continuous_torque=_smallest(self.continuous_torque, self.continuous_current, constant),
+            max_velocity=_or_infinite(self.max_velocity),
+            max_voltage=_or_infinite(self.max_voltage),
+            torque_constant=constant,
+            resistance=math.nan if self.resistance is None else self.resistance,
+            efficiency=self.gear_efficiency,
+        )
+
+
+def read_catalogue(path: str | os.PathLike[str]) -> RecordTable[CatalogueMotor]:
+    """Read the motors of a catalogue.
+
+    Raises:
+        InputError: with file and line of everything that is wrong.
+    """
+    return read_records(path, CatalogueMotor, "name")
+
+
+def _or_infinite(bound: float | None) -> float:
+    return math.inf if bound is None else bound
+
+
+def _smallest(torque: float | None, current: float | None, constant: float) -> float:
+    """The torque that is within both bounds."""
+    by_current = math.inf if current is None else current * constant
+    return min(_or_infinite(torque), by_current)

@@ -1,0 +1,142 @@
+"""One motor of a robot: what is asked of it, what it does, and which of a catalogue would do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar
+
+from vsacli.base.json_records import Published, named
+from vsacli.base.units import TORQUE, VELOCITY
+from vsacli.studies.sizing.catalogue import CatalogueMotor
+from vsacli.studies.sizing.choices import Choice
+from vsacli.studies.sizing.demand import MotorDemand, Peak
+from vsacli.studies.sizing.shaft import Shaft
+from vsacli.studies.sizing.working_points import WorkingPoints
+
+
+@dataclass(frozen=True)
+class Asked(Published):
+    """What is asked of a motor whichever it is, joint side of its gear.
+
+    Attributes:
+        load: largest |torque| of springs, and of what else acts beside them, N m (N).
+        rms_load: root mean square over time.
+        velocity: largest speed, rad/s (m/s).
+        acceleration: largest in size, rad/s^2 (m/s^2).
+        power: largest power that goes into the load, W.
+    """
+
+    load: Peak
+    rms_load: float
+    velocity: Peak
+    acceleration: float
+    power: float
+
+
+@dataclass(frozen=True)
+class OwnMotor(Published):
+    """What the robot's own motor does.
+
+    Attributes:
+        points: on its shaft; on the joint's side if its gear is not known.
+        shares: what it uses of each of its limits, by name.
+        does: whether all are kept.
+        low, high: gear ratios between which they would be; NaN if with none, or if that is not known.
+    """
+
+    points: WorkingPoints
+    shares: dict[str, float]
+    does: bool
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class MotorSizing(Published):
+    """One motor of the robot.
+
+    Attributes:
+        demand: what is asked of it, step by step.
+        gear_ratio: of the robot's own motor; None if it is not known.
+        own: what that does; None if no step can be done.
+        choices: motors of the catalogue in its place, those that do first, the best of these first.
+        record: the first of these in the catalogue.
+        shaft: its constants, or those of the robot's own motor without a catalogue.
+        points: what that one does on its shaft.
+    """
+
+    demand: MotorDemand = field(repr=False)
+    gear_ratio: float | None
+    own: OwnMotor | None = None
+    choices: tuple[Choice, ...] = ()
+    record: CatalogueMotor | None = field(default=None, repr=False)
+    shaft: Shaft | None = field(default=None, repr=False)
+    points: WorkingPoints | None = field(default=None, repr=False)
+
+    shape: ClassVar = {
+        **named("joint", "motor", "gear_ratio", "does"),
+        "asked": "asked",
+        "own": "own",
+        "chosen?": "chosen",
+        "choices?": "choices",
+    }
+
+    @property
+    def joint(self) -> str:
+        """Whose motor it is."""
+        return self.demand.joint
+
+    @property
+    def motor(self) -> int:
+        """1 or 2."""
+        return self.demand.number
+
+    @property
+    def name(self) -> str:
+        """Joint and number."""
+        return f"{self.joint} {self.motor}"
+
+    @property
+    def title(self) -> str:
+        """Name, and with which motor and gear."""
+        if self.best is None:
+            return self.name if self.gear_ratio is None else f"{self.name}, gear {abs(self.gear_ratio):.4g}"
+        return f"{self.name}: {self.best.motor}, gear {self.best.ratio:.4g}"
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Of the torques and velocities of its points."""
+        known = self.best is not None or self.gear_ratio is not None
+        joint_type = "revolute" if known else self.demand.joint_type
+        return TORQUE.unit(joint_type), VELOCITY.unit(joint_type)
+
+    @property
+    def best(self) -> Choice | None:
+        """The motor that comes first: it does, or is the one that comes nearest to it."""
+        return self.choices[0] if self.choices else None
+
+    @property
+    def does(self) -> bool:
+        """Whether a motor of the catalogue does; without one, the robot's own."""
+        judged = self.best or self.own
+        return judged is not None and judged.does
+
+    @property
+    def chosen(self) -> WorkingPoints | None:
+        """What the best motor of the catalogue does."""
+        return self.points if self.choices else None
+
+    @cached_property
+    def asked(self) -> Asked | None:
+        """What is asked of any motor; None if no step can be done."""
+        demand = self.demand
+        if not demand.time.size:
+            return None
+        return Asked(
+            load=demand.peak(demand.load),
+            rms_load=demand.rms(demand.load),
+            velocity=demand.peak(demand.velocity),
+            acceleration=demand.peak(demand.acceleration).value,
+            power=float((demand.load * demand.velocity).max(initial=0.0)),
+        )

@@ -1,0 +1,131 @@
+"""Sizing of drives: what trajectories ask of motors and springs, and which motors of a catalogue would do."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+
+from vsacli.actuators.limit_check import LIMIT_ROUNDING
+from vsacli.actuators.motor import JointMotor
+from vsacli.base.errors import InputError
+from vsacli.documents.record_table import RecordTable
+from vsacli.robot.model import Robot
+from vsacli.studies.sizing.catalogue import CatalogueMotor, read_catalogue
+from vsacli.studies.sizing.choices import CRITERIA, check_criterion, choices, usual_criterion
+from vsacli.studies.sizing.demand import MotorDemand, demanded
+from vsacli.studies.sizing.gears import Gears, gears_of_joints
+from vsacli.studies.sizing.motor_sizing import MotorSizing, OwnMotor
+from vsacli.studies.sizing.ratios import ratios_within
+from vsacli.studies.sizing.shaft import Shaft
+from vsacli.studies.sizing.sizing_report import Sizing
+from vsacli.studies.sizing.working_points import WorkingPoints
+from vsacli.trajectory.trajectory import Trajectory
+
+
+def size_drives(
+    robot: Robot,
+    trajectories: Sequence[Trajectory],
+    catalogue: str | os.PathLike[str] | None = None,
+    gears: Sequence[str] = (),
+    minimize: str | None = None,
+    *,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Sizing:
+    """What motions ask of motors and springs, and which motors of a catalogue, with which gears, would do.
+
+    Peaks are the largest of all trajectories, means are over all of them, one after the other as a cycle.
+
+    Args:
+        robot: the robot.
+        trajectories: what it is to do.
+        catalogue: path of a CSV file of motors; None to look at the robot's own alone.
+        gears: ratios such as "50,80,100", or a range such as "30..160", for all joints, or for one of them as
+            in "slide=500..3000"; any if empty. Motors that have a gear in the catalogue keep it.
+        minimize: "copper", "utilisation" or "mass", by which the best is chosen; the first if the catalogue
+            says enough for it, else the second.
+        progress: is told how many further steps are done.
+
+    Raises:
+        InputError: a trajectory does not fit the robot, the catalogue cannot be read, or gears or criterion
+            are none.
+    """
+    by_joint = gears_of_joints(gears, robot.joint_names)
+    table = None if catalogue is None else read_catalogue(catalogue)
+    criterion = _criterion(table, gears, minimize)
+    demand = demanded(robot, trajectories, progress)
+    own = [(joint, motor) for joint in robot.joints for motor in joint.actuator.motors]
+    found = [
+        _sized(asked, motor, table, by_joint[asked.joint], criterion)
+        for asked, (_, motor) in zip(demand.motors, own, strict=True)
+    ]
+    return Sizing(
+        robot=robot.name,
+        outcomes=demand.outcomes,
+        catalogue=None if table is None else table.source.path,
+        candidates=0 if table is None else len(table.records),
+        criterion=criterion,
+        motors=tuple(found),
+        springs=demand.springs,
+        notes=tuple(_notes(robot, table)),
+    )
+
+
+def _criterion(
+    table: RecordTable[CatalogueMotor] | None, gears: Sequence[str], minimize: str | None
+) -> str | None:
+    if table is None:
+        if gears or minimize is not None:
+            raise InputError.one("gears and a criterion are for motors of a catalogue; give one")
+        return None
+    if minimize is None:
+        return usual_criterion(table.records)
+    if minimize not in CRITERIA:
+        raise InputError.one(f"unknown criterion {minimize!r}, expected one of {', '.join(CRITERIA)}")
+    check_criterion(minimize, table.records)
+    return minimize
+
+
+def _sized(
+    demand: MotorDemand,
+    motor: JointMotor,
+    table: RecordTable[CatalogueMotor] | None,
+    gears: Gears,
+    criterion: str | None,
+) -> MotorSizing:
+    """One motor of the robot, which nothing is known of if no step can be done."""
+    if not demand.time.size:
+        return MotorSizing(demand, motor.gear_ratio)
+    own = WorkingPoints.as_it_is(demand, motor)
+    found = choices(demand, table.records, gears, criterion) if table and criterion else ()
+    best = next((each for each in table.records if each.name == found[0].motor), None) if table else None
+    return MotorSizing(
+        demand,
+        motor.gear_ratio,
+        own=_own(demand, motor, own),
+        choices=found,
+        record=best,
+        shaft=Shaft.of_joint_motor(motor) if best is None else best.shaft,
+        points=own if best is None else WorkingPoints.with_gear(demand, best.shaft, found[0].ratio),
+    )
+
+
+def _own(demand: MotorDemand, motor: JointMotor, points: WorkingPoints) -> OwnMotor:
+    shaft = Shaft.of_joint_motor(motor)
+    shares = points.shares(shaft)
+    low = high = math.nan
+    if motor.gear_ratio is not None and not (motor.friction and motor.friction.width):
+        possible = ratios_within(demand, Shaft.of([shaft]))
+        if not possible.empty[0]:
+            low, high = float(possible.low[0]), float(possible.high[0])
+    does = max(shares.values(), default=0.0) <= 1 + LIMIT_ROUNDING
+    return OwnMotor(points, shares, does, low, high)
+
+
+def _notes(robot: Robot, table: RecordTable[CatalogueMotor] | None) -> Iterator[str]:
+    """What the numbers rest on, where that is not obvious."""
+    coupled = [joint.name for joint in robot.joints if joint.actuator.coupled_rotors]
+    if coupled and table is not None:
+        yield f"{', '.join(coupled)}: the coupled inertia stays as it is, whatever the motors"
+    if table is not None and table.others:
+        yield f"columns of the catalogue that were left out: {', '.join(table.others)}"
