@@ -17,6 +17,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from samples.catalogues import GENERIC
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited, installed
 from samples.disturbed import PATIENCE, Disturbance, Disturber
 from samples.excited import Excitation, excited
