@@ -10,6 +10,7 @@ import click
 
 from vsacli.cli.command_parts import example, json_option, overwrite_option, robot_argument, run_stem
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
+from vsacli.cli.file_names import FILE, FOLDER
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -25,10 +26,10 @@ if TYPE_CHECKING:
     ),
 )
 @robot_argument
-@click.argument("trajectories", nargs=-1, required=True, metavar="TRAJECTORY...")
+@click.argument("trajectories", nargs=-1, required=True, metavar="TRAJECTORY...", type=FILE)
 @click.option(
     "--catalogue",
-    metavar="FILE",
+    type=FILE,
     help="Motors to choose from, a CSV file; by default the robot's own motors are held to their limits.",
 )
 @click.option(
@@ -44,8 +45,8 @@ if TYPE_CHECKING:
     help="What the best choice has least of: heat in its windings, the share of its limits that it uses, or "
     "mass. By default the first if the catalogue says enough for it, else the second.",
 )
-@click.option("-o", "--output", metavar="FILE", help="Write the robot file with the motors chosen.")
-@click.option("--plot", "folder", metavar="FOLDER", help="Save a figure of torques over speeds there.")
+@click.option("-o", "--output", type=FILE, help="Write the robot file with the motors chosen.")
+@click.option("--plot", "folder", type=FOLDER, help="Save a figure of torques over speeds there.")
 @json_option
 @overwrite_option
 @talk_options

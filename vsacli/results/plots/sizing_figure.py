@@ -14,8 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.plots.drawing import house_style, line_style
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete
+from vsacli.results.plots.styles import house_style, line_style
 
 PANEL_HEIGHT = 2.1
 """Inches."""
