@@ -39,6 +39,7 @@ LONG = (
     *("python.md", "quickstart.md", "reading-a-verdict.md"),
     *("recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "simulation.md", "studies.md"),
     *("sizing.md", "suggestions.md", "urdf.md"),
+    "models.md",
 )
 """Pages whose examples take more than a second."""
 

@@ -13,6 +13,7 @@ from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.limit_check import LimitCheck, OfJoint, within
 from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
@@ -168,6 +169,16 @@ class Actuator(ABC):
     def sources(self) -> tuple[Source, ...]:
         """Files that its springs were read from."""
         return ()
+
+    @property
+    def spring_elements(self) -> tuple[SpringElement, ...] | None:
+        """Its springs, if a weighted sum of positions stretches each; None if they are no such springs."""
+        return None if self.sprung else ()
+
+    @property
+    def lever_spring(self) -> LeverSpring | None:
+        """Its only spring, if that lies between a lever and a point of the link."""
+        return None
 
     def limits(self) -> Iterator[LimitCheck]:
         """Its limits, finite or not."""

@@ -19,6 +19,7 @@ from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.pairs.decoupling_matrix import beta, determinant, solve
 from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
 from vsacli.actuators.reach import Reach, deflections_within_reach
+from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
@@ -120,6 +121,13 @@ class Antagonistic(Actuator):
     def sources(self) -> tuple[Source, ...]:
         """Those of the springs."""
         return tuple(source for law in self._distinct_springs for source in law.sources)
+
+    @property
+    def spring_elements(self) -> tuple[SpringElement, ...]:
+        """The springs of both sides, and the coupling."""
+        one, two = self.laws
+        sides = (SpringElement(one, -1.0, (1.0, 0.0)), SpringElement(two, -1.0, (0.0, 1.0)))
+        return sides if self.coupling is None else (*sides, SpringElement(self.coupling, 0.0, (1.0, -1.0)))
 
     @property
     def _distinct_springs(self) -> tuple[SpringLaw, ...]:

@@ -17,6 +17,7 @@ from vsacli.actuators.laws.rows import SpringRows
 from vsacli.actuators.limit_check import LimitCheck, OfJoint
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import Reach
+from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.transmission import Command, Transmission, single_motor
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
@@ -97,6 +98,11 @@ class Elastic(Actuator):
     def sources(self) -> tuple[Source, ...]:
         """Those of the spring."""
         return self.law.sources
+
+    @property
+    def spring_elements(self) -> tuple[SpringElement, ...]:
+        """The spring."""
+        return (SpringElement(self.law, -1.0, (1.0,)),)
 
     def limits(self) -> Iterator[LimitCheck]:
         """Those of every actuator, and the torques that the spring can carry."""

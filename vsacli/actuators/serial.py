@@ -21,6 +21,7 @@ from vsacli.actuators.mechanisms.mechanism import Mechanism
 from vsacli.actuators.mechanisms.state import MechanismState
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import deflections_within_reach
+from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -122,6 +123,16 @@ class Serial(Actuator):
     def sources(self) -> tuple[Source, ...]:
         """Those of the mechanism."""
         return self.mechanism.sources
+
+    @property
+    def spring_elements(self) -> tuple[SpringElement, ...] | None:
+        """Those of the mechanism."""
+        return self.mechanism.spring_elements
+
+    @property
+    def lever_spring(self) -> LeverSpring | None:
+        """That of the mechanism."""
+        return self.mechanism.lever_spring
 
     @property
     def spring_group(self) -> Hashable:

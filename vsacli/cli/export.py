@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import click
+from click.core import ParameterSource
 
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.streams import STANDARD
@@ -15,36 +17,38 @@ from vsacli.cli.command_parts import (
     result_line,
     variables_option,
 )
-from vsacli.cli.console import Exit, Talk, talk_options, tell
+from vsacli.cli.console import Exit, Talk, say, talk_options, tell
 from vsacli.cli.file_names import FILE
 from vsacli.results.exports import FORMATS as OF_RESULTS
+from vsacli.robot.models import FORMATS as OF_ROBOTS
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Staged
+    from vsacli.files.file_kinds import FileKind
     from vsacli.results.exports.result_format import ResultFormat
     from vsacli.results.store.reader import StoredResult
+
+ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
+"""Options that say nothing of a robot."""
 
 
 @click.command(
     "export",
-    short_help="Write motor torques, or other variables, for other programs.",
+    short_help="Write results, or the robot, for other programs.",
     epilog=example("vsacli export result.h5 --rate 250 -o torques.csv"),
 )
 @click.argument("file", type=FILE)
-@click.option(
-    "-o", "--output", type=FILE, help="File to write; by default standard output, which takes texts."
-)
+@click.option("-o", "--output", type=FILE, help="File to write; by default standard output, for text.")
 @click.option(
     "--format",
     "form",
-    type=click.Choice(tuple(OF_RESULTS)),
-    default="csv",
-    show_default=True,
-    help="CSV, a MATLAB file, Parquet, or a message JointTrajectory of ROS 2.",
+    type=click.Choice((*OF_RESULTS, *OF_ROBOTS)),
+    help="Of a result: CSV, which is the default, a MATLAB file, Parquet, or a JointTrajectory of ROS 2; of "
+    "a robot: URDF, or MJCF, the XML of MuJoCo.",
 )
 @variables_option(
     "tau_motor, of a simulation q_actual, stiffness_actual, tau_motor_actual; of a joint-trajectory what it "
-    "has fields for: q, dq, ddq, tau_e"
+    "has fields for, q, dq, ddq, tau_e"
 )
 @click.option(
     "--rate", metavar="HZ", type=float, help="Samples per second, a whole fraction of the stored rate."
@@ -62,15 +66,12 @@ if TYPE_CHECKING:
 def export(
     file: str,
     output: str | None,
-    form: str,
-    variables: tuple[str, ...] | None,
-    rate: float | None,
-    side: str,
-    allow_nan: bool,
+    form: str | None,
     overwrite: bool,
     talk: Talk,
+    **of_results: Any,
 ) -> int:
-    """Write variables of a result or a simulation for other programs.
+    """Write variables of a result or a simulation, or a robot, for other programs.
 
     By default these are the motor torques to send; of a simulation, motion, stiffness and motor torques as
     they were.
@@ -80,27 +81,84 @@ def export(
 
     With --side motor, motion and torque of the motors are those of their shafts, in rad and N m at any joint;
     every motor needs a gear_ratio in the robot file. What is not of a motor stays as it is.
+
+    Of a robot, URDF holds links and joints. MJCF holds motors and springs as well; forces for which it has no
+    place go to a Python file beside it, FILE_forces.py.
     """
+    from vsacli.files.file_kinds import FileKind, recognise
+
+    kind = recognise(file)
+    output = None if output == STANDARD else output
+    if kind is FileKind.ROBOT:
+        _check_options()
+        return _export_robot(file, output, _chosen(form, OF_ROBOTS, file, kind), overwrite, talk)
+    if kind not in {FileKind.RESULT, FileKind.SIMULATION}:
+        raise InputError.one(f"is a {kind}; export takes a result, a simulation or a robot", file)
+    name = _chosen(form or "csv", OF_RESULTS, file, kind)
+    if OF_RESULTS[name].binary and output is None:
+        raise InputError.one(f"a {name} file is no text; name it with -o")
+    options = {**of_results, "progress": talk.writing}
+    return _export_result(file, output, OF_RESULTS[name], options, overwrite, talk)
+
+
+def _chosen(form: str | None, formats: Any, file: str, kind: FileKind) -> str:
+    """A format that there is for a kind of files."""
+    words = ", ".join(formats)
+    if form is None:
+        raise InputError.one(f"is a {kind}; say by --format as what to write it: {words}", file)
+    if form not in formats:
+        raise InputError.one(f"is a {kind}, which --format {form} is not for; there is {words}", file)
+    return form
+
+
+def _check_options() -> None:
+    """Refuse options of results."""
+    context = click.get_current_context()
+    for name in ONLY_OF_RESULTS:
+        if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
+            option = f"--{name.replace('_', '-')}"
+            raise click.UsageError(f"{option} is for results, and says nothing of a robot; leave it out")
+
+
+def _export_robot(file: str, output: str | None, form: str, overwrite: bool, talk: Talk) -> int:
     from vsacli.base.outputs import Outputs
-    from vsacli.results.exports.result_format import UndefinedSamplesError
+    from vsacli.robot.file import load_robot
+
+    robot = load_robot(file)
+    model = OF_ROBOTS[form](robot)
+    if output is None:
+        if model.forces is not None:
+            raise InputError.one("a Python file with forces belongs to this model; name both with -o", file)
+        say(model.text.rstrip("\n"))
+    else:
+        with Outputs(overwrite=overwrite, inputs=[source.path for source in robot.sources]) as outputs:
+            outputs.file(output).write_text(model.text)
+            if model.forces is not None:
+                path = Path(output)
+                outputs.file(path.with_name(f"{path.stem}_forces.py")).write_text(model.forces)
+        talk.wrote(outputs)
+    for note in model.notes:
+        talk.note(note)
+    return Exit.OK
+
+
+def _export_result(
+    file: str, output: str | None, form: ResultFormat, options: dict[str, Any], overwrite: bool, talk: Talk
+) -> int:
+    from vsacli.base.outputs import Outputs
+    from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
     from vsacli.results.store.simulation import open_stored
 
-    options: dict[str, Any] = {"variables": variables, "rate": rate, "allow_nan": allow_nan, "side": side}
-    options["progress"] = talk.writing
-    chosen: ResultFormat = OF_RESULTS[form]
-    to_file = output is not None and output != STANDARD
-    if chosen.binary and not to_file:
-        raise InputError.one(f"a {form} file is no text; name it with -o")
     try:
         with open_stored(file) as stored:
             talk.detail(result_line(stored))
-            if to_file:
-                assert output is not None
-                with Outputs(overwrite=overwrite, inputs=[file]) as outputs:
-                    _write(stored, outputs.file(output), chosen, options)
-                talk.wrote(outputs)
+            if output is None:
+                export_result(stored, _stdout(), form, **options)
+                sys.stdout.flush()
             else:
-                _print(stored, chosen, options)
+                with Outputs(overwrite=overwrite, inputs=[file]) as outputs:
+                    _write(stored, outputs.file(output), form, options)
+                talk.wrote(outputs)
     except UndefinedSamplesError as error:
         tell(str(error))
         return Exit.VERDICT
@@ -112,13 +170,6 @@ def _write(stored: StoredResult, file: Staged, form: ResultFormat, options: dict
 
     with file.opened_for_bytes() if form.binary else file.opened() as stream:
         export_result(stored, stream, form, **options)
-
-
-def _print(stored: StoredResult, form: ResultFormat, options: dict[str, Any]) -> None:
-    from vsacli.results.exports.result_format import export_result
-
-    export_result(stored, _stdout(), form, **options)
-    sys.stdout.flush()
 
 
 def _stdout() -> TextIO:

@@ -21,6 +21,11 @@ class Cubic(SpringLaw):
     k: float = number(units.STIFFNESS, "linear coefficient K", check=POSITIVE)
     k_c: float = number(units.CUBIC_STIFFNESS, "cubic coefficient Kc", check=POSITIVE)
 
+    @property
+    def polynomial(self) -> tuple[float, ...]:
+        """K and Kc."""
+        return (self.k, 0.0, self.k_c)
+
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """The closed pair of twins, on the branch of equations (28)-(31)."""
         return CubicTwins(self) if other == self else None

@@ -63,6 +63,11 @@ class SpringLaw(ABC):
         """Whether the stiffness is the same at every deflection."""
         return False
 
+    @property
+    def polynomial(self) -> tuple[float, ...] | None:
+        """Coefficients of phi, phi^2, ... if the torque is a polynomial on the domain; None if it is none."""
+        return None
+
     def as_second(self) -> SpringLaw:
         """The law as it acts on side 2, where a tendon pulls the other way."""
         return self

@@ -38,6 +38,11 @@ class Polynomial(SpringLaw):
         """Whether all but the first coefficient vanish."""
         return len(self._coefficients) == 1
 
+    @property
+    def polynomial(self) -> tuple[float, ...]:
+        """The coefficients, with zeros for even powers."""
+        return tuple(term for each in self._coefficients for term in (each, 0.0))[:-1]
+
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Derivatives as power series, odd and even in turn, which share the square."""
         squared = phi * phi

@@ -20,6 +20,11 @@ class Quadratic(Tendon):
 
     k: float = number(units.QUADRATIC_STIFFNESS, "quadratic coefficient k", check=POSITIVE)
 
+    @property
+    def polynomial(self) -> tuple[float, ...]:
+        """The quadratic term alone."""
+        return (0.0, self.k)
+
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """The closed pair of twins."""
         return QuadraticTwins(self) if other == self.as_second() else None

@@ -55,6 +55,12 @@ class Mirrored(SpringLaw):
         """Whether the law only pulls."""
         return self.law.pulls_only
 
+    @property
+    def polynomial(self) -> tuple[float, ...] | None:
+        """Terms of odd power are the law's, those of even power their opposites."""
+        terms = self.law.polynomial
+        return terms and tuple(term if power % 2 else -term for power, term in enumerate(terms, 1))
+
     def hardening(self, phi: FloatArray) -> FloatArray:
         """The hardening is odd in the deflection."""
         return -self.law.hardening(-phi)

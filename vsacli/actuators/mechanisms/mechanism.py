@@ -11,6 +11,7 @@ import numpy as np
 
 from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.mechanisms.state import DeflectionState, MechanismState, Partials
+from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.documents.fields import check_fields
 from vsacli.documents.source import Source
@@ -67,6 +68,16 @@ class Mechanism(ABC):
     def sources(self) -> tuple[Source, ...]:
         """Files that it was read from."""
         return ()
+
+    @property
+    def spring_elements(self) -> tuple[SpringElement, ...] | None:
+        """See `Actuator.spring_elements`."""
+        return None
+
+    @property
+    def lever_spring(self) -> LeverSpring | None:
+        """See `Actuator.lever_spring`."""
+        return None
 
     @abstractmethod
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:

@@ -15,6 +15,7 @@ from vsacli.actuators.laws.pair import PairSolution
 from vsacli.actuators.mechanisms.mechanism import Mechanism, Range
 from vsacli.actuators.mechanisms.state import Partials
 from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
+from vsacli.actuators.spring_elements import SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import OneOf, Pair, check_fields, choice, value
@@ -89,6 +90,12 @@ class ShiftedCams(Mechanism):
     def sources(self) -> tuple[Source, ...]:
         """Those of the cams."""
         return tuple(source for law in self._cams.distinct for source in law.sources)
+
+    @property
+    def spring_elements(self) -> tuple[SpringElement, ...]:
+        """Both cams."""
+        first, second = self._cams.laws
+        return (SpringElement(first, -1.0, (1.0, 1.0)), SpringElement(second, -1.0, (1.0, -1.0)))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
         """Deflection and setting from the solution of the pair."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift
 from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import PreloadedCam
+from vsacli.actuators.spring_elements import LeverSpring
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
@@ -43,6 +44,11 @@ class Maccepa(PreloadedCam):
     def deflection_range(self) -> tuple[float, float]:
         """Half a turn either way."""
         return (-math.pi, math.pi)
+
+    @property
+    def lever_spring(self) -> LeverSpring:
+        """The spring."""
+        return LeverSpring(self.b, self.c, self.k, self.r)
 
     def lift(self, from_rest: FloatArray) -> Lift:
         """Growth of the distance a; with half angles, so that nothing cancels at rest."""

@@ -1,0 +1,122 @@
+"""`vsacli export`: a robot as URDF and MJCF."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import mujoco
+import pytest
+from samples.command_line import REPOSITORY, ROBOT, contents, installed
+
+ROBOTS = REPOSITORY / "robots"
+
+
+def test_a_model_goes_to_standard_output_or_to_a_file(vsacli, tmp_path):
+    printed = vsacli("export", ROBOT, "--format", "mjcf")
+    assert (printed.code, printed.err) == (0, "")
+    written = vsacli("export", ROBOT, "--format", "mjcf", "-o", "arm.xml")
+    assert (written.code, written.out, written.err) == (0, "", "wrote arm.xml\n")
+    assert (tmp_path / "arm.xml").read_text(encoding="utf-8") == printed.out
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml")).nq == 9
+
+
+def test_forces_that_mjcf_has_no_place_for_are_beside_it(vsacli, tmp_path):
+    robot = ROBOTS / "awas_1r.yaml"
+    done = vsacli("export", robot, "--format", "mjcf")
+    assert (done.code, done.out) == (2, "")
+    assert done.err.endswith("a Python file with forces belongs to this model; name both with -o\n")
+    done = vsacli("export", robot, "--format", "mjcf", "-o", "a.b.xml")
+    assert (done.code, done.err) == (0, "wrote a.b.xml\nwrote a.b_forces.py\n")
+    assert "Beside it, passive forces: springs of elbow." in (tmp_path / "a.b.xml").read_text()
+
+
+USING = """
+import mujoco, runpy
+other = mujoco.MjModel.from_xml_string(
+    "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
+)
+model = mujoco.MjModel.from_xml_path("awas.xml")
+data = mujoco.MjData(model)
+runpy.run_path("awas_forces.py")["install"](model)
+data.qpos[:] = [0, 0.1, 5]
+mujoco.mj_forward(model, data)
+print(data.qfrc_passive.round(3).tolist())
+its = mujoco.MjData(other)
+mujoco.mj_step(other, its)
+print(its.qfrc_passive.tolist())
+"""
+
+
+def test_the_forces_act_on_their_model_alone_and_need_nothing_of_vsacli(vsacli, tmp_path):
+    vsacli("export", ROBOTS / "awas_1r.yaml", "--format", "mjcf", "-o", "awas.xml")
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", USING + "import sys; assert 'vsacli' not in sys.modules"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    torque, other = done.stdout.splitlines()
+    r, phi = 0.05, 0.1
+    tau_e, against_setting = 120000 * r**2 * math.sin(phi) * math.cos(phi), 1200 * r * math.sin(phi) ** 2
+    assert json.loads(torque) == [round(each, 3) for each in (tau_e, -tau_e, -against_setting)]
+    assert other == "[0.0]"
+
+
+def test_a_urdf_comes_back(vsacli, tmp_path):
+    done = vsacli("export", ROBOT, "--format", "urdf", "-o", "arm.urdf")
+    assert done.code == 0
+    assert done.err.splitlines() == [
+        "wrote arm.urdf",
+        "motors and springs are left out: URDF has no place for them (base, shoulder, elbow)",
+    ]
+    assert vsacli("import-urdf", "arm.urdf").code == 0
+    assert (tmp_path / "arm.yaml").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "is a robot; say by --format as what to write it: urdf, mjcf"),
+        (["--format", "csv"], "is a robot, which --format csv is not for; there is urdf, mjcf"),
+        (["--format", "urdf", "--rate", "100"], "--rate is for results, and says nothing of a robot"),
+        (["--format", "urdf", "--allow-nan"], "--allow-nan is for results"),
+    ],
+)
+def test_what_is_not_for_robots_is_refused(vsacli, arguments, message):
+    done = vsacli("export", ROBOT, *arguments)
+    assert (done.code, done.out) == (2, "")
+    assert message in done.err
+
+
+def test_other_files_are_refused(vsacli, feasible_result, motion):
+    done = vsacli("export", feasible_result, "--format", "urdf")
+    assert done.code == 2
+    assert "is a result, which --format urdf is not for; there is csv, mat, parquet, joint-traj" in done.err
+    done = vsacli("export", motion)
+    assert done.err == f"{motion}: is a trajectory; export takes a result, a simulation or a robot\n"
+
+
+def test_a_link_that_mujoco_refuses_is_named_and_nothing_is_written(vsacli, tmp_path):
+    done = vsacli("export", ROBOTS / "puma_560.yaml", "--format", "mjcf", "-o", "puma.xml")
+    assert (done.code, done.out) == (2, "")
+    waist, elbow = done.err.splitlines()
+    assert waist.startswith(f"{ROBOTS / 'puma_560.yaml'}: link of joint waist: MuJoCo takes no body without")
+    assert "link of joint elbow: its inertia breaks the triangle inequality (0.086 > 0.0125 + 0.066" in elbow
+    assert contents(tmp_path) == {}
+
+
+def test_files_that_exist_are_kept(vsacli, tmp_path):
+    (tmp_path / "awas_forces.py").write_text("precious")
+    done = vsacli("export", ROBOTS / "awas_1r.yaml", "--format", "mjcf", "-o", "awas.xml")
+    assert done.code == 4
+    assert contents(tmp_path) == {"awas_forces.py": b"precious"}
+
+
+def test_the_installed_command_writes_a_model(tmp_path):
+    done = installed("export", ROBOT, "--format", "urdf", folder=tmp_path)
+    assert (done.returncode, done.stdout.count("<link ")) == (0, 5)

@@ -1,0 +1,160 @@
+"""Exported models in MuJoCo: its inverse dynamics, and motions that computed torques drive."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import DAMPING
+from vsacli.base.variables import VARIABLES
+from vsacli.robot.model import Robot
+from vsacli.robot.models.mjcf import mjcf_model
+from vsacli.robot.models.mjcf_rotor import motor_name
+
+
+class Compiled(NamedTuple):
+    """A model with its data, and the forces that go beside it, which act within `compiled`."""
+
+    model: Any
+    data: Any
+
+
+@contextlib.contextmanager
+def compiled(robot: Robot) -> Iterator[Compiled]:
+    """The exported model."""
+    exported = mjcf_model(robot)
+    model = mujoco.MjModel.from_xml_string(exported.text)
+    try:
+        if exported.forces is not None:
+            namespace: dict[str, Any] = {}
+            exec(compile(exported.forces, "forces.py", "exec"), namespace)
+            namespace["install"](model)
+        yield Compiled(model, mujoco.MjData(model))
+    finally:
+        mujoco.set_mjcb_passive(None)
+        mujoco.set_mjcb_control(None)
+
+
+class Coordinates(NamedTuple):
+    """Positions, velocities, accelerations of the model's coordinates along a run, each (samples, nq)."""
+
+    positions: FloatArray
+    velocities: FloatArray
+    accelerations: FloatArray
+
+
+def coordinates(robot: Robot, model: Any, result: Any) -> Coordinates:
+    """Of joints and motors with springs, where MuJoCo has them."""
+    samples = len(result.time)
+    rows = Coordinates(*np.zeros((3, samples, model.nq)))
+    names = (("q", "theta"), ("dq", "dtheta"), ("ddq", "ddtheta"))
+    for index, joint in enumerate(robot.joints):
+        for values, (of_joint, of_motor) in zip(rows, names, strict=True):
+            values[:, model.joint(joint.name).qposadr[0]] = getattr(result, of_joint)[:, index]
+            for side in range(joint.actuator.motor_count if joint.actuator.sprung else 0):
+                place = model.joint(motor_name(joint, side + 1)).qposadr[0]
+                values[:, place] = getattr(result, of_motor)[:, index, side]
+    return rows
+
+
+def torques(robot: Robot, result: Any) -> FloatArray:
+    """(samples, motors) in the order of exported columns."""
+    columns = [
+        result.tau_motor[:, index, side]
+        for index, joint in enumerate(robot.joints)
+        for side in range(joint.actuator.motor_count)
+    ]
+    return np.stack(columns, axis=1)
+
+
+def controls(robot: Robot, result: Any) -> FloatArray:
+    """Torques of the motors, then the damping of each damper."""
+    columns = list(torques(robot, result).T)
+    for index, joint in enumerate(robot.joints):
+        if joint.damper is not None:
+            columns += [getattr(result, DAMPING.key)[:, index]] * _dampers(joint)
+    return np.stack(columns, axis=1)
+
+
+def inverse_error(robot: Robot, result: Any) -> float:
+    """Largest error of the forces that MuJoCo finds for a run, a share of the peak of all torques."""
+    with compiled(robot) as (model, data):
+        rows, commands = coordinates(robot, model, result), controls(robot, result)
+        errors = []
+        for sample in range(len(result.time)):
+            data.qpos[:], data.qvel[:], data.qacc[:] = (values[sample] for values in rows)
+            data.ctrl[:] = commands[sample]
+            mujoco.mj_inverse(model, data)
+            mujoco.mj_fwdActuation(model, data)
+            errors.append(np.abs(data.qfrc_inverse - data.qfrc_actuator).max())
+    return float(max(errors) / np.abs(result.tau_motor[np.isfinite(result.tau_motor)]).max())
+
+
+def driven(robot: Robot, result: Any) -> FloatArray:
+    """Positions of MuJoCo's coordinates less those of a run, (steps, nq).
+
+    A step of RK4 goes over two samples, so that the torques of all its stages are known.
+    """
+    with compiled(robot) as (model, data):
+        rows, commands = coordinates(robot, model, result), controls(robot, result)
+        begin, half = result.time[0], result.time[1] - result.time[0]
+        model.opt.timestep = 2 * half
+        data.qpos[:], data.qvel[:] = rows.positions[0], rows.velocities[0]
+
+        def control(_model: Any, data: Any) -> None:
+            data.ctrl[:] = commands[round(data.time / half)]
+
+        mujoco.set_mjcb_control(control)
+        errors = []
+        for sample in range(2, len(result.time), 2):
+            mujoco.mj_step(model, data)
+            errors.append(data.qpos - rows.positions[sample])
+        assert abs(begin + data.time - result.time[sample]) < half / 2
+    return np.array(errors)
+
+
+def accelerations(
+    robot: Robot, state: Any, torque: FloatArray, damping: FloatArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Of joints and of motors that move by themselves, NaN where there is none, at states (samples, ...)."""
+    found_q, found_theta = np.full(state.q.shape, np.nan), np.full(state.theta.shape, np.nan)
+    places = [
+        (index, side, motor_name(joint, side + 1))
+        for index, joint in enumerate(robot.joints)
+        for side in range(joint.actuator.motor_count)
+    ]
+    with compiled(robot) as (model, data):
+        for sample in range(len(state.q)):
+            for index, joint in enumerate(robot.joints):
+                data.joint(joint.name).qpos[0] = state.q[sample, index]
+                data.joint(joint.name).qvel[0] = state.dq[sample, index]
+            commands = [torque[sample, index, side] for index, side, _ in places]
+            for index, side, name in places:
+                if name != robot.joints[index].name:
+                    data.joint(name).qpos[0] = state.theta[sample, index, side]
+                    data.joint(name).qvel[0] = state.dtheta[sample, index, side]
+            if damping is not None:
+                commands += [
+                    value
+                    for joint, value in zip(robot.joints, damping[sample], strict=True)
+                    for _ in range(_dampers(joint))
+                ]
+            data.ctrl[:] = commands
+            mujoco.mj_forward(model, data)
+            found_q[sample] = [data.joint(joint.name).qacc[0] for joint in robot.joints]
+            for index, side, name in places:
+                if name != robot.joints[index].name:
+                    found_theta[sample, index, side] = data.joint(name).qacc[0]
+    return found_q, found_theta
+
+
+def _dampers(joint: Any) -> int:
+    """Controls of a joint's damper: one beside each spring."""
+    if joint.damper_at("transmission"):
+        return sum(joint.actuator.has(VARIABLES["phi"]))
+    return int(joint.damper is not None)

@@ -1,0 +1,39 @@
+"""Springs as single elements, as simulators of bodies know them: what stretches each, and how it pulls."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from vsacli.actuators.laws.law import SpringLaw
+
+
+class SpringElement(NamedTuple):
+    """A spring whose deflection is a weighted sum of positions, on which it pulls by the same weights.
+
+    Attributes:
+        law: its law.
+        joint: weight of the position of the joint.
+        motors: weight of the position of each motor.
+    """
+
+    law: SpringLaw
+    joint: float
+    motors: tuple[float, ...]
+
+
+class LeverSpring(NamedTuple):
+    """A linear spring from a lever that motor 1 turns to a point of the link, tightened by motor 2.
+
+    It is stretched by the distance of both ends beyond the least one, and by the pretension.
+
+    Attributes:
+        lever: length of the lever, m.
+        arm: distance from the axis to the point of the link, m.
+        stiffness: N/m.
+        lead: pretension per position of motor 2, m/rad.
+    """
+
+    lever: float
+    arm: float
+    stiffness: float
+    lead: float

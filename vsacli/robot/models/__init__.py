@@ -1,0 +1,13 @@
+"""The robot for other programs: its kinematics and bodies, and, where they know such, motors and springs."""
+
+from __future__ import annotations
+
+from vsacli.base.lazy import LazyRegistry
+
+FORMATS = LazyRegistry(
+    {
+        "urdf": "vsacli.robot.models.urdf:urdf_model",
+        "mjcf": "vsacli.robot.models.mjcf:mjcf_model",
+    }
+)
+"""Formats by their names on a command line, each a function from a robot to an `ExportedModel`."""

@@ -1,0 +1,165 @@
+"""A Python file with the forces that MJCF has no place for: springs of other laws, and smooth dry friction.
+
+The forces are traced as they are computed everywhere else, and written down operation by operation, so that
+the file needs NumPy and MuJoCo alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from vsacli.actuators.friction import Friction, FrictionLaws
+from vsacli.actuators.spring_elements import SpringElement
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.texts import one_line
+from vsacli.base.version import __version__
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+from vsacli.robot.models.mjcf_drive import has_springs_of
+from vsacli.robot.models.mjcf_rotor import motor_name
+from vsacli.robot.models.mujoco_bodies import file_of
+
+_TEXT = '''"""Passive forces of {name}, by vsacli {version}: {words}.
+
+    model = mujoco.MjModel.from_xml_path(...)
+    install(model)
+
+MuJoCo has one such callback for all models; this one leaves others alone. While it is there MuJoCo compiles
+no model: mujoco.set_mjcb_passive(None) takes it away.
+"""
+
+from numpy import *
+
+JOINTS = {joints}
+
+{function}
+
+def install(model):
+    """Add the forces to whatever is simulated with a model, once it is compiled."""
+    import mujoco
+
+    joints = [model.joint(name) for name in JOINTS]
+    positions = array([joint.qposadr[0] for joint in joints])
+    velocities = array([joint.dofadr[0] for joint in joints])
+
+    def passive(its_model, data):
+        if its_model.signature == model.signature:
+            with errstate(all="ignore"):
+                data.qfrc_passive[velocities] += forces(data.qpos[positions], data.qvel[velocities])
+
+    mujoco.set_mjcb_passive(passive)
+'''
+
+
+def check_friction(robot: Robot) -> None:
+    """Refuse friction whose shape is the sign function.
+
+    Raises:
+        InputError: for each such friction, with what would do.
+    """
+    problems = [
+        Problem(
+            file_of(robot),
+            0,
+            f"{where} has the width 0; MuJoCo's frictionloss is another law, which creeps where this one "
+            "sticks: give the friction a width",
+        )
+        for joint in robot.joints
+        for where, friction in _frictions(joint)
+        if friction.sharp
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def forces_words(robot: Robot) -> str:
+    """What the file has forces of, empty if there is none."""
+    springs = [joint.name for joint in robot.joints if not has_springs_of(joint)]
+    friction = [joint.name for joint in robot.joints if joint.has_friction]
+    parts = {"springs": springs, "friction": friction}
+    return "; ".join(f"{what} of {', '.join(names)}" for what, names in parts.items() if names)
+
+
+def forces_text(robot: Robot) -> str | None:
+    """The file; None if MJCF has a place for all forces of the robot."""
+    joints = [joint for joint in robot.joints if joint.has_friction or not has_springs_of(joint)]
+    if not joints:
+        return None
+    from vsacli.compute.tracing import Kind, trace
+    from vsacli.compute.tracing.python_text import function_text
+
+    names = [name for joint in joints for name in _coordinates(joint)]
+    program = trace(lambda rows: _forces(joints, rows), [Kind.REAL] * (2 * len(names)))
+    function = function_text(program, "forces", {"positions": len(names), "velocities": len(names)})
+    return _TEXT.format(
+        name=one_line(robot.name).replace('"', "'").replace("\\", "/"),
+        version=__version__,
+        words=forces_words(robot),
+        joints=tuple(names),
+        function=function,
+    )
+
+
+def _frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
+    """Where there is dry friction, in words, and what it is."""
+    if joint.friction is not None:
+        yield f"joint {joint.name}: its friction", joint.friction
+    for number, motor in enumerate(joint.actuator.motors, 1):
+        if motor.friction is not None:
+            yield f"joint {joint.name}: the friction of motor {number}", motor.friction
+
+
+def _coordinates(joint: Joint) -> list[str]:
+    """The joint, and its motors if they move by themselves."""
+    numbers = range(1, 1 + len(joint.actuator.motors))
+    return list(dict.fromkeys([joint.name, *(motor_name(joint, number) for number in numbers)]))
+
+
+def _forces(joints: Sequence[Joint], rows: Sequence[Any]) -> list[Any]:
+    """Rows of forces on all coordinates, from rows of their positions and velocities."""
+    positions, velocities = list(rows[: len(rows) // 2]), list(rows[len(rows) // 2 :])
+    forces = []
+    for joint in joints:
+        count = len(_coordinates(joint))
+        forces += _forces_of(joint, positions[:count], velocities[:count])
+        del positions[:count], velocities[:count]
+    return forces
+
+
+def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]) -> list[Any]:
+    """On the coordinates of a joint: what springs exert, less friction."""
+    forces = [np.zeros_like(position) for position in positions]
+    if not has_springs_of(joint):
+        elements = joint.actuator.spring_elements
+        forces = _of_mechanism(joint, positions) if elements is None else _of_elements(elements, positions)
+    frictions = [joint.friction, *(motor.friction for motor in joint.actuator.motors)]
+    for number, friction in enumerate(frictions):
+        law = FrictionLaws.of([friction])
+        if law is not None:
+            place = min(number, len(forces) - 1)  # a motor without springs moves with the joint
+            forces[place] = forces[place] - law.torque(velocities[place])
+    return forces
+
+
+def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) -> list[Any]:
+    """What springs exert, each by its weights; those that only pull go slack."""
+    forces = [np.zeros_like(position) for position in positions]
+    for spring in elements:
+        weights = (spring.joint, *spring.motors)
+        phi = sum(weight * position for weight, position in zip(weights, positions, strict=True))
+        if spring.law.pulls_only:
+            phi = np.minimum(np.maximum(phi, spring.law.domain[0]), spring.law.domain[1])
+        torque = spring.law.torque(phi)
+        forces = [force - weight * torque for force, weight in zip(forces, weights, strict=True)]
+    return forces
+
+
+def _of_mechanism(joint: Joint, positions: Sequence[Any]) -> list[Any]:
+    """What the springs of a joint exert that are known by their potential alone."""
+    elasticity = type(joint.actuator).elasticity([joint.actuator])
+    torques = elasticity.torques(elasticity.coordinates(positions[0], np.stack(positions[1:], axis=-1)))
+    against = (torques.tau_spring[..., side] for side in range(len(joint.actuator.motors)))
+    return [torques.tau_e, *(-each for each in against)]

@@ -1,0 +1,113 @@
+"""The robot as URDF: links, joints, limits. It has no place for springs, and hardly one for motors.
+
+The frame of a link is the one that URDF asks for, on the axis of its joint: the Denavit-Hartenberg frame of
+the link is Tx(a) Rx(alpha) farther.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from xml.etree import ElementTree
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.version import __version__
+from vsacli.robot.joint import UNBOUNDED, Joint
+from vsacli.robot.model import Robot
+from vsacli.robot.models.exported_model import ExportedModel
+from vsacli.robot.models.xml_text import Element, add, document, element
+from vsacli.robot.urdf.rigid_motion import pose_matrix, roll_pitch_yaw
+
+ROOT, TOOL = "world", "tool"
+"""Links at the ends; those between are called `<joint>_link`."""
+
+STANDARD_GRAVITY = (0.0, 0.0, -9.81)
+"""m/s^2, what most readers of a URDF take."""
+
+NO_LIMIT = 1e9
+"""In place of a limit that URDF asks for and the robot does not have; `import-urdf` takes it for none."""
+
+
+def urdf_model(robot: Robot) -> ExportedModel:
+    """The model, with what it leaves out."""
+    root = ElementTree.Element("robot", name=robot.name)
+    element(root, "link", name=ROOT)
+    parent, end = ROOT, pose_matrix(robot.base.xyz, robot.base.rpy)
+    for joint in robot.joints:
+        link = f"{joint.name}_link"
+        dh = joint.dh
+        _add_link(root, link, joint)
+        moving = _add_joint(root, joint.name, _type(joint), parent, link)
+        _place(moving, end @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
+        _add_drive(moving, joint)
+        parent, end = link, pose_matrix((dh.a, 0, 0), (dh.alpha, 0, 0))
+    element(root, "link", name=TOOL)
+    fixed = _add_joint(root, "tool.mount", "fixed", parent, TOOL)
+    _place(fixed, end @ pose_matrix(robot.tool.xyz, robot.tool.rpy))
+    notes = tuple(_left_out(robot))
+    return ExportedModel(document(root, f"{robot.name}, by vsacli {__version__}"), None, notes)
+
+
+def _add_link(root: Element, name: str, joint: Joint) -> None:
+    """A link; what is known along the axes of its Denavit-Hartenberg frame stays as it is known there."""
+    link = joint.link
+    body = element(element(root, "link", name=name), "inertial")
+    end = pose_matrix((joint.dh.a, 0, 0), (joint.dh.alpha, 0, 0))
+    com = end[:3, :3] @ np.array(link.com) + end[:3, 3]
+    element(body, "origin", xyz=com, rpy=(joint.dh.alpha, 0, 0))
+    element(body, "mass", value=link.mass)
+    inertia = link.inertia
+    entries = {f"i{name}": getattr(inertia, name) for name in ("xx", "xy", "xz", "yy", "yz", "zz")}
+    element(body, "inertia", **entries)
+
+
+def _add_joint(root: Element, name: str, kind: str, parent: str, child: str) -> Element:
+    joint = element(root, "joint", name=name, type=kind)
+    element(joint, "parent", link=parent)
+    element(joint, "child", link=child)
+    return joint
+
+
+def _place(joint: Element, pose: FloatArray) -> None:
+    element(joint, "origin", xyz=pose[:3, 3], rpy=roll_pitch_yaw(pose[:3, :3]))
+
+
+def _type(joint: Joint) -> str:
+    if not joint.is_revolute:
+        return "prismatic"
+    return "continuous" if joint.limits.position == UNBOUNDED else "revolute"
+
+
+def _add_drive(moving: Element, joint: Joint) -> None:
+    """Axis, damping, friction and limits of a joint; the efforts of two motors are none of the joint."""
+    element(moving, "axis", xyz=(0, 0, 1))
+    friction = {} if joint.friction is None else {"friction": max(joint.friction.coulomb)}
+    element(moving, "dynamics", damping=joint.damping, **friction)
+    motors = joint.actuator.motors
+    effort = motors[0].max_torque if len(motors) == 1 else math.inf
+    speed = min(map(abs, joint.limits.velocity))
+    limit = element(moving, "limit", effort=min(effort, NO_LIMIT), velocity=min(speed, NO_LIMIT))
+    if _type(joint) != "continuous":
+        lower, upper = (max(-NO_LIMIT, min(NO_LIMIT, end)) for end in joint.limits.position)
+        add(limit, lower=lower, upper=upper)
+
+
+def _left_out(robot: Robot) -> Iterator[str]:
+    """What URDF has no place for, sentences."""
+    yield f"motors and springs are left out: URDF has no place for them ({', '.join(robot.joint_names)})"
+    if robot.gravity != STANDARD_GRAVITY:
+        gravity = ", ".join(f"{each:g}" for each in robot.gravity)
+        yield f"gravity, [{gravity}] m/s^2, is left out: who reads a URDF says what it is, along -z as a rule"
+    reduced = {
+        "dry friction but for its size": [joint for joint in robot.joints if joint.friction is not None],
+        "variable dampers": [joint for joint in robot.joints if joint.damper is not None],
+        "limits of the stiffness": [joint for joint in robot.joints if joint.limits.stiffness != UNBOUNDED],
+        "the larger of two limits of the velocity": [
+            joint for joint in robot.joints if joint.limits.velocity[0] != -joint.limits.velocity[1]
+        ],
+    }
+    for what, joints in reduced.items():
+        if joints:
+            yield f"left out: {what} ({', '.join(joint.name for joint in joints)})"
