@@ -54,7 +54,7 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 ROBOT = ROOT / "robots" / "vsa_3r.yaml"
 IMAGES = ROOT / "docs" / "images"
 
-DRAWING = ("gallery.md", "sizing.md", "studies.md")
+DRAWING = ("gallery.md", "optimisation.md", "sizing.md", "studies.md")
 """Pages whose commands draw the figures of the tool, wherever they are shown."""
 
 FILE_OR_COMMANDS = re.compile(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -150,10 +151,23 @@ def test_like_motors_heat_least_where_their_torques_are_least(arm, load):
 
 @pytest.mark.slow
 def test_what_is_written_runs_with_the_margin_and_costs_what_the_report_says(vsacli, arm):
-    done = vsacli("optimize", ROBOT, REST_TO_REST, "--margin", "2%", "--json", "-o", "best.yaml", "-q")
+    done = vsacli(
+        "optimize",
+        ROBOT,
+        REST_TO_REST,
+        "--margin",
+        "2%",
+        "--json",
+        "-o",
+        "best.yaml",
+        "--plot",
+        "figures",
+        "-q",
+    )
     assert done.code == 0
     found = json.loads(done.out)
     assert (found["format"], found["possible"]) == ("vsacli-optimum/1", True)
+    assert [drawn.name for drawn in Path("figures").iterdir()] == ["vsa_3r-rest_to_rest-optimum.png"]
     result = inverse_dynamics(arm, load_trajectory("best.yaml", arm))
     assert result.report.verdict == "ok"
     assert min(joint.margin for joint in result.report.joints) >= 0.02

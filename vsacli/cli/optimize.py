@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -12,11 +15,24 @@ from vsacli.cli.command_parts import (
     load_inputs,
     overwrite_option,
     robot_argument,
+    run_stem,
     set_option,
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE
+
+if TYPE_CHECKING:
+    from vsacli.analysis.result import Result
+    from vsacli.base.arrays import FloatArray
+    from vsacli.base.outputs import Outputs
+    from vsacli.results.plots import Moved
+    from vsacli.robot.joint import Joint
+    from vsacli.studies.optimisation import Optimum
+    from vsacli.trajectory.trajectory import Trajectory
+
+CHANGE, PACE = "optimum", "pace"
+"""Names of figures."""
 
 
 def _share(_context: click.Context, _parameter: click.Parameter, text: str | None) -> float | None:
@@ -63,6 +79,9 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
     type=FILE,
     help="Write the best trajectory, with a CSV beside it for what is no formula.",
 )
+@click.option(
+    "--plot", "folder", metavar="FOLDER", help="Save figures of stiffness, torques and pace there, as png."
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts drawn.")
 @json_option
 @overwrite_option
@@ -75,6 +94,7 @@ def optimize(
     vary: str | None,
     margin: float | None,
     output: str | None,
+    folder: str | None,
     seed: int,
     as_json: bool,
     overwrite: bool,
@@ -92,10 +112,15 @@ def optimize(
     from vsacli.studies.optimisation import searches
     from vsacli.studies.remedies import Remedy, check_fixed_target, write_fixed
 
+    vary = vary or ("timing" if minimize == "time" else "stiffness")
+    names, stem = (CHANGE,) if vary == "stiffness" else (CHANGE, PACE), run_stem(robot, trajectory)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
             check_fixed_target(output, outputs)
-        vary = vary or ("timing" if minimize == "time" else "stiffness")
+        if folder is not None:
+            outputs.folder(folder)
+            for name in names:
+                outputs.check(Path(folder) / f"{stem}-{name}.png")
         steps = searches(inputs.robot, minimize, vary)
         with talk.progress(steps, shown_from=0, label="searching") as progress:
             found = optimized(
@@ -110,6 +135,57 @@ def optimize(
             write_fixed(Remedy(0.0, inputs.robot, found.trajectory), output, outputs)
         elif output is not None:
             talk.note(f"{output} is not written: nothing feasible was found")
+        if folder is not None and found.trajectory is not None:
+            _draw(found, found.trajectory, inputs.trajectory, folder, stem, outputs)
     talk.wrote(outputs)
     say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
     return Exit.OK if found.possible else Exit.VERDICT
+
+
+def _draw(
+    found: Optimum, best: Trajectory, asked: Trajectory, folder: str, stem: str, outputs: Outputs
+) -> None:
+    """What changes at each joint, and the pace if that varies."""
+    from vsacli.analysis.run import inverse_dynamics
+    from vsacli.results.plots import FigureFiles, JointChange, change_figure, pace_figure
+    from vsacli.studies.optimisation import path_at
+
+    before, after = (inverse_dynamics(found.robot, each) for each in (asked, best))
+    place = after.time - best.start
+    if found.pace is not None:
+        place = path_at(place, found.pace, asked.duration)
+    joints = [
+        JointChange(
+            name=joint.name,
+            joint_type=joint.type,
+            before=_moved(before, before.time - asked.start, index),
+            after=_moved(after, place, index),
+            limits=_torque_limits(joint),
+        )
+        for index, joint in enumerate(found.robot.joints)
+    ]
+    title = f"{found.robot_name}, {found.asked}"
+    figures = {CHANGE: change_figure(joints, title, along_path=found.pace is not None)}
+    if found.pace is not None:
+        uniform = math.nan if found.timing is None else asked.duration / found.timing.uniform
+        figures[PACE] = pace_figure(place, 1 / found.pace(place), uniform, title)
+    FigureFiles(figures, folder, stem, "png", outputs).save(figures)
+
+
+def _moved(result: Result, place: FloatArray, index: int) -> Moved:
+    """What a joint, by index, does at places."""
+    from vsacli.results.plots import Moved
+
+    stiffness, lower, upper = (
+        row[:, index] for row in (result.stiffness, result.stiffness_lower, result.stiffness_upper)
+    )
+    return Moved(place, stiffness, lower, upper, result.tau_motor[:, index].T)
+
+
+def _torque_limits(joint: Joint) -> FloatArray:
+    """What the torques of all motors of a joint have to lie between, (2,)."""
+    import numpy as np
+
+    ranges = [check.range for check in joint.actuator.limits() if check.variable == "tau_motor"]
+    lower, upper = zip(*ranges, strict=True) if ranges else ((-np.inf,), (np.inf,))
+    return np.array([max(lower), min(upper)])

@@ -25,6 +25,7 @@ from vsacli.results.plots.figures import (
 )
 from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
 from vsacli.results.plots.measured_figure import MeasuredCurve, measured_figure
+from vsacli.results.plots.optimum_figures import JointChange, Moved, change_figure, pace_figure
 from vsacli.results.plots.sensitivity_figures import Bar, Torque, band_figure, ranking_figure
 from vsacli.results.plots.simulation_figures import simulation_drawings
 from vsacli.results.plots.sizing_figure import Bounds, TorqueSpeed, torque_speed_figure
@@ -39,10 +40,13 @@ __all__ = [
     "Bar",
     "Bounds",
     "FigureFiles",
+    "JointChange",
     "MeasuredCurve",
+    "Moved",
     "Torque",
     "TorqueSpeed",
     "band_figure",
+    "change_figure",
     "check_drawable",
     "chosen_figures",
     "compare_files",
@@ -52,6 +56,7 @@ __all__ = [
     "drawings_of",
     "measured_figure",
     "omitted_figures",
+    "pace_figure",
     "plot_feasibility",
     "plot_stored",
     "ranking_figure",

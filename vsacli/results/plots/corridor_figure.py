@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Patch
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import STIFFNESS
 from vsacli.results.corridors import BOUNDS, compliant_joints, visible_range
@@ -55,19 +56,33 @@ def draw_corridors(place: SubplotSpec, result: StoredResult, failures: Failures)
 
 def _draw_stiffness(axes: Axes, curves: Curves, joint: int) -> list[Artist]:
     command, *bounds = curves.values
-    bottom, top = visible_range(command, *bounds)
+    handles = draw_corridor(axes, curves.time, command, bounds)
+    return [*draw_curve(axes, curves[0], joint, line_style(joint)), *handles]
+
+
+def draw_corridor(
+    axes: Axes, time: FloatArray, shown: FloatArray, bounds: Sequence[FloatArray]
+) -> list[Artist]:
+    """Draw what a stiffness may be as far as that is near; returns what a legend shows.
+
+    Args:
+        axes: with nothing else so far.
+        time: (points,), s.
+        shown: stiffnesses that are to be seen, any number.
+        bounds: nothing, or lower and upper end of the corridor, each (points,).
+    """
+    bottom, top = visible_range(shown, *bounds)
     axes.set_ylim(bottom, top)
-    handles = draw_curve(axes, curves[0], joint, line_style(joint))
     if not bounds:
-        return handles
+        return []
     lower, upper = bounds
     carried = ~np.isnan(lower)
     if not carried.any():
-        return handles
-    axes.fill_between(curves.time, np.maximum(lower, bottom), np.minimum(upper, top), carried, **_AREA)
+        return []
+    axes.fill_between(time, np.maximum(lower, bottom), np.minimum(upper, top), carried, **_AREA)
     for bound in bounds:
-        axes.plot(curves.time, np.where(np.isinf(bound), np.nan, bound), **_EDGE)
-    return [*handles, Patch(**_AREA, label="reachable")]
+        axes.plot(time, np.where(np.isinf(bound), np.nan, bound), **_EDGE)
+    return [Patch(**_AREA, label="reachable")]
 
 
 def check_drawable(actuators: Sequence[str]) -> None:

@@ -2,5 +2,6 @@
 
 from vsacli.studies.optimisation.optimise import optimize, searches
 from vsacli.studies.optimisation.optimum import Optimum
+from vsacli.studies.optimisation.retimed import path_at
 
-__all__ = ["Optimum", "optimize", "searches"]
+__all__ = ["Optimum", "optimize", "path_at", "searches"]

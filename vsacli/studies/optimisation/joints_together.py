@@ -54,7 +54,7 @@ def fastest(
         agreeing=found.agreeing,
         bounding=found.bounding,
     )
-    return replace(what, timing=optimum, trajectory=best)
+    return replace(what, timing=optimum, trajectory=best, pace=found.pace())
 
 
 def cheapest_pace(
@@ -92,7 +92,8 @@ def cheapest_pace(
         return replace(what, reasons=error.reasons)
     bar.finish()
     joints = _joints(what.robot, criterion, found, loads, best)
-    return replace(what, joints=joints, together=_together(criterion, joints), trajectory=best)
+    together, pace = _together(criterion, joints), found.pace(max(count, 1))
+    return replace(what, joints=joints, together=together, trajectory=best, pace=pace)
 
 
 def _periods(trajectory: Trajectory, loads: Sequence[Load]) -> int:

@@ -5,12 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
 
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import aligned
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 VARIED = {"stiffness": "stiffness", "timing": "timing", "both": "timing and stiffness"}
 """What varies, in words."""
@@ -107,6 +112,7 @@ class Optimum(Published):
         timing: None if time is not minimised, or nothing was found.
         reasons: why nothing was found, in clauses.
         trajectory: the best; None if nothing was found.
+        pace: along the path, dt/ds, a spline whose argument is s; None if it is as commanded.
     """
 
     robot: Robot = field(repr=False)
@@ -120,6 +126,7 @@ class Optimum(Published):
     timing: TimingOptimum | None = None
     reasons: tuple[str, ...] = ()
     trajectory: Trajectory | None = field(default=None, repr=False)
+    pace: BSpline[np.float64] | None = field(default=None, repr=False)
 
     format: ClassVar[str] = "vsacli-optimum/1"
     shape: ClassVar = {

@@ -1,0 +1,36 @@
+"""Figures of what an optimisation changes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vsacli.results.plots import JointChange, Moved, change_figure, pace_figure
+
+TIME = np.linspace(0.0, 2.0, 50)
+
+
+def moved(stiffness):
+    rows = np.full_like(TIME, stiffness)
+    return Moved(TIME, rows, 0.5 * rows, 2 * rows, np.stack([rows / 10, -rows / 10]))
+
+
+def joint(name, stiffness=900.0, limit=np.inf):
+    return JointChange(name, "revolute", moved(stiffness), moved(0.9 * stiffness), np.array([-limit, limit]))
+
+
+def texts(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_a_joint_without_stiffness_has_torques_alone():
+    figure = change_figure([joint("soft", limit=100.0), joint("stiff", np.nan)], "arm", along_path=True)
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert titles == ["soft", "soft: motors", "stiff: motors"]
+    assert texts(figure) == ["as commanded", "optimum", "reachable", "limit"]
+    labels = [axes.get_xlabel() for axes in figure.axes]
+    assert labels == ["place on the path [s]", "", "place on the path [s]"]
+
+
+def test_the_fastest_motion_as_a_whole_is_drawn_where_there_is_one():
+    assert texts(pace_figure(TIME, 1 + TIME, np.nan, "arm")) == ["optimum", "as commanded"]
+    assert texts(pace_figure(TIME, 1 + TIME, 1.5, "arm"))[-1] == "fastest as a whole"
