@@ -34,7 +34,7 @@ MOST_ROUNDS = 12
 corridors alone, took seven."""
 
 ACTIVE = 1e-2
-"""How near a bound, relative to it, a motion runs along it: barriers keep the fastest some thousandths away."""
+"""How near a bound, relative to it, a motion runs along it: barriers keep the fastest a thousandth away."""
 
 STIFFER = (1.0, 0.8, 1.5, 2.2)
 """Multiples of the commanded stiffness to begin with, if it may vary."""
