@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -105,6 +106,7 @@ def optimize(
     Unless time is minimised, the motion takes as long as commanded. Every step keeps the margin and all
     limits. What is found is a local optimum; the report says from how many starts the search came to it.
     """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy reads it when it is imported, which comes next
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.base.outputs import Outputs
