@@ -10,9 +10,15 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # where `site_parts` and `python_names` lie
 
+from typing import TYPE_CHECKING
+
 from nbclient import NotebookClient
+from pygments.lexers.special import TextLexer
 
 from vsacli.base.version import __version__
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 project = "vsacli"
 author = "the vsacli contributors"
@@ -62,3 +68,8 @@ html_title = f"vsacli {__version__}"
 html_static_path = ["site_parts/style.css"]
 html_css_files = ["style.css"]
 html_show_sphinx = False
+
+
+def setup(app: Sphinx) -> None:
+    """Show tables as they are: Pygments knows no CSV."""
+    app.add_lexer("csv", TextLexer)
