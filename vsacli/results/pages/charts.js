@@ -119,6 +119,7 @@ vsacli.charts = (() => {
         this.area = element("span", { class: "area" });
         legend.append(element("span", { class: "key" }, this.area, chart.band));
       }
+      if (chart.note) legend.append(element("span", { class: "note" }, chart.note));
       this.node = element("figure", { class: "chart" },
         element("figcaption", {}, chart.title, " ", element("code", {}, chart.name)), this.plot, legend);
       this.node.card = this;
@@ -139,7 +140,7 @@ vsacli.charts = (() => {
 
     /* The corridor has a colour of its own; uncertainty that of its curve. */
     get bandColour() {
-      return this.chart.shown ? colour("reachable") : "";
+      return this.chart.name === "stiffness" ? colour("reachable") : "";
     }
 
     get visible() {

@@ -56,6 +56,7 @@ class Chart(Published):
         limits: bounds that are finite.
         shown: what of the axis of values is shown at first; None for all curves.
         band: what the bands around curves are; empty without.
+        note: what else there is to say; empty if there is nothing.
     """
 
     title: str
@@ -65,10 +66,11 @@ class Chart(Published):
     limits: tuple[Limit, ...] = ()
     shown: tuple[float, float] | None = None
     band: str = ""
+    note: str = ""
 
 
 @dataclass(frozen=True)
-class Curve:
+class Banded:
     """A curve of one joint before it is packed; all arrays (points,).
 
     Attributes:

@@ -15,8 +15,9 @@ from vsacli.base.units import WrenchQuantity
 from vsacli.base.variables import MOTORS, VARIABLES, Variable, deviation
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.results.corridors import BOUNDS, visible_range
-from vsacli.results.curves import Curves, Sampled, read_curves
-from vsacli.results.pages.charts import Chart, Curve, Limit, Series
+from vsacli.results.curves import Curves, Failures, Sampled, read_curves
+from vsacli.results.near_singular import GROWING, calm_range
+from vsacli.results.pages.charts import Banded, Chart, Limit, Series
 from vsacli.results.pages.packing import Packed
 from vsacli.results.pages.sections import Section, sections_of
 from vsacli.results.several import Difference
@@ -27,6 +28,9 @@ DEVIATIONS = 2
 
 BEYOND = 5.0
 """How far the corridor is drawn beyond what is shown of it at first, in heights of that."""
+
+
+CUT_OFF = "peaks of near-singular steps are cut off; Ctrl and the wheel show them"
 
 
 class ResultCharts:
@@ -58,6 +62,10 @@ class ResultCharts:
             what = "hold no variable in common" if len(self._files) > 1 else "holds no variable"
             raise InputError.one(f"nothing can be plotted: {what} that has a plot", self._first.path)
         return found
+
+    @cached_property
+    def _failures(self) -> list[Failures]:
+        return [Failures.of(file) for file in self._files]
 
     @cached_property
     def _differences(self) -> list[Difference]:
@@ -125,9 +133,22 @@ class ResultCharts:
             ]
             band = "two standard deviations" if any(each.band for each in series) else ""
             limits = self._limits(name, column, joints)
-            yield Chart(title, name, unit, tuple(series), limits, band=band)
+            rows = [at * width + column for at in range(len(roles))]
+            shown = self._calm(curves, rows, joints) if name in GROWING else None
+            note = CUT_OFF if shown else ""
+            yield Chart(title, name, unit, tuple(series), limits, shown, band, note)
 
-    def _series(self, joint: int, file: int, role: str, curve: Curve, **further: Any) -> Series:
+    def _calm(
+        self, curves: Sequence[Sequence[Curves]], rows: Sequence[int], joints: Sequence[int]
+    ) -> tuple[float, float] | None:
+        """What is shown if near-singular peaks would set the scale otherwise."""
+        places = [(file, row, joint) for file in range(len(curves)) for row in rows for joint in joints]
+        values = [curves[file][joint].values[row] for file, row, joint in places]
+        calm = [self._failures[file].calm(joint, curves[file][joint].time) for file, _, joint in places]
+        found = calm_range(np.concatenate(values), np.concatenate(calm))
+        return None if found is None else (found.bottom, found.top)
+
+    def _series(self, joint: int, file: int, role: str, curve: Banded, **further: Any) -> Series:
         arrays: Any = curve.packed(self._packed, self.start)
         return Series(self._first.joint_names[joint], joint, joint, file, role, **arrays, **further)
 
@@ -148,7 +169,7 @@ class ResultCharts:
                 carried = None
                 if np.isfinite(lower).any():
                     carried = np.maximum(lower, shown[0] - spare), np.minimum(upper, shown[1] + spare)
-                series = self._series(joint, 0, "computed", Curve(time, command, carried))
+                series = self._series(joint, 0, "computed", Banded(time, command, carried))
                 title = f"{variable.long_name}, {self._first.joint_names[joint]}"
                 limits = self._limits(variable.name, 0, [joint])
                 band = "reachable" if carried else ""
@@ -183,13 +204,13 @@ class ResultCharts:
             yield Chart(title, variable.name, variable.quantity.of_axis(axes[0]), tuple(series))
 
 
-def _curve(curves: Curves, row: int, deviation_row: int | None = None) -> Curve:
+def _curve(curves: Curves, row: int, deviation_row: int | None = None) -> Banded:
     """One of the curves of a joint; if its deviation is another one of them, with a band."""
     values = curves.values[row]
     if deviation_row is None or np.isnan(curves.values[deviation_row]).all():
-        return Curve(curves.time, values)
+        return Banded(curves.time, values)
     spread = DEVIATIONS * curves.values[deviation_row]
-    return Curve(curves.time, values, (values - spread, values + spread))
+    return Banded(curves.time, values, (values - spread, values + spread))
 
 
 class _Components:

@@ -18,6 +18,7 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.results.curves import Curves, Failures, read_curves
+from vsacli.results.near_singular import GROWING
 from vsacli.results.plots.drawing import ZERO, draw_bands, draw_curve
 from vsacli.results.plots.labels import Label, label, motor_labels, variable_labels
 from vsacli.results.plots.panels import (
@@ -29,7 +30,7 @@ from vsacli.results.plots.panels import (
     joint_panels,
     missing_variables,
 )
-from vsacli.results.plots.scale import GROWING, Peaked, cut_peaks
+from vsacli.results.plots.scale import Peaked, cut_peaks
 from vsacli.results.plots.styles import house_style, line_handle, line_style
 from vsacli.results.plots.variable_figures import drawable_variables
 from vsacli.results.several import Difference, check_comparable, distinct_labels

@@ -14,6 +14,7 @@ from matplotlib.gridspec import SubplotSpec
 from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import deviation
 from vsacli.results.curves import Curves, Failures, read_curves
+from vsacli.results.near_singular import GROWING
 from vsacli.results.plots.drawing import draw_bands, draw_curve, draw_limits, draw_uncertainty
 from vsacli.results.plots.labels import Label
 from vsacli.results.plots.panels import (
@@ -25,7 +26,7 @@ from vsacli.results.plots.panels import (
     result_title,
     share_time,
 )
-from vsacli.results.plots.scale import GROWING, Peaked, cut_peaks
+from vsacli.results.plots.scale import Peaked, cut_peaks
 from vsacli.results.plots.styles import line_handle, line_style
 from vsacli.results.store.reader import StoredResult
 

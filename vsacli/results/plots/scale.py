@@ -11,21 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.simulation_variables import actual
-
-_OF_MOTORS = (
-    *("dphi", "dtheta", "ddtheta", "tau_motor", "motor_power"),
-    *("dissipated_power", "current", "voltage", "copper_loss"),
-)
-GROWING = frozenset({*_OF_MOTORS, *map(actual, _OF_MOTORS)})
-"""Variables that grow without bound towards a singular step, where they are undefined: rates of deflections
-follow from the inverse of the decoupling matrix, and what motors do from them."""
-
-TOLERATED = 0.5
-"""Share of the range of all other steps by which near-singular ones may exceed it before they are cut off."""
-
-ROOM = 0.08
-"""Free space above and below, relative to that range; marks of what is cut off stand in it."""
+from vsacli.results.near_singular import calm_range
 
 _MARK: dict[str, Any] = {"markersize": 6, "linestyle": ""}
 _BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5}
@@ -55,17 +41,10 @@ def cut_peaks(axes: Axes, curves: Sequence[Peaked]) -> list[Artist]:
         What a legend shows for the marks.
     """
     values = np.concatenate([curve.values for curve in curves])
-    there = np.isfinite(values)
-    calm = there & np.concatenate([curve.calm for curve in curves])
-    if not calm.any():
+    found = calm_range(values, np.concatenate([curve.calm for curve in curves]))
+    if found is None:
         return []
-    low, high = values[calm].min(), values[calm].max()
-    least, most = values[there].min(), values[there].max()
-    size = high - low or abs(high) or 1.0
-    below, above = least < low - TOLERATED * size, most > high + TOLERATED * size
-    if not below and not above:
-        return []
-    bottom, top = (low if below else least) - ROOM * size, (high if above else most) + ROOM * size
+    bottom, top = found.bottom, found.top
     axes.set_ylim(bottom, top)
     middle = (curves[0].time[0] + curves[0].time[-1]) / 2
     _mark(axes, [peak for curve in curves for peak in _peaks(curve, -1, bottom)], -1, middle)
