@@ -26,6 +26,7 @@ from field_tables import record_sections, table, variant_sections
 from five_figures import draw as draw_five_figures
 from noise_study import draw as draw_noise
 from noise_study import table_rows
+from page_picture import take_picture
 from python_names import public_names
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
@@ -54,7 +55,7 @@ PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 ROBOT = ROOT / "robots" / "vsa_3r.yaml"
 IMAGES = ROOT / "docs" / "images"
 
-DRAWING = ("gallery.md", "optimisation.md", "sizing.md", "studies.md")
+DRAWING = ("gallery.md", "optimisation.md", "pages.md", "sizing.md", "studies.md")
 """Pages whose commands draw the figures of the tool, wherever they are shown."""
 
 FILE_OR_COMMANDS = re.compile(
@@ -335,6 +336,7 @@ def draw_images() -> None:
         for drawn in Path(folder).rglob("*.png"):
             if drawn.name in shown:
                 shutil.copy(drawn, IMAGES)
+        take_picture(Path(folder) / "pages" / "hasty.html", IMAGES / "page.png")
     draw_noise(IMAGES / "recorded-noise.png")
     draw_five_figures(IMAGES)
 

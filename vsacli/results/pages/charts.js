@@ -1,111 +1,11 @@
 "use strict";
 /* The plots over time: each a card with a legend that shows the values at the cursor; one window of time for all. */
-Bokeh.set_log_level("warn");
 vsacli.charts = (() => {
   const { data, state, array, valueAt, number, colour, curveColour, element } = vsacli;
-  const DASHES = ["solid", "dashed", "dotdash", "dotted"];
-  const BORDERS = { solid: "solid", dashed: "dashed", dotdash: "double", dotted: "dotted" };
+  const { dash, addSeries, shade, newFigure, addTools } = vsacli.figures;
   const NEAR = 0.5, ROOM = 0.06;  // how far limits may be from curves to be shown, and room left; in heights of the curves
-  const ROLES = { commanded: "commanded", measured: "measured", actual: "actual" };
   const MANY = 8;  // joints, from which on a legend scrolls
   const cards = [];
-
-  /* Joints have colours; what is beyond those, other files and other roles have other dashes. */
-  function dash(series) {
-    const roles = { commanded: 1, measured: 3 };
-    return DASHES[(roles[series.role] || series.file + Math.floor(series.colour / vsacli.COLOURS)) % DASHES.length];
-  }
-
-  function absolute(times) {
-    return Float64Array.from(times, (time) => time + data.start);
-  }
-
-  /* The stretches of a kind at some joints of any file, those that overlap as one. */
-  function stretches(kind, joints) {
-    const every = data.files.flatMap((file) => (kind === "doubtful" ? file.doubtful
-      : (file.troubles[kind] || []).filter((_, joint) => joints.has(joint)).flat()));
-    const merged = [];
-    for (const [start, end] of every.sort((one, other) => one[0] - other[0])) {
-      const last = merged.at(-1);
-      if (last && start <= last[1]) last[1] = Math.max(last[1], end); else merged.push([start, end]);
-    }
-    return merged;
-  }
-
-  function shade(figure, kind, joints, look) {
-    const spans = stretches(kind, joints);
-    if (spans.length) {
-      const [x0, x1] = [0, 1].map((end) => spans.map((span) => span[end] + data.start));
-      figure.vstrip({ x0, x1, fill_color: colour(kind), line_color: colour(kind), line_alpha: look.fill_alpha,
-                      level: "underlay", ...look });
-    }
-  }
-
-  /* Runs of points between gaps, as index pairs; single points are what a line would not show. */
-  function runs(values) {
-    const found = [];
-    let start = -1;
-    for (let index = 0; index <= values.length; index += 1) {
-      const there = index < values.length && !Number.isNaN(values[index]);
-      if (there && start < 0) start = index;
-      if (!there && start >= 0) { found.push([start, index]); start = -1; }
-    }
-    return found;
-  }
-
-  function addBand(figure, series, x, fill) {
-    const [lower, upper] = series.band.map(array);
-    const summed = lower.map((value, index) => value + upper[index]);
-    return runs(summed).filter(([start, end]) => end - start > 1).map(([start, end]) => {
-      const [part, y1, y2] = [x, lower, upper].map((each) => each.slice(start, end));
-      const source = new Bokeh.ColumnDataSource({ data: { x: part, y1, y2 } });
-      const look = { fill_color: fill, fill_alpha: 0.3, level: "underlay" };
-      return figure.varea({ field: "x" }, { field: "y1" }, { field: "y2" }, { source, ...look });
-    });
-  }
-
-  function addSeries(figure, series, bandColour) {
-    const x = absolute(array(series.time)), y = array(series.values);
-    const look = { line_color: curveColour(series.colour), line_width: series.role === "measured" ? 1 : 1.7,
-                   line_dash: dash(series) };
-    const source = new Bokeh.ColumnDataSource({ data: { x, y } });
-    const drawn = [figure.line({ field: "x" }, { field: "y" }, { source, ...look })];
-    const alone = runs(y).filter(([start, end]) => end - start === 1).map(([start]) => start);
-    if (alone.length) {
-      drawn.push(figure.scatter(alone.map((at) => x[at]), alone.map((at) => y[at]),
-                                { size: 3, line_color: look.line_color, fill_color: look.line_color }));
-    }
-    if (series.band) drawn.push(...addBand(figure, series, x, bandColour || look.line_color));
-    return { series, drawn };
-  }
-
-  function paint(figure) {
-    for (const axis of [...figure.xaxes, ...figure.yaxes]) {
-      axis.setv({ axis_line_color: colour("line"), major_tick_line_color: colour("line"), minor_tick_line_color: null,
-                  major_label_text_color: colour("soft"), axis_label_text_color: colour("soft"),
-                  axis_label_text_font_style: "normal", axis_label_text_font_size: "12px" });
-    }
-    for (const grid of [...figure.xgrids, ...figure.ygrids]) grid.grid_line_color = colour("grid");
-    figure.setv({ background_fill_color: colour("card"), border_fill_color: colour("card"), outline_line_color: null });
-  }
-
-  /* A figure in the page's colours, its labels taken literally. */
-  function newFigure(attributes, labels) {
-    const figure = Bokeh.Plotting.figure({ sizing_mode: "stretch_both", tools: [], min_border_right: 12,
-                                           lod_threshold: null, ...attributes });
-    figure.toolbar.autohide = true;
-    figure.toolbar.logo = null;
-    figure.xaxes[0].axis_label = new Bokeh.PlainText({ text: labels[0] });
-    figure.yaxes[0].axis_label = new Bokeh.PlainText({ text: labels[1] });
-    paint(figure);
-    return figure;
-  }
-
-  function addTools(figure) {
-    const tools = [new Bokeh.BoxZoomTool({ dimensions: "auto" }), new Bokeh.PanTool(),
-                   new Bokeh.WheelZoomTool({ modifiers: { ctrl: true } }), new Bokeh.SaveTool()];
-    figure.toolbar.setv({ tools, active_drag: tools[0], active_scroll: tools[2] });
-  }
 
   class Card {
     constructor(chart) {
@@ -129,7 +29,7 @@ vsacli.charts = (() => {
     key(label) {
       const box = element("span", { class: "key" }, `${label} `);
       for (const series of this.chart.series.filter((each) => each.label === label)) {
-        const swatch = element("i", { class: "swatch" }), value = element("b"), role = ROLES[series.role] || "";
+        const swatch = element("i", { class: "swatch" }), value = element("b"), role = series.role === "computed" ? "" : series.role;
         const rms = series.rms === null ? "" : `rms ${number(series.rms)}, now `;
         const part = element("span", { class: "key", title: data.files[series.file].label }, swatch, role, rms, value);
         this.values.push({ series, swatch, value, part });
@@ -231,7 +131,7 @@ vsacli.charts = (() => {
       this.values.forEach(({ series, part, swatch }) => {
         part.classList.toggle("hidden", !vsacli.shown(series));
         swatch.style.borderTopColor = curveColour(series.colour);
-        swatch.style.borderTopStyle = BORDERS[dash(series)];
+        swatch.style.borderTopStyle = dash(series)[1];
       });
       this.keys.forEach((key) => key.classList.toggle("hidden", !key.querySelector(".key:not(.hidden)")));
       for (const { series, drawn } of this.curves || []) drawn.forEach((each) => { each.visible = vsacli.shown(series); });
@@ -293,5 +193,5 @@ vsacli.charts = (() => {
   vsacli.listen("reset", () => { cards.forEach((card) => card.reset()); vsacli.setWindow(...data.span); });
   vsacli.listen("scheme", () => { cards.forEach((card) => { card.drop(); card.show(); }); buildRest(); });
   addEventListener("scroll", updateSoon, { passive: true });
-  return { add, buildRest, newFigure, addTools, cards };
+  return { add, buildRest, cards };
 })();

@@ -14,7 +14,7 @@ from vsacli.results.pages.packing import Packed, as_script
 
 TEMPLATE, STYLE = "page.html", "page.css"
 
-SCRIPTS = ("marks.js", "charts.js", "robot.js", "scatter.js", "page.js")
+SCRIPTS = ("marks.js", "figures.js", "charts.js", "robot.js", "scatter.js", "page.js")
 """The project's own, in the order in which they run."""
 
 LARGEST_SHOWN = 200_000

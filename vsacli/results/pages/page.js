@@ -3,7 +3,8 @@
 (() => {
   const { data, state, element, number, curveColour, colour } = vsacli;
   const byId = (name) => document.getElementById(name);
-  const HEADINGS = { infeasible: "infeasible", singular: "singular", "near-singular": "near-singular",
+  /* Colours of what may be wrong, the worst first. */
+  const SHADES = { infeasible: "infeasible", singular: "singular", "near-singular": "near-singular",
                      "over a limit": "over-limit", doubtful: "doubtful" };
 
   document.querySelectorAll(".line").forEach((line) => {
@@ -45,10 +46,10 @@
       addFilter(state.joints, joint, name, [swatch]);
     });
     if (data.files.length > 1) {
-      const look = ["solid", "dashed", "double", "dotted"];
+      const { DASHES } = vsacli.figures;
       data.files.forEach(({ label }, file) => {
         const swatch = element("i", { class: "swatch" });
-        swatch.style.borderTopStyle = look[file % look.length];
+        swatch.style.borderTopStyle = DASHES[file % DASHES.length][1];
         addFilter(state.files, file, label, [swatch]);
       });
     }
@@ -69,7 +70,7 @@
     place.hidden = false;
     const keys = [...kinds].map((kind) => {
       const area = element("span", { class: "area" });
-      area.style.background = `var(--${HEADINGS[kind]})`;
+      area.style.background = `var(--${SHADES[kind]})`;
       return element("span", { class: "key" }, area, kind);
     });
     place.prepend(element("div", { class: "legend" }, ...keys));
@@ -81,7 +82,7 @@
     for (const [kind, spans] of found.reverse()) {
       for (const [from, to] of spans) {
         const mark = element("i", { title: `${kind}: ${number(from + data.start)} to ${number(to + data.start)} s` });
-        Object.assign(mark.style, { left: percent(from), width: `${100 * (to - from) / length}%`, background: `var(--${HEADINGS[kind]})` });
+        Object.assign(mark.style, { left: percent(from), width: `${100 * (to - from) / length}%`, background: `var(--${SHADES[kind]})` });
         lane.append(mark);
       }
     }
@@ -163,6 +164,16 @@
     });
   }
 
+  /* A page opens where the worst begins. */
+  function beginning() {
+    for (const kind of Object.keys(SHADES)) {
+      const starts = data.files.flatMap((file) => (file.troubles[kind] || []).flat()).map(([start]) => start);
+      if (starts.length) return Math.min(...starts);
+    }
+    return data.span[0];
+  }
+
+  state.cursor = beginning();
   addSections();
   addFilters();
   addTroubles();

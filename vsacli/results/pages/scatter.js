@@ -3,7 +3,7 @@
 (() => {
   const { data, array, number, colour, curveColour, element } = vsacli;
   if (data.kind !== "study") return;
-  const { newFigure, addTools } = vsacli.charts;
+  const { newFigure, addTools } = vsacli.figures;
   const place = document.getElementById("plots");
   const FEASIBLE = 2, LOST = 1;  // colours of curves
   let plots = [], section;
