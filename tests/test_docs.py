@@ -36,7 +36,7 @@ PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 
 LONG = (
     *("cli.md", "energy.md", "gallery.md", "identification.md", "mending-a-motion.md", "optimisation.md"),
-    *("index.md", "python.md", "quickstart.md", "reading-a-verdict.md"),
+    *("index.md", "pages.md", "python.md", "quickstart.md", "reading-a-verdict.md"),
     *("recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "simulation.md", "studies.md"),
     *("sizing.md", "suggestions.md", "urdf.md"),
     "models.md",
