@@ -76,6 +76,7 @@ def plot(
 
     The table of a study gives <stem>-margin, over the numbers that vary, <stem>-pareto, cost over margin, and
     <stem>-feasibility, the share of runs with at least a margin; of several tables the latter are compared.
+    Where runs were optimised, <stem>-cost is in place of the first two.
 
     --format html writes one page <stem>.html instead, for a browser and without network: the report, zoomable
     plots of every variable, and the robot at the time cursor; of several FILEs their differences, too. It

@@ -17,8 +17,16 @@ NAMED_RUNS = 3
 NORMAL_95 = 1.96
 """Standard deviations of a normal distribution within which 95 % lie."""
 
-COSTS = {"energy_spent": ("energy that motors spend", "J"), "peak_tau_motor": ("largest motor torque", "N m")}
-"""What a study may have kept that says what a motion costs: the first of these counts."""
+COSTS = {
+    "cost_after": "{}",
+    "energy_spent": "energy that motors spend",
+    "peak_tau_motor": "largest motor torque",
+}
+"""What a study may have kept that says what a motion costs, in words or in those of the table: the first
+counts."""
+
+ADDED = "J"
+"""Unit of costs that those of the joints add up to; of others the largest counts."""
 
 
 class StudyPoints:
@@ -52,12 +60,25 @@ class StudyPoints:
     @cached_property
     def cost(self) -> tuple[str, FloatArray] | None:
         """The words for the cost, and that of each run, NaN if steps are without; None if none was kept."""
-        for name, (words, unit) in COSTS.items():
-            if name in self._table.columns:
-                values = self._table.read(name)
-                total = values.sum(axis=1) if values.ndim == 2 else _most(values)
-                return f"{words} [{unit}]", total
-        return None
+        return next((self._cost(name) for name in COSTS if name in self._table.columns), None)
+
+    @property
+    def optimised(self) -> bool:
+        """Whether each run is an optimum, whose margin says what was asked."""
+        return "cost_after" in self._table.columns
+
+    @property
+    def shown(self) -> list[tuple[str, FloatArray]]:
+        """What is drawn over numbers that vary: margin and cost, or of optima the costs before and after."""
+        cost = [] if self.cost is None else [self.cost]
+        first = self._cost("cost_before") if self.optimised else ("smallest margin [%]", 100 * self.margin)
+        return [first, *cost]
+
+    def _cost(self, name: str) -> tuple[str, FloatArray]:
+        values, column = self._table.read(name), self._table.column(name)
+        unit = column.quantity.revolute
+        words = COSTS.get(name, "{}").format(column.long_name)
+        return f"{words} [{unit}]", _sum(values) if unit == ADDED else _most(values)
 
     @property
     def share(self) -> tuple[float, float, float]:
@@ -103,9 +124,20 @@ def _least(margins: FloatArray) -> FloatArray:
     return np.where(np.isinf(least), np.nan, least)
 
 
-def _most(peaks: FloatArray) -> FloatArray:
-    """Over joints and motors; NaN of a second motor that is not there does not count."""
-    peaks = peaks.reshape(len(peaks), -1)
-    there = ~np.isnan(peaks).all(axis=0)
-    most: FloatArray = peaks[:, there].max(axis=1, initial=-math.inf)
+def _sum(costs: FloatArray) -> FloatArray:
+    """Over joints."""
+    total: FloatArray = _there(costs).sum(axis=1)
+    return total
+
+
+def _most(costs: FloatArray) -> FloatArray:
+    """Over joints and motors."""
+    most: FloatArray = _there(costs).max(axis=1)
     return most
+
+
+def _there(costs: FloatArray) -> FloatArray:
+    """Costs (rows, ...) as (rows, columns), without columns of a motor or an optimum that no row has."""
+    costs = costs.reshape(len(costs), -1)
+    there = ~np.isnan(costs).all(axis=0)
+    return costs[:, there] if there.any() else costs

@@ -19,11 +19,14 @@ from vsacli.results.plots.styles import house_style, line_handle, line_style, sh
 from vsacli.results.store.stored_study import StoredStudy
 from vsacli.results.study_points import StudyPoints
 
-MARGIN, PARETO, FEASIBILITY_OF_RUNS = "margin", "pareto", "feasibility"
+MARGIN, COST, PARETO, FEASIBILITY_OF_RUNS = "margin", "cost", "pareto", "feasibility"
 """Names of the figures; the files are called `<stem>-<name>`."""
 
 PANEL_HEIGHT = 2.4
 """Inches."""
+
+MOST_LETTERS = 30
+"""Of a label in one line, along a panel."""
 
 MOST_PANELS = 6
 """Numbers that vary whose panels one figure holds: those that the margin follows most."""
@@ -41,8 +44,10 @@ def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
     with house_style():
         figures = {FEASIBILITY_OF_RUNS: _feasibility([points], [points.name])}
         if points.varying:
-            figures[MARGIN] = _over_map(points) if _is_grid(points) else _over_numbers(points)
-        if points.cost is not None and len(points.front) > 1:
+            figures[COST if points.optimised else MARGIN] = (
+                _over_map(points) if _is_grid(points) else _over_numbers(points)
+            )
+        if points.cost is not None and not points.optimised and len(points.front) > 1:
             figures[PARETO] = _pareto(points)
     return figures
 
@@ -121,9 +126,9 @@ def _is_grid(points: StudyPoints) -> bool:
 
 
 def _over_map(points: StudyPoints) -> Figure:
-    """Margin, and cost beside it, as maps over two numbers."""
+    """Margin, and cost beside it, or costs before and after an optimisation, as maps over two numbers."""
     (across, x), (up, y) = points.varying.items()
-    maps = [("smallest margin [%]", 100 * points.margin)] + ([points.cost] if points.cost is not None else [])
+    maps = points.shown
     figure = Figure((1.5 * PANEL_WIDTH * len(maps), PANEL_HEIGHT + 1.2), layout="constrained")
     panels = figure.subplots(1, len(maps), squeeze=False, sharey=True)[0]
     panels[0].set_ylabel(_label(points, up), parse_math=False)
@@ -138,9 +143,17 @@ def _over_map(points: StudyPoints) -> Figure:
         axes.set_xlabel(_label(points, across), parse_math=False)
         axes.grid(visible=False)
         axes.set_facecolor("0.8")
-        figure.colorbar(shown, ax=axes, label=label)
-    handles = [Line2D([], [], color=_LOST, label="margin zero"), Patch(color="0.8", label="infeasible steps")]
-    return complete(figure, points.name, handles)
+        figure.colorbar(shown, ax=axes, label=_fitting(label))
+    zero, none = (
+        Line2D([], [], color=_LOST, label="margin zero"),
+        Patch(color="0.8", label="infeasible steps"),
+    )
+    return complete(figure, points.name, [none] if points.optimised else [zero, none])
+
+
+def _fitting(label: str) -> str:
+    """A label with its unit, in two lines if it is longer than a panel is high."""
+    return label if len(label) <= MOST_LETTERS else label.replace(" [", "\n[")
 
 
 def _pareto(points: StudyPoints) -> Figure:

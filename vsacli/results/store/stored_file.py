@@ -31,8 +31,8 @@ class StoredFile:
     def _dataset(self, name: str) -> h5py.Dataset:
         return bounded(own_dataset(self._file, name))
 
-    def _labels(self, name: str) -> tuple[str, ...]:
-        return tuple(map(one_line, self._dataset(name).asstr()[...]))
+    def _labels(self, name: str, rows: slice = slice(None)) -> tuple[str, ...]:
+        return tuple(map(one_line, self._dataset(name).asstr()[rows]))
 
     def inputs(self) -> list[StoredInput]:
         """The files that were read, with what they held, as far as it was stored.

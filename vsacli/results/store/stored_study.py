@@ -4,17 +4,31 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line
+from vsacli.base.units import Quantity
 from vsacli.results.store.damage import CheckedFile, reporting_damage
 from vsacli.results.store.stored_file import StoredFile
 from vsacli.results.store.study_table import FORMAT, TEXTS
 
 PROVENANCE = ("method", "seed", "engine", "compiler", "numpy", "command_line")
 """Root attributes that say how a table was computed."""
+
+
+ALL = slice(None)
+"""Every row."""
+
+
+class StoredColumn(NamedTuple):
+    """A column as of `study_table.Column`."""
+
+    name: str
+    dims: tuple[str, ...]
+    quantity: Quantity
+    long_name: str
 
 
 class StoredStudy(StoredFile):
@@ -71,24 +85,43 @@ class StoredStudy(StoredFile):
             if self._dataset(name).shape[0] != self.rows:
                 raise ValueError(f"{name} has not {self.rows} rows")
 
-    def texts(self, name: str) -> tuple[str, ...]:
-        """Texts of all rows, or the labels of a dimension.
+    def texts(self, name: str, rows: slice = ALL) -> tuple[str, ...]:
+        """Texts of rows, or the labels of a dimension.
 
         Raises:
             InputError: they are damaged.
         """
         with reporting_damage(self.path, name):
-            return self._labels(name)
+            return self._labels(name, rows)
 
-    def read(self, name: str) -> AnyArray:
+    def read(self, name: str, rows: slice = ALL) -> AnyArray:
         """A column of numbers, (rows, ...), or the numbers of the runs.
 
         Raises:
             InputError: it is damaged, or not there.
         """
         with reporting_damage(self.path, name):
-            values: AnyArray = self._dataset(name)[...]
+            values: AnyArray = self._dataset(name)[rows]
         return values
+
+    def column(self, name: str) -> StoredColumn:
+        """What is known of a column.
+
+        Raises:
+            InputError: it is damaged, or not there.
+        """
+        with reporting_damage(self.path, name):
+            dataset = self._dataset(name)
+            unit = str(dataset.attrs["units"])
+            per_type = (str(dataset.attrs.get(f"units_{each}", unit)) for each in ("revolute", "prismatic"))
+            dims = tuple(dimension[0].name.removeprefix("/") for dimension in dataset.dims)
+            return StoredColumn(name, dims[1:], Quantity(*per_type), str(dataset.attrs["long_name"]))
+
+    def shape(self, name: str, steps: int) -> tuple[int, ...]:
+        """Of a column's values in one row, if columns over time have so many steps."""
+        with reporting_damage(self.path, name):
+            shape = tuple(map(int, self._dataset(name).shape[1:]))
+        return (steps, *shape[1:]) if name in self.columns and "step" in self.column(name).dims else shape
 
     def unit(self, name: str) -> str:
         """The unit of a column or parameter; that of revolute joints if they differ."""

@@ -24,10 +24,19 @@ from vsacli.results.store.schema import TEXT, storable, unit_attributes
 FORMAT = "vsacli-study-table/1"
 TEXTS = {
     "trajectory": "file of the trajectory",
-    "verdict": "verdict of the run's report; failed if it could not be computed",
-    "error": "why it could not be computed, else empty",
+    "verdict": "verdict of the run's report; failed if it cannot be computed, impossible without an optimum",
+    "error": "why there are no numbers, else empty",
     "key": "digest of all that the row depends on",
 }
+
+
+ROWS_AT_ONCE = 1024
+"""That are written together, or as many as have so many steps over time."""
+
+
+def rows_at_once(steps: int) -> int:
+    """How many rows are written together, if each has so many steps over time."""
+    return 1 + ROWS_AT_ONCE // (1 + steps)
 
 
 class Column(Protocol):

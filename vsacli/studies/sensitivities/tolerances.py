@@ -17,6 +17,7 @@ from vsacli.base.errors import InputError
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import LARGEST
+from vsacli.documents.kinds.shares import PER_CENT
 from vsacli.documents.number import evaluate
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.yaml_tree import parse_yaml
@@ -24,7 +25,6 @@ from vsacli.studies.sensitivities.parameter_steps import SMALL_CHANGES
 from vsacli.studies.sensitivities.parameters import Parameter
 
 FORM = "e.g. {normal: 5 %} or {uniform: 0.001}"
-_SHARE = re.compile(r"(?P<number>.*\S)\s*%")
 _PLAIN = re.compile(r"[-+.\d]+(e[-+]?\d+)?|nan|inf", re.IGNORECASE)
 
 
@@ -74,7 +74,7 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
     Raises:
         InputError: with file and line of what is no distribution, or fits no parameter.
     """
-    share = _SHARE.fullmatch(text.strip())
+    share = PER_CENT.fullmatch(text.strip())
     if share is None:
         if _PLAIN.fullmatch(text.strip()):
             raise InputError.one(
@@ -133,7 +133,7 @@ def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
     ((shape, size),) = node.entries.items()
     if shape not in SHAPES or not isinstance(size, tree.Scalar):
         raise InputError.one(f"expected a distribution, {FORM}, found {shape}: {size}")
-    share = _SHARE.fullmatch(size.text)
+    share = PER_CENT.fullmatch(size.text)
     if share is None:
         return Tolerance(shape, _number(size.text, size.text, unit))
     return Tolerance(shape, _number(share["number"], size.text) / 100 * abs(value))

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.arrays import IndexArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
 from vsacli.documents.source import Source
 from vsacli.results.store.stored_study import StoredStudy
-from vsacli.results.store.study_table import TEXTS, Column, Head, Parameter, Rows, StudyWriter
-from vsacli.studies.sweeps.kept import KEPT
-from vsacli.studies.sweeps.over_time import OVER_TIME
+from vsacli.results.store.study_table import TEXTS, Head, Parameter, Rows, StudyWriter, rows_at_once
 from vsacli.studies.sweeps.rows import FAILED
 
 MOST_NAMED = 5
@@ -41,10 +39,11 @@ def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
         parts = [stack.enter_context(StoredStudy(path)) for path in paths]
         _check_alike(parts)
         order = _order(parts)
-        with StudyWriter(
-            file, _head(parts[0], max(part.steps for part in parts), provenance), len(order)
-        ) as writer:
-            writer.write(Rows(range(len(order)), _arrays(parts, order)))
+        steps = max(part.steps for part in parts)
+        with StudyWriter(file, _head(parts[0], steps, provenance), len(order)) as writer:
+            for start in range(0, len(order), rows_at_once(steps)):
+                rows = order[start : start + rows_at_once(steps)]
+                writer.write(Rows(range(start, start + len(rows)), _arrays(parts, rows, steps)))
             writer.finish()
 
 
@@ -72,31 +71,34 @@ def _order(parts: Sequence[StoredStudy]) -> IndexArray:
     return order
 
 
-def _arrays(parts: Sequence[StoredStudy], order: IndexArray) -> dict[str, Any]:
-    """All columns in the order of the runs."""
-    first, arrays = parts[0], dict[str, Any]()
-    for name in (*TEXTS, *first.parameters, *first.columns):
-        if name in TEXTS or first.parameter_is_text(name):
-            texts = [text for part in parts for text in part.texts(name)]
-            arrays[name] = [texts[row] for row in order]
-        else:
-            arrays[name] = np.concatenate(_alike([part.read(name) for part in parts]))[order]
-    return arrays
+def _arrays(parts: Sequence[StoredStudy], rows: IndexArray, steps: int) -> dict[str, Any]:
+    """All columns of some runs, whose rows are those among all rows of the parts."""
+    first = parts[0]
+    texts = {name for name in (*TEXTS, *first.parameters) if name in TEXTS or first.parameter_is_text(name)}
+    arrays: dict[str, Any] = {name: np.empty(len(rows), dtype=object) for name in texts}
+    for name in {*first.parameters, *first.columns} - texts:
+        arrays[name] = np.full((len(rows), *first.shape(name, steps)), np.nan)
+    start = 0
+    for part in parts:
+        here = np.flatnonzero((start <= rows) & (rows < start + part.rows))
+        if len(here):
+            _fill(arrays, texts, here, part, rows[here] - start)
+        start += part.rows
+    return arrays | {name: arrays[name].tolist() for name in texts}
 
 
-def _alike(pieces: Sequence[FloatArray]) -> list[FloatArray]:
-    """Pieces of a column with as many steps as the one that has most, NaN where others have ended."""
-    if pieces[0].ndim == 1:
-        return list(pieces)
-    steps = max(piece.shape[1] for piece in pieces)
-    rest = [(0, 0)] * (pieces[0].ndim - 2)
-    ends = [[(0, 0), (0, steps - piece.shape[1]), *rest] for piece in pieces]
-    return [np.pad(piece, end, constant_values=np.nan) for piece, end in zip(pieces, ends, strict=True)]
+def _fill(
+    arrays: dict[str, Any], texts: Collection[str], here: IndexArray, part: StoredStudy, rows: IndexArray
+) -> None:
+    """Put rows of a part in their places; those that have fewer steps than others end with NaN."""
+    span = slice(int(rows.min()), int(rows.max()) + 1)
+    for name, array in arrays.items():
+        found = np.array(part.texts(name, span), dtype=object) if name in texts else part.read(name, span)
+        array[(here, *map(slice, found.shape[1:]))] = found[rows - span.start]
 
 
 def _head(part: StoredStudy, steps: int, provenance: dict[str, str]) -> Head:
     sources: dict[str, tuple[Source, ...]] = {"study": (), "robot": (), "trajectory": ()}
-    columns: dict[str, Column] = {**KEPT, **OVER_TIME}
     role = "study"
     for each in part.inputs():
         role = each.role or role
@@ -117,7 +119,7 @@ def _head(part: StoredStudy, steps: int, provenance: dict[str, str]) -> Head:
             )
             for path in part.parameters
         ),
-        columns=tuple(columns[name] for name in part.columns),
+        columns=tuple(map(part.column, part.columns)),
         steps=steps,
         sources=sources,
         provenance=part.provenance() | provenance,

@@ -24,6 +24,9 @@ from vsacli.trajectory.trajectory import Trajectory
 FAILED = "failed"
 """In place of the verdict of a run that could not be computed."""
 
+IMPOSSIBLE = "impossible"
+"""In place of the verdict of a run for which no feasible optimum was found."""
+
 LOST = "the process that computed it"
 """How the error of a run begins that was lost with its process."""
 
@@ -34,9 +37,10 @@ class Row(NamedTuple):
     Attributes:
         run: its number.
         key: of all that it depends on.
-        verdict: of its report, or `FAILED`.
-        error: why it failed, else empty.
-        values: what is kept, (columns,); empty if it failed.
+        verdict: of its report, or `FAILED`, or `IMPOSSIBLE`.
+        error: the reason of the latter two, else empty.
+        values: costs of the optimum, if one was looked for, and what is kept, (columns,); empty if there is
+            nothing of which they could be.
         curves: what is kept over time, flat; see `Recorder`.
     """
 
@@ -55,7 +59,11 @@ class Row(NamedTuple):
 
 def failed(run: int, key: str, reason: str) -> Row:
     """The row of a run that could not be computed."""
-    return Row(run, key, FAILED, one_line(reason), np.empty(0), np.empty(0))
+    return _without_values(run, key, FAILED, reason)
+
+
+def _without_values(run: int, key: str, verdict: str, reason: str) -> Row:
+    return Row(run, key, verdict, one_line(reason), np.empty(0), np.empty(0))
 
 
 def lost(study: Study, run: int, how: str) -> Row:
@@ -101,12 +109,19 @@ class Computer:
             )
         trajectory = with_devices(self._trajectory(robot, point.trajectory, changes), robot)
         self._study.check_read([*robot.sources, *trajectory.sources])
+        costs, optimise = list[FloatArray](), self._study.file.optimize
+        if optimise is not None:
+            optimum = optimise.optimum(robot, trajectory)
+            if optimum.trajectory is None:
+                return _without_values(run, key, IMPOSSIBLE, "; ".join(optimum.reasons))
+            trajectory, costs = optimum.trajectory, [cost.values(optimum) for cost in self._study.costs]
         computed = Run(robot, trajectory, engine=self._study.engine, threads=1)
         recorder = Recorder(self._study.over_time, self._study.file.every)
         for block in computed:
             recorder.add(block)
         report = computed.report()
-        return Row(run, key, report.verdict, "", columns(self._study.kept, report), recorder.curves)
+        values = np.concatenate([*costs, columns(self._study.kept, report)])
+        return Row(run, key, report.verdict, "", values, recorder.curves)
 
     def _trajectory(self, robot: Robot, index: int, changes: Divided) -> Trajectory:
         place, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)

@@ -113,7 +113,8 @@ class _Means(NamedTuple):
 
     def of(self, study: Study, runs: int, tell: Callable[[str], object]) -> AbstractContextManager[Rows]:
         """What computes so many runs."""
-        paying = runs if self.dask else 1 + runs // RUNS_A_PROCESS
+        short = self.dask is None and study.file.optimize is None
+        paying = 1 + runs // RUNS_A_PROCESS if short else runs
         count = min(processors(), paying) if self.processes is None else min(self.processes, runs)
         return executor(study, count, self.dask, tell)
 

@@ -26,6 +26,7 @@ from vsacli.studies.sweeps.design import Design
 from vsacli.studies.sweeps.dimensions import Dimension
 from vsacli.studies.sweeps.entries import Entries
 from vsacli.studies.sweeps.kept import KEPT, Kept
+from vsacli.studies.sweeps.optimised import Cost
 from vsacli.studies.sweeps.over_time import OverTime, over_time
 from vsacli.studies.sweeps.study_file import FORMAT, StudyFile
 from vsacli.trajectory.changes import Divided, divided
@@ -87,6 +88,11 @@ class Study:
         return tuple(KEPT[name] for name in dict.fromkeys(self.file.keep or KEPT))
 
     @property
+    def costs(self) -> tuple[Cost, ...]:
+        """What is kept of each run's optimum, if one is looked for."""
+        return () if self.file.optimize is None else self.file.optimize.costs
+
+    @property
     def over_time(self) -> tuple[OverTime, ...]:
         """What is kept of each run over time."""
         return over_time(self.file.variables or ())
@@ -112,7 +118,9 @@ class Study:
         robot = [source.sha256 for source in self.robot.sources]
         kept = [each.name for each in self.kept]
         curves = [self.file.every, *(each.name for each in self.over_time)]
-        return _digest([[*self.computed_by.values()], robot, kept, curves, [*self._named_files.values()]])
+        optimised = [] if self.file.optimize is None else [repr(self.file.optimize)]
+        files = [*self._named_files.values()]
+        return _digest([[*self.computed_by.values()], robot, kept, curves, files, *optimised])
 
     @property
     def computed_by(self) -> dict[str, str]:

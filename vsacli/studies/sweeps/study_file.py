@@ -11,6 +11,7 @@ from vsacli.documents.fields import (
     Choice,
     Items,
     Name,
+    Record,
     Text,
     check_fields,
     choice,
@@ -20,6 +21,7 @@ from vsacli.documents.fields import (
 )
 from vsacli.documents.kinds.several import OneOrMore
 from vsacli.studies.sweeps.kept import KEPT
+from vsacli.studies.sweeps.optimised import Optimised
 from vsacli.studies.sweeps.over_time import OVER_TIME
 from vsacli.studies.sweeps.ways import Drawn, Ranged, Varied, Ways
 
@@ -61,12 +63,16 @@ class StudyFile:
         "runs of each trajectory that are drawn; absent if the method is grid", check=_COUNT, default=None
     )
     seed: int = integer("of what is drawn", check=_SEED, default=0)
+    optimize: Optimised | None = value(
+        Record(Optimised),
+        "what is optimised in each run; all that is kept is of the optimum then",
+        default=None,
+    )
     keep: tuple[str, ...] | None = value(
         Items(_ColumnName(tuple(KEPT))),
         "what is kept of each run beside its verdict; all by default",
         default=None,
     )
-
     variables: tuple[str, ...] | None = value(
         Items(_VariableName(tuple(OVER_TIME))),
         "variables of results that are kept over time",

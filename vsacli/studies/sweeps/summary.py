@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.base.json_records import Stored, named
 from vsacli.results.store.stored_study import StoredStudy
-from vsacli.studies.sweeps.rows import FAILED
+from vsacli.studies.sweeps.rows import FAILED, IMPOSSIBLE
 
 MOST_ERRORS = 3
 """Failed runs that the text names."""
@@ -97,6 +97,9 @@ class StudySummary(Stored):
             lines.append(
                 f"infeasible or singular steps in {without:,} runs; peaks and energies there are NaN"
             )
+        impossible = self.verdicts.get(IMPOSSIBLE, 0)
+        if impossible:
+            lines.append(f"nothing feasible was found in {impossible:,} runs; error in the table says why")
         lines += [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
         if len(self.failures) > MOST_ERRORS:
             lines.append(f"and {len(self.failures) - MOST_ERRORS:,} more failed, see error in the table")

@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 from vsacli.base.outputs import Staged
-from vsacli.results.store.study_table import Head, Parameter, Rows, StudyWriter
+from vsacli.results.store.study_table import Head, Parameter, Rows, StudyWriter, rows_at_once
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.over_time import filled, steps_of
-from vsacli.studies.sweeps.row_values import arrays_of, width
-from vsacli.studies.sweeps.rows import FAILED, Row
+from vsacli.studies.sweeps.row_values import Values, arrays_of, width
+from vsacli.studies.sweeps.rows import Row
 from vsacli.studies.sweeps.study import Study
-
-ROWS_AT_ONCE = 1024
-"""That are written together."""
 
 
 def write(
@@ -49,7 +46,7 @@ def write(
     steps = 0
     if study.over_time:  # known once all rows were read
         steps = max((steps_of(row(run).curves, study.over_time, joints) for run in runs), default=0)
-    at_once = ROWS_AT_ONCE if steps == 0 else 1 + ROWS_AT_ONCE // steps
+    at_once = rows_at_once(steps)
     with StudyWriter(file, _head(study, steps, provenance), len(runs)) as writer:
         for start in range(0, len(runs), at_once):
             writer.write(_rows(study, [row(run) for run in runs[start : start + at_once]], steps))
@@ -66,7 +63,7 @@ def _head(study: Study, steps: int, provenance: dict[str, str]) -> Head:
         joint_names=study.robot.joint_names,
         joint_types=study.robot.joint_types,
         parameters=tuple(parameters),
-        columns=(*study.kept, *study.over_time),
+        columns=(*study.costs, *study.kept, *study.over_time),
         steps=steps,
         sources={
             "study": (study.source,),
@@ -99,11 +96,12 @@ def _rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
                 value if isinstance(value, str) else json.dumps(value) for value in values
             ]
     joints = len(study.robot.joints)
-    table = np.full((len(rows), width(study.kept, joints)), np.nan)
+    columns: list[Values] = [*study.costs, *study.kept]
+    table = np.full((len(rows), width(columns, joints)), np.nan)
     for place, row in enumerate(rows):
-        if row.verdict != FAILED:
+        if len(row.values):
             table[place] = row.values
-    arrays |= arrays_of(study.kept, table, joints)
+    arrays |= arrays_of(columns, table, joints)
     if study.over_time:
         arrays |= filled([row.curves for row in rows], study.over_time, steps, joints)
     return Rows([row.run for row in rows], arrays)
