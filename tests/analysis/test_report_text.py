@@ -11,8 +11,8 @@ import pytest
 
 from vsacli.analysis.joint_report import COUNTED, JointReport, Worst
 from vsacli.analysis.report import Report
-from vsacli.analysis.report_text import sentences
 from vsacli.analysis.self_check import SelfCheck
+from vsacli.analysis.trouble_text import sentences
 from vsacli.dynamics.energy import JointEnergy
 
 NAN = math.nan
@@ -80,7 +80,7 @@ def too_soft(value: float, bound: float, **changes: object) -> JointReport:
 
 
 def sentence(joint: JointReport) -> str:
-    (only,) = sentences(joint)
+    (only,) = sentences([joint])
     return only
 
 
@@ -341,3 +341,28 @@ def test_what_lacks_what_every_report_has_is_none(key):
     del content[key]
     with pytest.raises(TypeError, match=f"missing 1 required positional argument: '{key}'"):
         Report.from_json(content)
+
+
+def many(worst: Worst, steps: list[int]) -> list[JointReport]:
+    return [replace(troubled(worst, steps=each), name=f"j{number}") for number, each in enumerate(steps)]
+
+
+def test_five_joints_in_trouble_are_told_one_by_one():
+    told = list(sentences(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [5, 4, 3, 2, 1])))
+    assert [sentence.partition(":")[0] for sentence in told] == ["j0", "j1", "j2", "j3", "j4"]
+
+
+def test_of_many_joints_those_with_most_steps_are_told_and_none_is_left_out():
+    *told, rest = sentences(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [1, 7, 2, 9, 8, 6, 3]))
+    assert [sentence.partition(":")[0] for sentence in told] == ["j1", "j3", "j4", "j5"]
+    assert rest == ("also infeasible: j0 (1 step), j2 (2 steps, from 3.588 s), j6 (3 steps, from 3.588 s)")
+
+
+def test_of_many_limits_those_farthest_off_are_told():
+    joints = [
+        replace(troubled(Worst("velocity_limit", 1.0, 3.0 + k, 3.0, "rad/s")), name=f"j{k}")
+        for k in range(1, 7)
+    ]
+    *told, rest = sentences(joints)
+    assert [sentence.partition(":")[0] for sentence in told] == ["j3", "j4", "j5", "j6"]
+    assert rest == "also over the velocity limit: j1 (4 rad/s, limit 3), j2 (5 rad/s, limit 3)"

@@ -10,6 +10,7 @@ from vsacli.analysis.dry_friction import dry_friction_lines
 from vsacli.analysis.energy_text import energy_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
+from vsacli.analysis.trouble_text import sentences
 from vsacli.analysis.uncertainty_text import uncertainty_lines
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.tables import ReportText
@@ -73,7 +74,7 @@ class Report(Stored):
         """The report in its parts, as people read it."""
         lines = [
             *text.warnings_and_notes(self.warnings, self.notes),
-            *(sentence for joint in self.joints for sentence in text.sentences(joint)),
+            *sentences(self.joints),
             *uncertainty_lines(self.joints),
             *text.stops(self.joints, self.drifts),
             *text.start(self.joints),

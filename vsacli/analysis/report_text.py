@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.analysis.joint_report import JointDrift, JointReport, Worst
+from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.self_check import SelfCheck
-from vsacli.base.flags import Flag
 from vsacli.base.units import POSITION, TORQUE, VELOCITY, time_text
 
 WIDTH = 78
@@ -33,14 +32,6 @@ def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterato
     """A line each, marked as what it is."""
     yield from (f"warning: {warning}" for warning in warnings)
     yield from (f"note: {note}" for note in notes)
-
-
-def sentences(joint: JointReport) -> Iterator[str]:
-    """One sentence for each kind of trouble of a joint, naming it."""
-    between = {worst.time for worst in joint.between.values()}
-    for kind, worst in joint.worst.items():
-        where = "; this lies between the steps" if worst.time in between else ""
-        yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, worst)}{where}"
 
 
 def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
@@ -68,20 +59,21 @@ def _row(joint: JointReport) -> tuple[str, ...]:
         _span(joint.stiffness_min, joint.stiffness_max),
         *(
             (_corridor(*joint.reachable), percent(joint.margin))
-            if "stiffness" in _kind(joint).commanded
+            if "stiffness" in kind_of(joint).commanded
             else ("-", "-")
         ),
     )
 
 
-def _kind(joint: JointReport) -> type[Actuator]:
+def kind_of(joint: JointReport) -> type[Actuator]:
+    """Of its actuator."""
     kind: type[Actuator] = ACTUATORS[joint.actuator]
     return kind
 
 
 def of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
     """Of a pair of numbers those of the motors that the joint has."""
-    return pair[: _kind(joint).motor_count]
+    return pair[: kind_of(joint).motor_count]
 
 
 def _corridor(lower: float, upper: float) -> str:
@@ -108,7 +100,7 @@ def percent(share: float) -> str:
     return f"{100 * share:.2f} %" if abs(share) >= 1e-4 or share == 0 else f"{100 * share:.1g} %"
 
 
-def _apart(value: float, bound: float) -> tuple[str, str]:
+def apart(value: float, bound: float) -> tuple[str, str]:
     """Both with as many digits as it takes to see how far they are apart, at least four."""
     for digits in range(4, 17):
         shown = _rounded(value, digits), _rounded(bound, digits)
@@ -125,86 +117,6 @@ def _rounded(value: float, digits: int) -> str:
 def count(steps: int) -> str:
     """Steps by number."""
     return f"{steps} step" if steps == 1 else f"{steps} steps"
-
-
-def _steps(joint: JointReport, kind: str) -> str:
-    found = joint.steps[kind]
-    return count(found) if found == 1 else f"{count(found)}, from {time_text(joint.first_time[kind])}"
-
-
-def _infeasible(joint: JointReport, worst: Worst) -> str:
-    steps = _steps(joint, "infeasible")
-    slack = f"; a tendon goes slack at {count(joint.steps['slack'])}" if joint.steps["slack"] else ""
-    preload = "; the opposite preload would reach it" if joint.other_preload else ""
-    hints = f"({steps}){slack}{preload}"
-    when = f"at t = {time_text(worst.time)}"
-    if math.isnan(worst.bound):
-        return f"its springs cannot carry the elastic torque {when} at any stiffness {hints}"
-    value, bound = _apart(worst.value, worst.bound)
-    if "stiffness" not in _kind(joint).commanded:
-        relation = "below" if worst.value < worst.bound else "above"
-        load = f"elastic torque {value} {worst.unit} {when}"
-        return f"{load} is {relation} the {bound} that its spring carries {hints}"
-    relation, remedy = ("below", "raise") if worst.value < worst.bound else ("above", "lower")
-    return (
-        f"stiffness {value} {worst.unit} {when} is {relation} the {bound} "
-        f"its load allows, {remedy} it {hints}"
-    )
-
-
-def _singular(joint: JointReport, worst: Worst) -> str:
-    if math.isnan(worst.bound):
-        when = f"at t = {time_text(worst.time)}"
-        return f"its spring is slack {when}: motor torques are undefined ({_steps(joint, 'singular')})"
-    remedy = "lower" if worst.bound == joint.reachable[1] else "raise"
-    return (
-        f"stiffness {worst.value:.6g} {worst.unit} at t = {time_text(worst.time)} is singular: "
-        f"motor torques are undefined at the end of its range, {remedy} it ({_steps(joint, 'singular')})"
-    )
-
-
-def _near_singular(joint: JointReport, worst: Worst) -> str:
-    gap, when = abs(worst.value - worst.bound) / worst.value, f"at t = {time_text(worst.time)}"
-    return (
-        f"warning: stiffness {worst.value:.6g} {worst.unit} {when} is {100 * gap:.2g} % "
-        f"from singular, where motor torques grow without bound ({_steps(joint, 'near_singular')})"
-    )
-
-
-def _not_finite(joint: JointReport, worst: Worst) -> str:
-    return (
-        f"a number of its motors is not finite at t = {time_text(worst.time)}: motion, stiffness or load are "
-        f"too large, or no numbers (infeasible: {_steps(joint, 'infeasible')})"
-    )
-
-
-def _unstable(joint: JointReport, worst: Worst) -> str:
-    return (
-        f"what moves inside its transmission is unstable from t = {time_text(worst.time)} on: its damper "
-        f"carries {number(worst.value)} {worst.unit} that the springs cannot; raise the stiffness "
-        f"({_steps(joint, 'singular')})"
-    )
-
-
-def _limit(joint: JointReport, worst: Worst) -> str:
-    return f"{excess(worst)} (first at {time_text(joint.first_time[worst.kind])})"
-
-
-def excess(worst: Worst) -> str:
-    """By how much a limit is exceeded, and where."""
-    whose = Flag.labelled(worst.kind).quantity_of(worst.motor)
-    value, bound = _apart(worst.value, worst.bound)
-    relation = "below" if worst.value < worst.bound else "above"
-    return f"{whose} is {value} {worst.unit} at t = {time_text(worst.time)}, {relation} its limit {bound}"
-
-
-_SENTENCES = {
-    "not_finite": _not_finite,
-    "infeasible": _infeasible,
-    "singular": _singular,
-    "near_singular": _near_singular,
-    "internal_instability": _unstable,
-}
 
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:

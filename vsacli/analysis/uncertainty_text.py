@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointReport, JointUncertainty, Spread
-from vsacli.analysis.report_text import by_joint, count, excess, number, of_motors, percent
+from vsacli.analysis.report_text import by_joint, count, number, of_motors, percent
+from vsacli.analysis.trouble_text import excess
 
 DIFFERENT_PEAK = 1.1
 """Factor between a peak at the ends of a record and that inside from which on it is said where it is."""

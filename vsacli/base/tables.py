@@ -6,6 +6,9 @@ from collections.abc import Iterator, Sequence
 from html import escape
 from typing import NamedTuple
 
+BETWEEN_CELLS = "   "
+"""What no other text of a report has between words, so that tables can be told from it."""
+
 
 def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
     """The lines of a table: the first column to the left, the others to the right."""
@@ -15,7 +18,7 @@ def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
             cell.ljust(width) if column == 0 else cell.rjust(width)
             for column, (cell, width) in enumerate(zip(row, widths, strict=True))
         )
-        yield "   ".join([name, *cells])
+        yield BETWEEN_CELLS.join([name, *cells])
 
 
 class ReportText(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -12,7 +11,7 @@ import click
 
 from vsacli.base.errors import InputError
 from vsacli.base.streams import STANDARD
-from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say
+from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_json, say_text
 from vsacli.cli.file_names import FILE
 
 if TYPE_CHECKING:
@@ -205,8 +204,8 @@ def show_report(report: Report, as_json: bool, suggestions: Suggestions | None =
     """Print the report, and suggestions if there are; the exit code says what the report says."""
     if as_json:
         extra = {} if suggestions is None else {"suggestions": suggestions.as_json()}
-        say(json.dumps({**report.as_json(), **extra}, indent=1))
+        say_json({**report.as_json(), **extra})
     else:
         texts = [str(report)] if suggestions is None else [str(report), str(suggestions)]
-        say("\n".join(texts))
+        say_text("\n".join(texts), report.verdict)
     return EXIT_OF_VERDICT[report.verdict]

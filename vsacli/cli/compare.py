@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,7 +63,7 @@ def compare(
             comparison = compared(stored, recording, begins_at, columns)
         if folder is not None:
             _draw(comparison, folder, outputs)
-    say(json.dumps(comparison.as_json(), indent=1) if as_json else str(comparison))
+    say(comparison, as_json)
     talk.wrote(outputs)
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import enum
+import json
 import os
+import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import wraps
-from typing import TYPE_CHECKING, Any, Self, TextIO, cast
+from typing import TYPE_CHECKING, Any, Protocol, Self, TextIO, cast
 
 import click
 
@@ -57,6 +59,13 @@ class Exit(enum.IntEnum):
         return member
 
 
+GREEN, YELLOW, RED = ("\x1b[1;32m", "\x1b[1;33m", "\x1b[1;31m")
+PLAIN = "\x1b[0m"
+"""What turns the colour of a terminal, each bold, so that it is seen without colours, too; and back."""
+
+COLORS = {"ok": GREEN, **dict.fromkeys(("over_limit", "doubtful", "strayed", "untold"), YELLOW)}
+"""Colour of a verdict; every other is red."""
+
 EXIT_OF_VERDICT = {
     "ok": Exit.OK,
     "over_limit": Exit.VERDICT,
@@ -86,12 +95,79 @@ def tell(message: str) -> None:
         click.echo(for_terminal(message), err=True)
 
 
-def say(report: str) -> None:
-    """Print what the exit code says as well; a reader that has gone has read enough of it."""
+class Reported(Protocol):
+    """What a command has found: a text for people, and JSON values for programs."""
+
+    def as_json(self) -> dict[str, Any]:
+        """As JSON values."""
+
+
+def say(found: Reported, as_json: bool) -> None:
+    """Print what a command has found, as JSON or as a text."""
+    if as_json:
+        say_json(found.as_json())
+    else:
+        say_text(str(found), getattr(found, "verdict", ""))
+
+
+def say_json(content: Mapping[str, Any]) -> None:
+    """Print JSON, whatever reads it."""
+    with _read_enough():
+        click.echo(json.dumps(content, indent=1))
+
+
+def say_text(text: str, verdict: str = "") -> None:
+    """Print a text: on a terminal fitted to its width, the verdict at the end of its headline in colour."""
+    text = for_width(text)
+    place = headline_end(text, verdict)
+    with _read_enough():
+        if place is not None and isinstance(sys.stdout, _CheckedOutput) and _colored():
+            sys.stdout.write_colored(text, place, COLORS.get(verdict, RED))
+            sys.stdout.flush()
+        else:
+            click.echo(text)
+
+
+def for_width(text: str) -> str:
+    """A text as it fits the terminal that standard output is; as it is where that is none."""
+    width = _terminal_width(sys.stdout)
+    if not width:
+        return text
+    from vsacli.base.fitted_text import fitted
+
+    return fitted(text, width)
+
+
+@contextmanager
+def _read_enough() -> Iterator[None]:
+    """Within, a reader that has gone has read enough: the exit code says what is wrong as well."""
     try:
-        click.echo(report)
+        yield
     except OutputClosedError:
         _discard_buffer(sys.stdout)
+
+
+def headline_end(text: str, verdict: str) -> slice | None:
+    """Where the verdict stands at the end of a line, with what is added to it in parentheses, if it does."""
+    words = re.escape(verdict.upper().replace("_", " "))
+    found = re.search(rf"(?<!\S){words}( \([^()\n]*\))?$", text, re.MULTILINE) if verdict else None
+    return slice(*found.span()) if found else None
+
+
+def _terminal_width(stream: TextIO | None) -> int:
+    """Columns of the terminal that a stream goes to; 0 if it goes elsewhere."""
+    try:
+        if stream is None or not stream.isatty():
+            return 0
+        return os.get_terminal_size(stream.fileno()).columns
+    except (OSError, ValueError):
+        return 0
+
+
+def _colored() -> bool:
+    """Whether standard output is a terminal whose user has nothing against colours, see no-color.org."""
+    wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return wanted and sys.stdout.isatty()
 
 
 @dataclass(frozen=True)
@@ -189,6 +265,14 @@ class _CheckedOutput:
     def write(self, text: str) -> int:
         with _raising_output_errors():
             return self._stream.write(for_terminal(text))
+
+    def write_colored(self, text: str, place: slice, color: str) -> None:
+        """Write a text and the end of its line, a place in it in a colour; nothing else of it may act."""
+        before, words, after = (
+            for_terminal(part) for part in (text[: place.start], text[place], text[place.stop :])
+        )
+        with _raising_output_errors():
+            self._stream.write(f"{before}{color}{words}{PLAIN}{after}\n")
 
     def flush(self) -> None:
         with _raising_output_errors():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -141,7 +140,7 @@ def identify(
             file.write_text(fitted_text(loaded, found, Path(output or "").parent))
         if folder is not None:
             _draw(found, robot, folder, outputs)
-    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    say(found, as_json)
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]
 

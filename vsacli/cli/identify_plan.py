@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -63,7 +62,7 @@ def plan(
         if file is not None:
             with file.opened() as stream:
                 stream.write(excitation_text(found))
-    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    say(found, as_json)
     talk.wrote(outputs)
     if output is None:
         talk.note("the excitation was not written; name a file for it: -o excitation.yaml")

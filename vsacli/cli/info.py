@@ -11,7 +11,7 @@ import click
 
 from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import example
-from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.console import Talk, for_width, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
 
 
@@ -82,8 +82,10 @@ def _show(description: dict[str, Any], as_json: bool, field: str | None) -> None
 
     if field is not None:
         click.echo(_found(description, field))
+    elif as_json:
+        click.echo(json.dumps(json_value(description), indent=1))
     else:
-        click.echo(json.dumps(json_value(description), indent=1) if as_json else render(description))
+        click.echo(for_width(render(description)))
 
 
 def _cache(folder: str, clear: bool) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from pathlib import Path
@@ -140,7 +139,7 @@ def optimize(
         if folder is not None and found.trajectory is not None:
             _draw(found, found.trajectory, inputs.trajectory, folder, stem, outputs)
     talk.wrote(outputs)
-    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    say(found, as_json)
     return Exit.OK if found.possible else Exit.VERDICT
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 from contextlib import ExitStack
@@ -101,7 +100,7 @@ def sensitivity(
         found = _analysed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
         if folder is not None:
             _draw(found, inputs.robot, folder, run_stem(robot, trajectory), outputs)
-    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    say(found, as_json)
     talk.wrote(outputs)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 from collections.abc import Callable
@@ -278,5 +277,5 @@ def _run(
 
 
 def _show(report: SimulationReport, as_json: bool) -> Exit:
-    say(json.dumps(report.as_json(), indent=1) if as_json else str(report))
+    say(report, as_json)
     return Exit.OK if report.verdict == "ok" else Exit.VERDICT

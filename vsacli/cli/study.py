@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 import sys
@@ -128,7 +127,7 @@ def _shown(table: StoredStudy, as_json: bool, talk: Talk) -> int:
     from vsacli.studies.sweeps import StudySummary
 
     summary = StudySummary.of(table)
-    say(json.dumps(summary.as_json(), indent=1) if as_json else str(summary))
+    say(summary, as_json)
     talk.note(f"wrote {table.path}")
     return Exit.VERDICT if summary.failures else Exit.OK
 

@@ -12,6 +12,7 @@ from vsacli.base.tables import aligned
 from vsacli.base.units import DAMPING, POSITION, STIFFNESS, TORQUE
 from vsacli.documents.changes import written
 from vsacli.files import recordings
+from vsacli.files.info.devices_text import device_lines
 from vsacli.files.info.study_info import KIND, study_lines
 from vsacli.files.stored_reports import stored_report
 
@@ -42,6 +43,7 @@ def _robot(robot: Description) -> Iterator[str]:
     yield from ("", *aligned(list(_drives(joints))), "")
     yield "static load: the largest torque of gravity that was found, over configurations within the limits"
     yield "stiffness: reachable without load, and with the static load in either direction"
+    yield from ("", *device_lines(joints))
     yield from _dampers(joints)
     if robot["held_at_zero"]:
         yield f"without position limits, and held at zero: {', '.join(robot['held_at_zero'])}"

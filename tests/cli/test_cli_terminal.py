@@ -1,0 +1,91 @@
+"""Reports on a terminal: as wide as that is, the verdict in colour; in a pipe neither."""
+
+from __future__ import annotations
+
+import os
+import struct
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from samples.command_line import REPOSITORY, ROBOT
+from samples.marks import slow
+
+fcntl, pty, termios = (pytest.importorskip(name) for name in ("fcntl", "pty", "termios"))
+
+TRAJECTORY = REPOSITORY / "trajectories" / "rest_to_rest.yaml"
+COMMAND = [sys.executable, "-m", "vsacli"]
+CHECK = ("check-feasibility", str(ROBOT), str(TRAJECTORY), "--set", "rate=20")
+RED, GREEN, PLAIN = "\x1b[1;31m", "\x1b[1;32m", "\x1b[0m"
+
+
+def on_terminal(columns: int, *arguments: str, **environment: str) -> str:
+    """What a command shows on a terminal of so many columns, without what the terminal adds."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    known = {name: value for name, value in os.environ.items() if name not in {"NO_COLOR", "COLUMNS"}}
+    done = subprocess.Popen(
+        [*COMMAND, *arguments],
+        stdout=theirs,
+        stderr=subprocess.PIPE,
+        env={**known, "TERM": "xterm", **environment},
+    )
+    os.close(theirs)
+    shown = b""
+    while chunk := _read(ours):
+        shown += chunk
+    os.close(ours)
+    assert done.communicate()[1] == b""
+    return shown.decode().replace("\r\n", "\n")
+
+
+def _read(terminal: int) -> bytes:
+    try:
+        return os.read(terminal, 65536)
+    except OSError:  # the other side has gone
+        return b""
+
+
+@pytest.mark.parametrize("columns", [40, slow(80), slow(200)])
+def test_a_report_is_as_wide_as_its_terminal(columns: int) -> None:
+    wrong = (*CHECK, "--set", "stiffness.end=700")
+    shown = on_terminal(columns, *wrong)
+    assert f"{RED}INFEASIBLE (3 of 3 joints){PLAIN}\n" in shown
+    plain = shown.replace(RED, "").replace(PLAIN, "")
+    assert max(map(len, plain.splitlines())) <= columns
+    piped = subprocess.run([*COMMAND, *wrong], capture_output=True, text=True, check=False).stdout
+    assert "\x1b" not in piped
+    words = sorted(set(piped.split()))
+    assert sorted(set(plain.split())) == words  # nothing is left out
+    assert (plain == piped) == (columns == 200)
+
+
+@pytest.mark.slow
+def test_colour_is_for_those_who_want_it() -> None:
+    assert f" {GREEN}OK{PLAIN}\n" in on_terminal(80, *CHECK)
+    assert "\x1b" not in on_terminal(80, *CHECK, NO_COLOR="1")
+    assert "\x1b" not in on_terminal(80, *CHECK, TERM="dumb")
+    assert GREEN in on_terminal(80, *CHECK, NO_COLOR="")  # empty is not set, see no-color.org
+
+
+@pytest.mark.slow
+def test_json_on_a_terminal_is_as_in_a_pipe() -> None:
+    piped = subprocess.run([*COMMAND, *CHECK, "--json"], capture_output=True, text=True, check=True).stdout
+    assert on_terminal(40, *CHECK, "--json") == piped
+
+
+@pytest.mark.slow
+def test_descriptions_are_fitted_too() -> None:
+    shown = on_terminal(60, "info", str(ROBOT))
+    assert max(map(len, shown.splitlines())) <= 60
+    assert "\x1b" not in shown
+
+
+@pytest.mark.slow
+def test_names_do_not_act_on_a_terminal(tmp_path: Path) -> None:
+    """An escape in a name is refused, or shown as one, whatever colours the verdict has."""
+    wicked = tmp_path / "OK\x1b[32m.yaml"
+    wicked.write_bytes(Path(TRAJECTORY).read_bytes())
+    shown = on_terminal(80, *CHECK[:2], str(wicked), "--set", "rate=20")
+    assert "\x1b[32m" not in shown

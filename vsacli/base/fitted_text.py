@@ -1,0 +1,116 @@
+"""Reports fitted to the width of a terminal: lines broken between words, wide tables in parts."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+from vsacli.base.tables import BETWEEN_CELLS
+
+LEAST_WIDTH = 20
+"""Columns of a terminal below which a line may be too long for it."""
+
+INDENT = "  "
+"""Before what goes on from the line above."""
+
+WIDEST_INDENT = 3
+"""What fraction of the width may stand before lines that go on as wide as their beginning."""
+
+BEFORE_UNIT = re.compile(r"(?<=\d) (?=[A-Za-z%])|(?<=\bN) (?=m\b)| (?=[+-]\d)")
+"""Blanks at which a line is not broken: between a number and its unit, within newton metres, and before a
+number with a sign, which belongs to the joint before it."""
+
+HARD_BLANK = "\N{NO-BREAK SPACE}"
+"""What stands for them while it is broken."""
+
+
+def fitted(text: str, width: int) -> str:
+    """A report with no line longer than a terminal is wide, as far as words and cells of tables allow.
+
+    Below the first line, tables are lines with cells that are apart by three blanks or more, as
+    `tables.aligned` makes them. One that is too wide follows in parts, each with the first column. Lines that
+    go on below a label, with a comma at their end, are broken anew.
+    """
+    width = max(width, LEAST_WIDTH)
+    if all(len(line) <= width for line in text.split("\n")):
+        return text
+    headline, *lines = _joined(text.split("\n"))
+    broken = _broken(headline, width)
+    for is_table, group in groupby(lines, key=_has_cells):
+        several = list(group)
+        fits = all(len(line) <= width for line in several)
+        if is_table and len(several) > 1 and not fits:
+            broken += _parts_of_table(several, width)
+        else:
+            broken += [part for line in several for part in _broken(line, width)]
+    return "\n".join(broken)
+
+
+def _has_cells(line: str) -> bool:
+    return BETWEEN_CELLS in line.strip()
+
+
+def _joined(lines: Sequence[str]) -> list[str]:
+    """The lines, with those that go on below a label joined to it."""
+    joined: list[str] = []
+    for line in lines:
+        if joined and joined[-1].endswith(",") and line.startswith(INDENT):
+            joined[-1] += " " + line.lstrip()
+        else:
+            joined.append(line)
+    return joined
+
+
+def _broken(line: str, width: int) -> list[str]:
+    """A line between its words; what is set to the right of it, as a verdict, in a line of its own."""
+    if len(line) <= width:
+        return [line]
+    if _has_cells(line):
+        left, _, right = line.rpartition(BETWEEN_CELLS)
+        return [*_broken(left.rstrip(), width), right.strip().rjust(width)]
+    wrapped = textwrap.wrap(
+        BEFORE_UNIT.sub(HARD_BLANK, line),
+        width,
+        subsequent_indent=_indent(line, width),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [part.replace(HARD_BLANK, " ") for part in wrapped]
+
+
+def _indent(line: str, width: int) -> str:
+    """Below its label, if that leaves enough of the width."""
+    label, colon, _ = line.partition(": ")
+    below = " " * len(label + colon)
+    if colon and len(below) * WIDEST_INDENT <= width:
+        return below
+    return " " * (len(line) - len(line.lstrip())) + INDENT
+
+
+def _parts_of_table(lines: Sequence[str], width: int) -> Iterator[str]:
+    """The table in as many parts as it takes, a part one below the other, each with the first column."""
+    first, *columns = _columns(lines)
+    while columns:
+        taken, room = 1, width - len(first[0]) - len(BETWEEN_CELLS) - len(columns[0][0])
+        while taken < len(columns) and (room := room - len(BETWEEN_CELLS) - len(columns[taken][0])) >= 0:
+            taken += 1
+        for cells in zip(first, *columns[:taken], strict=True):
+            yield BETWEEN_CELLS.join(cells).rstrip()
+        columns = columns[taken:]
+
+
+def _columns(lines: Sequence[str]) -> list[list[str]]:
+    """The cells of a table, by column: these are apart where three blanks or more stand in every line."""
+    longest = max(map(len, lines))
+    padded = [line.ljust(longest) for line in lines]
+    blank = [all(line[place] == " " for line in padded) for place in range(longest)]
+    bounds, start = [], 0
+    for is_blank, places in groupby(range(longest), key=blank.__getitem__):
+        span = list(places)
+        if is_blank and len(span) >= len(BETWEEN_CELLS) and span[0] > 0:
+            bounds.append((start, span[0]))
+            start = span[-1] + 1
+    bounds.append((start, longest))
+    return [[line[begin:end] for line in padded] for begin, end in bounds]
