@@ -17,7 +17,7 @@ from vsacli.cli.command_parts import (
     result_line,
     variables_option,
 )
-from vsacli.cli.console import Exit, Talk, say, talk_options, tell
+from vsacli.cli.console import Exit, Talk, talk_options, tell
 from vsacli.cli.file_names import FILE
 from vsacli.results.exports import FORMATS as OF_RESULTS
 from vsacli.robot.models import FORMATS as OF_ROBOTS
@@ -129,7 +129,7 @@ def _export_robot(file: str, output: str | None, form: str, overwrite: bool, tal
     if output is None:
         if model.forces is not None:
             raise InputError.one("a Python file with forces belongs to this model; name both with -o", file)
-        say(model.text.rstrip("\n"))
+        click.echo(model.text.rstrip("\n"))
     else:
         with Outputs(overwrite=overwrite, inputs=[source.path for source in robot.sources]) as outputs:
             outputs.file(output).write_text(model.text)

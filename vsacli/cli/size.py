@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -91,7 +90,7 @@ def size(
             outputs.file(output).write_text(sized_text(loaded, found, Path(output).parent))
         if folder is not None:
             _draw(found, folder, run_stem(robot, trajectories[0]), outputs)
-    say(json.dumps(found.as_json(), indent=1) if as_json else str(found))
+    say(found, as_json)
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]
 
