@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import re
 from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -16,12 +17,15 @@ from vsacli.documents.fields import declared
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
+SEVERAL = re.compile(r"^:(ivar|param) \w+(, \w+)+:")
+"""A field of a docstring for several names, of which the first would be taken for the type of the last."""
+
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Write the descriptions when the page is read."""
     app.connect("source-read", _add_descriptions)
     app.connect("autodoc-process-docstring", _add_fields)
-    app.connect("autodoc-process-docstring", _escape_bars)
+    app.connect("autodoc-process-docstring", _escape)
     return {"parallel_read_safe": True}
 
 
@@ -64,9 +68,13 @@ def _add_fields(_app: Sphinx, _what: str, _name: str, thing: Any, _options: Any,
         lines += [f":ivar {name}: {field.doc}" for name, (field, _default) in declared(thing).items()]
 
 
-def _escape_bars(_app: Sphinx, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
-    """Let |x| be an absolute value and not a substitution of reStructuredText."""
-    lines[:] = [line.replace("|", r"\|") for line in lines]
+def _escape(_app: Sphinx, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
+    """Let |x| be an absolute value and `q, dq` two names, which reStructuredText takes for something else."""
+    lines[:] = [SEVERAL.sub(_joined, line.replace("|", r"\|")) for line in lines]
+
+
+def _joined(names: re.Match[str]) -> str:
+    return names[0].replace(", ", ",")
 
 
 def _add_descriptions(_app: Sphinx, page: str, source: list[str]) -> None:
