@@ -137,7 +137,7 @@ def _export_robot(file: str, output: str | None, form: str, overwrite: bool, tal
                 path = Path(output)
                 outputs.file(path.with_name(f"{path.stem}_forces.py")).write_text(model.forces)
         talk.wrote(outputs)
-    for note in model.notes:
+    for note in (*model.notes, *(f"warning: {warning}" for warning in robot.warnings)):
         talk.note(note)
     return Exit.OK
 

@@ -15,10 +15,10 @@ from vsacli.robot.joint import Joint, Pose
 from vsacli.robot.model import Robot
 from vsacli.robot.models.exported_model import ExportedModel
 from vsacli.robot.models.mjcf_drive import Sections, add_dampers, add_drive
-from vsacli.robot.models.mjcf_lever import DRAWN
+from vsacli.robot.models.mjcf_lever import DRAWN, GHOST, draw_rod
 from vsacli.robot.models.mujoco_bodies import check_bodies, full_inertia
 from vsacli.robot.models.passive_forces import check_friction, forces_text, forces_words
-from vsacli.robot.models.xml_text import Element, Value, add, document, element
+from vsacli.robot.models.xml_text import Element, add, document, element
 
 LOWEST_VERSION = "3.7"
 """Of MuJoCo: the first with springs whose torque is a polynomial; tried with 3.5, 3.6, 3.7 and 4.0."""
@@ -26,10 +26,13 @@ LOWEST_VERSION = "3.7"
 TIME_STEP = 1e-3
 """s. With torques that are known at each stage, the motion of the shipped 3R is 4e-13 rad off with it."""
 
-THICKNESS_SHARE = 0.05
+THICKNESS_SHARE = 0.07
 """Radius of a drawn link as a share of the mean length of links."""
 
-LINK_COLOUR = (0.55, 0.6, 0.65, 1.0)
+SEEN = 2
+"""Size of what a viewer shows at first, as a multiple of the length of the arm."""
+
+LINK_COLOUR = (0.35, 0.45, 0.6, 1)
 
 
 def mjcf_model(robot: Robot) -> ExportedModel:
@@ -44,15 +47,25 @@ def mjcf_model(robot: Robot) -> ExportedModel:
     element(root, "compiler", angle="radian")
     option = element(root, "option", gravity=robot.gravity, integrator="RK4", timestep=TIME_STEP)
     element(option, "flag", contact="disable")
+    lengths = [math.hypot(joint.dh.a, joint.dh.d) for joint in robot.joints]
+    element(root, "statistic", center=robot.base.xyz, extent=SEEN * sum(lengths) or 1)
+    _add_light(root)
     sections = Sections(*(element(root, tag) for tag in ("worldbody", "tendon", "actuator")))
     body = _placed(sections.world, "base", robot.base)
-    radius = _radius(robot)
+    radius = THICKNESS_SHARE * (sum(lengths) / len(lengths) or 1)
     for joint in robot.joints:
         below, body = body, _link(body, joint, radius)
         add_drive(sections, joint, below, body)
     add_dampers(sections, robot.joints)
     element(body, "site", name="tool", pos=robot.tool.xyz, quat=_quaternion(robot.tool), size=DRAWN)
     return ExportedModel(document(root, _comment(robot)), forces_text(robot), ())
+
+
+def _add_light(root: Element) -> None:
+    """A bright sky, against which a model is seen that has no ground."""
+    element(element(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.6, 0.6, 0.6))
+    sky = element(element(root, "asset"), "texture", type="skybox", builtin="gradient", width=64, height=384)
+    add(sky, rgb1=(0.85, 0.9, 0.95), rgb2=(1, 1, 1))
 
 
 def _comment(robot: Robot) -> str:
@@ -89,15 +102,11 @@ def _link(parent: Element, joint: Joint, radius: float) -> Element:
 
 
 def _draw(body: Element, origin: tuple[float, float, float], radius: float) -> None:
-    """A rod along the link, without mass and contact."""
-    rod: dict[str, Value] = {"type": "capsule", "fromto": (*origin, 0, 0, 0)}
-    shape = rod if math.hypot(*origin) > radius else {"type": "sphere"}
-    element(body, "geom", size=radius, contype=0, conaffinity=0, mass=0, rgba=LINK_COLOUR, **shape)
-
-
-def _radius(robot: Robot) -> float:
-    lengths = [math.hypot(joint.dh.a, joint.dh.d) for joint in robot.joints]
-    return THICKNESS_SHARE * (sum(lengths) / len(lengths) or 1.0)
+    """A rod along the link, or a ball if it has no length."""
+    if math.hypot(*origin) > radius:
+        draw_rod(body, origin, radius, LINK_COLOUR)
+    else:
+        element(body, "geom", type="sphere", size=radius, rgba=LINK_COLOUR, **GHOST)
 
 
 def _row_quaternion(joint: Joint) -> tuple[float, ...]:
