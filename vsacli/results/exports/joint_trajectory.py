@@ -7,8 +7,9 @@ and no letter beyond ASCII.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator
-from typing import TextIO
+import re
+from collections.abc import Callable, Iterator
+from typing import Any, TextIO
 
 import numpy as np
 
@@ -21,6 +22,9 @@ from vsacli.results.exports.selection import Samples, Selection
 FIELDS = {"positions": "q", "velocities": "dq", "accelerations": "ddq", "effort": "tau_e"}
 """The variable in each field of a point. The effort is what the joint exerts on the link: there is one of it,
 while motors may be two, whose torques depend on springs that the message does not know."""
+
+WITHOUT_POINT = re.compile(r"(?<![\d.])(\d+)e")
+"""In 1e-05, which JSON takes for a number, and YAML for a text."""
 
 NANOSECONDS = 10**9
 """In a second: times of messages are whole seconds and nanoseconds."""
@@ -45,9 +49,9 @@ def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[
     separator = "\n"
     for block in selection.blocks():
         _check_finite(selection, block)
-        for line in _points(selection, block):
-            stream.write(f"{separator}{line}")
-            separator = ",\n"
+        points = ",\n".join(map(json.dumps, _points(selection, block)))
+        stream.write(separator + WITHOUT_POINT.sub(r"\1.0e", points))
+        separator = ",\n"
         done(len(block.time) * len(selection.chosen))
     stream.write("\n]}\n")
 
@@ -58,26 +62,14 @@ def _fields(selection: Selection) -> dict[str, str]:
     return {field: actual(name) if simulated else name for field, name in FIELDS.items()}
 
 
-def _points(selection: Selection, block: Samples) -> Iterator[str]:
+def _points(selection: Selection, block: Samples) -> Iterator[dict[str, Any]]:
     fields, values = _fields(selection), block.values
-    present = {field: values[name] for field, name in fields.items() if name in values}
+    present = {field: values[name].tolist() for field, name in fields.items() if name in values}
     since = np.rint((block.time - selection.time[0]) * NANOSECONDS).astype(np.int64).tolist()
-    rows = zip(*(values.tolist() for values in present.values()), strict=True)
-    for time, point in zip(since, rows, strict=True):
-        arrays = (f'"{field}": {_numbers(row)}' for field, row in zip(present, point, strict=True))
+    for time, *point in zip(since, *present.values(), strict=True):
         seconds, nanoseconds = divmod(time, NANOSECONDS)
-        stamp = f'"time_from_start": {{"sec": {seconds}, "nanosec": {nanoseconds}}}'
-        yield f"{{{', '.join([*arrays, stamp])}}}"
-
-
-def _numbers(row: Iterable[float]) -> str:
-    return f"[{', '.join(map(_number, row))}]"
-
-
-def _number(value: float) -> str:
-    """As `repr`, but 1.0e-05 for 1e-05, in which YAML sees no number."""
-    mantissa, exponent, power = repr(value).partition("e")
-    return f"{mantissa}.0e{power}" if exponent and "." not in mantissa else repr(value)
+        stamp = {"sec": seconds, "nanosec": nanoseconds}
+        yield {**dict(zip(present, point, strict=True)), "time_from_start": stamp}
 
 
 def _check_finite(selection: Selection, block: Samples) -> None:
