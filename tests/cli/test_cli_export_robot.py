@@ -7,6 +7,7 @@ import math
 import subprocess
 import sys
 
+import h5py
 import mujoco
 import pytest
 from samples.command_line import REPOSITORY, ROBOT, contents, installed
@@ -65,6 +66,32 @@ def test_the_forces_act_on_their_model_alone_and_need_nothing_of_vsacli(vsacli, 
     tau_e, against_setting = 120000 * r**2 * math.sin(phi) * math.cos(phi), 1200 * r * math.sin(phi) ** 2
     assert json.loads(torque) == [round(each, 3) for each in (tau_e, -tau_e, -against_setting)]
     assert other == "[0.0]"
+
+
+def test_the_start_of_a_result_is_a_key_frame(vsacli, tmp_path, feasible_result):
+    done = vsacli("export", ROBOT, "--format", "mjcf", "--start", feasible_result, "-o", "arm.xml")
+    assert (done.code, done.err) == (0, "wrote arm.xml\n")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    with h5py.File(feasible_result) as result:
+        theta = result["theta"][0].ravel()
+    places = [
+        model.joint(f"{joint}.motor_{motor}").qposadr[0]
+        for joint in ("base", "shoulder", "elbow")
+        for motor in (1, 2)
+    ]
+    assert model.key("start").qpos[places].tolist() == theta.tolist()
+
+
+def test_a_start_that_cannot_be(vsacli, tmp_path, feasible_result):
+    other = ROBOTS / "rp_2.yaml"
+    done = vsacli("export", other, "--format", "mjcf", "--start", feasible_result)
+    assert done.code == 2
+    assert "is of another robot, with the joints base, shoulder, elbow, not" in done.err
+    done = vsacli("export", ROBOT, "--format", "urdf", "--start", feasible_result)
+    assert done.err == "a URDF does not say where a motion starts; leave out --start\n"
+    done = vsacli("export", feasible_result, "--start", feasible_result)
+    assert done.err == f"{feasible_result}: --start is for robots; leave it out\n"
+    assert contents(tmp_path) == {}
 
 
 def test_a_urdf_comes_back(vsacli, tmp_path):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from samples.marks import slow, slow_but
 from samples.mechanisms import DEVICES
-from samples.mujoco_models import accelerations, compiled, inverse_error
+from samples.mujoco_models import accelerations, compiled, coordinates, inverse_error
 from samples.robots import inertia_from_tensor, random_robot, vsa_3r
 from samples.shipped import shipped_robot, shipped_run
 from samples.springs import SPRINGS
@@ -28,6 +28,7 @@ from vsacli.base.errors import InputError
 from vsacli.dynamics.forward import state_derivative
 from vsacli.robot.joint import Inertia, Limits, Link, Pose
 from vsacli.robot.models.mjcf import mjcf_model
+from vsacli.robot.models.start import Start
 
 ROUNDING = 1e-12
 """Of inverse dynamics, relative to the largest torque: sums of some hundred terms, each good to 1e-16, and
@@ -209,6 +210,24 @@ def test_controls_stand_in_the_order_of_exported_columns():
     with compiled(robot) as (model, _):
         names = [model.actuator(index).name for index in range(model.nu)]
     assert names == ["elbow.motor_1.torque", "elbow.motor_2.torque", "elbow.damping"]
+
+
+@pytest.mark.parametrize("name", ["mixed_3r", "maccepa_1r"])
+def test_a_key_frame_has_the_start_of_a_run(name):
+    robot, trajectory = shipped_run(name, name)
+    result = inverse_dynamics(robot, trajectory)
+    with compiled(robot, Start(*(getattr(result, each)[0] for each in Start._fields))) as (model, data):
+        mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)
+        rows = coordinates(robot, model, result)
+        np.testing.assert_array_equal(data.qpos, rows.positions[0])
+        np.testing.assert_array_equal(data.qvel, rows.velocities[0])
+
+
+def test_no_motion_begins_without_motors_positions():
+    robot = vsa_3r()
+    nothing = Start(np.zeros(3), np.zeros(3), np.full((3, 2), np.nan), np.zeros((3, 2)))
+    with pytest.raises(InputError, match=r"no motion begins where base\.motor_1, base\.motor_2, shoulder"):
+        mjcf_model(robot, nothing)
 
 
 def test_the_tool_is_where_the_forward_kinematics_say():

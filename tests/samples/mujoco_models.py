@@ -15,6 +15,7 @@ from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_rotor import motor_name
+from vsacli.robot.models.start import Start
 
 
 class Compiled(NamedTuple):
@@ -25,9 +26,9 @@ class Compiled(NamedTuple):
 
 
 @contextlib.contextmanager
-def compiled(robot: Robot) -> Iterator[Compiled]:
+def compiled(robot: Robot, start: Start | None = None) -> Iterator[Compiled]:
     """The exported model."""
-    exported = mjcf_model(robot)
+    exported = mjcf_model(robot, start)
     model = mujoco.MjModel.from_xml_string(exported.text)
     try:
         if exported.forces is not None:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from vsacli.files.file_kinds import FileKind
     from vsacli.results.exports.result_format import ResultFormat
     from vsacli.results.store.reader import StoredResult
+    from vsacli.robot.model import Robot
+    from vsacli.robot.models.start import Start
 
 ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 """Options that say nothing of a robot."""
@@ -61,12 +63,19 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
     help="Of the gear, on which motion and torque of the motors are given.",
 )
 @click.option("--allow-nan", is_flag=True, help="Leave values out where there are none.")
+@click.option(
+    "--start",
+    metavar="RESULT",
+    type=FILE,
+    help="Of a robot as MJCF: add a key frame, `start`, with the first step of this result.",
+)
 @overwrite_option
 @talk_options
 def export(
     file: str,
     output: str | None,
     form: str | None,
+    start: str | None,
     overwrite: bool,
     talk: Talk,
     **of_results: Any,
@@ -91,9 +100,12 @@ def export(
     output = None if output == STANDARD else output
     if kind is FileKind.ROBOT:
         _check_options()
-        return _export_robot(file, output, _chosen(form, OF_ROBOTS, file, kind), overwrite, talk)
+        name = _chosen(form, OF_ROBOTS, file, kind)
+        return _export_robot(file, output, name, start, overwrite, talk)
     if kind not in {FileKind.RESULT, FileKind.SIMULATION}:
         raise InputError.one(f"is a {kind}; export takes a result, a simulation or a robot", file)
+    if start is not None:
+        raise InputError.one("--start is for robots; leave it out", file)
     name = _chosen(form or "csv", OF_RESULTS, file, kind)
     if OF_RESULTS[name].binary and output is None:
         raise InputError.one(f"a {name} file is no text; name it with -o")
@@ -120,18 +132,20 @@ def _check_options() -> None:
             raise click.UsageError(f"{option} is for results, and says nothing of a robot; leave it out")
 
 
-def _export_robot(file: str, output: str | None, form: str, overwrite: bool, talk: Talk) -> int:
+def _export_robot(
+    file: str, output: str | None, form: str, start: str | None, overwrite: bool, talk: Talk
+) -> int:
     from vsacli.base.outputs import Outputs
     from vsacli.robot.file import load_robot
 
     robot = load_robot(file)
-    model = OF_ROBOTS[form](robot)
+    model = OF_ROBOTS[form](robot, None if start is None else _read_start(start, robot))
     if output is None:
         if model.forces is not None:
             raise InputError.one("a Python file with forces belongs to this model; name both with -o", file)
         click.echo(model.text.rstrip("\n"))
     else:
-        with Outputs(overwrite=overwrite, inputs=[source.path for source in robot.sources]) as outputs:
+        with Outputs(overwrite=overwrite, inputs=_inputs(robot, start)) as outputs:
             outputs.file(output).write_text(model.text)
             if model.forces is not None:
                 path = Path(output)
@@ -140,6 +154,23 @@ def _export_robot(file: str, output: str | None, form: str, overwrite: bool, tal
     for note in (*model.notes, *(f"warning: {warning}" for warning in robot.warnings)):
         talk.note(note)
     return Exit.OK
+
+
+def _inputs(robot: Robot, start: str | None) -> list[str]:
+    sources = [source.path for source in robot.sources]
+    return sources if start is None else [*sources, start]
+
+
+def _read_start(path: str, robot: Robot) -> Start:
+    """The first step of a result of the robot."""
+    from vsacli.results.store.reader import StoredResult
+    from vsacli.robot.models.start import Start
+
+    with StoredResult.open(path) as result:
+        if result.joint_names != robot.joint_names:
+            joints = f"{', '.join(result.joint_names)}, not {', '.join(robot.joint_names)}"
+            raise InputError.one(f"is of another robot, with the joints {joints}", path)
+        return Start(*(result.read(name, 0, 1)[0] for name in Start._fields))
 
 
 def _export_result(

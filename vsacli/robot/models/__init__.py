@@ -10,4 +10,5 @@ FORMATS = LazyRegistry(
         "mjcf": "vsacli.robot.models.mjcf:mjcf_model",
     }
 )
-"""Formats by their names on a command line, each a function from a robot to an `ExportedModel`."""
+"""Formats by their names on a command line, each a function from a robot, and the `Start` of a
+motion or None, to an `ExportedModel`."""

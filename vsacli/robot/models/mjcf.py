@@ -18,6 +18,7 @@ from vsacli.robot.models.mjcf_drive import Sections, add_dampers, add_drive
 from vsacli.robot.models.mjcf_lever import DRAWN, GHOST, draw_rod
 from vsacli.robot.models.mujoco_bodies import check_bodies, full_inertia
 from vsacli.robot.models.passive_forces import check_friction, forces_text, forces_words
+from vsacli.robot.models.start import Start, add_start
 from vsacli.robot.models.xml_text import Element, add, document, element
 
 LOWEST_VERSION = "3.7"
@@ -35,11 +36,11 @@ SEEN = 2
 LINK_COLOUR = (0.35, 0.45, 0.6, 1)
 
 
-def mjcf_model(robot: Robot) -> ExportedModel:
-    """The model.
+def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
+    """The model, with a key frame if it is known where a motion starts.
 
     Raises:
-        InputError: MuJoCo takes no such link, or knows no such friction.
+        InputError: MuJoCo takes no such link, or knows no such friction; or the start is none.
     """
     check_bodies(robot)
     check_friction(robot)
@@ -58,6 +59,8 @@ def mjcf_model(robot: Robot) -> ExportedModel:
         add_drive(sections, joint, below, body)
     add_dampers(sections, robot.joints)
     element(body, "site", name="tool", pos=robot.tool.xyz, quat=_quaternion(robot.tool), size=DRAWN)
+    if start is not None:
+        add_start(root, sections.world, robot, start)
     return ExportedModel(document(root, _comment(robot)), forces_text(robot), ())
 
 

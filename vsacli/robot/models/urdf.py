@@ -13,10 +13,12 @@ from xml.etree import ElementTree
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
 from vsacli.base.version import __version__
 from vsacli.robot.joint import UNBOUNDED, Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.models.exported_model import ExportedModel
+from vsacli.robot.models.start import Start
 from vsacli.robot.models.xml_text import Element, add, document, element
 from vsacli.robot.urdf.rigid_motion import pose_matrix, roll_pitch_yaw
 
@@ -30,8 +32,14 @@ NO_LIMIT = 1e9
 """In place of a limit that URDF asks for and the robot does not have; `import-urdf` takes it for none."""
 
 
-def urdf_model(robot: Robot) -> ExportedModel:
-    """The model, with what it leaves out."""
+def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
+    """The model, with what it leaves out.
+
+    Raises:
+        InputError: a start is given, for which there is no place.
+    """
+    if start is not None:
+        raise InputError.one("a URDF does not say where a motion starts; leave out --start")
     root = ElementTree.Element("robot", name=robot.name)
     element(root, "link", name=ROOT)
     parent, end = ROOT, pose_matrix(robot.base.xyz, robot.base.rpy)
