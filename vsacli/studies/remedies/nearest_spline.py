@@ -1,4 +1,9 @@
-"""The function of least size between two bounds: a cubic spline, from a quadratic programme."""
+"""The function of least size between two bounds: a cubic spline, from a quadratic programme.
+
+`vsacli optimize` has a solver of its own, which goes from a profile that keeps all bounds to a local minimum
+of any cost. Here such a profile is what is looked for, the minimum is the only one, and bounds may touch,
+which leaves nothing between them to start from.
+"""
 
 from __future__ import annotations
 
