@@ -75,7 +75,8 @@ class Difference:
         """Differences at the times start..stop-1, of the shape of the variable; NaN where one of both is."""
         stop = self.time.size if stop is None else stop
         own = np.asarray(self._result.read(name, self._first + start, self._first + stop), dtype=np.float64)
-        return own - self._interpolated(name, self.time[start:stop])
+        with np.errstate(over="ignore", invalid="ignore"):  # infinities are as far apart as NaN says
+            return own - self._interpolated(name, self.time[start:stop])
 
     def _interpolated(self, name: str, time: FloatArray) -> FloatArray:
         """Values of the other result, linear between its steps."""
@@ -92,9 +93,10 @@ class Difference:
     def rms(self, name: str) -> FloatArray:
         """Root mean square over the times at which neither is NaN, of the shape of a step of the variable."""
         total, count = 0.0, 0
-        for start in range(0, self.time.size, BLOCK):
-            block = self.read(name, start, min(start + BLOCK, self.time.size))
-            total = total + np.nansum(block**2, axis=0)
-            count = count + np.count_nonzero(np.isfinite(block), axis=0)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
+            for start in range(0, self.time.size, BLOCK):
+                block = self.read(name, start, min(start + BLOCK, self.time.size))
+                block = np.where(np.isfinite(block), block, np.nan)
+                total = total + np.nansum(block**2, axis=0)
+                count = count + np.count_nonzero(~np.isnan(block), axis=0)
             return np.asarray(np.sqrt(np.divide(total, count)))

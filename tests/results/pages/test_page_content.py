@@ -224,3 +224,53 @@ def test_a_result_reads_its_geometry(feasible_result: Path) -> None:
         geometry = result.geometry()
     assert [row.dh for row in geometry.joints] == [joint.dh for joint in robot.joints]
     assert (geometry.base, geometry.tool) == (robot.base, robot.tool)
+
+
+@pytest.mark.slow
+def test_a_recorded_motion_has_bands_and_doubtful_ends(vsacli: Any, feasible_result: Path) -> None:
+    assert vsacli("export", feasible_result, "--variables", "q,stiffness", "-o", "measured.csv").code == 0
+    vsacli("invdyn", ROBOT, "measured.csv", "-o", "again.h5", "-q")
+    page = page_of(vsacli, "again.h5")
+    with h5py.File("again.h5") as stored:
+        report = json.loads(stored["report/json"][()])
+        q, deviation = stored["q"][:, 0], stored["q_std"][:, 0]
+    columns = [column for fit in report["fits"] for column in fit["columns"]]
+    start, end = (max(column["doubtful"][side] for column in columns) for side in ("start", "end"))
+    assert page.data["files"][0]["doubtful"] == [[0, pytest.approx(start)], [pytest.approx(4 - end), 4]]
+    [base] = [each for each in page.chart("q")["series"] if each["joint"] == 0]
+    np.testing.assert_allclose(
+        page.array(base["band"][1]), q + 2 * deviation, atol=2 * SINGLE * np.abs(q).max()
+    )
+    assert page.chart("q")["band"] == "two standard deviations"
+
+
+WRONG = [{"fits": 3}, {"fits": [3]}, {"fits": [{"columns": [{"doubtful": {"start": "long", "end": 0}}]}]}]
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_report_of_another_form_is_refused_with_a_sentence(
+    vsacli: Any, feasible_result: Path, wrong: dict[str, Any]
+) -> None:
+    shutil.copy(feasible_result, "odd.h5")
+    with h5py.File("odd.h5", "r+") as file:
+        file["report/json"][()] = json.dumps({**json.loads(file["report/json"][()]), **wrong})
+    done = vsacli("plot", "odd.h5", "--format", "html")
+    assert done.code == 2
+    sentence = r"odd\.h5: variable report is damaged or truncated \(.*\); compute it again\n"
+    assert re.fullmatch(sentence, done.err)
+    assert not Path("odd.html").exists()
+
+
+def test_infinities_of_a_run_that_diverged_are_gaps(vsacli: Any, feasible_result: Path) -> None:
+    """Without a warning, which is an error in tests."""
+    shutil.copy(feasible_result, "far.h5")
+    with h5py.File("far.h5", "r+") as file:
+        file["q"][200:] = np.inf
+        file["tau_motor"][200:] = 1e300
+    page = page_of(vsacli, "far.h5")
+    values = page.array(page.chart("tau_motor", "motor 1")["series"][0]["values"])
+    assert np.isfinite(values[:200]).all()
+    assert np.isnan(values[200:]).all()
+    both = page_of(vsacli, feasible_result, "far.h5")
+    apart = [each["rms"] for chart in both.charts for each in chart["series"] if each["rms"] is not None]
+    assert 0.0 in apart

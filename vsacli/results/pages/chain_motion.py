@@ -50,7 +50,9 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> ChainMot
         return None
     steps = evenly(result.samples, MOST_FRAMES)
     geometry = result.geometry()
-    frames = list(frames_in_base(geometry, np.asarray(result.read(name), dtype=np.float64)[steps]))
+    positions = np.asarray(result.read(name), dtype=np.float64)[steps]
+    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
+        frames = list(frames_in_base(geometry, positions))
     origins = np.stack([frame.origin for frame in frames], axis=1)
     lengths = np.array([joint.dh.a for joint in geometry.joints])
     normals = np.stack([frame.axes[..., 0] for frame in frames[1:-1]], axis=1)

@@ -9,7 +9,7 @@ from importlib.resources import files
 from typing import Any, NamedTuple
 
 from vsacli.base.tables import ReportText
-from vsacli.results.pages.library import plotting_library
+from vsacli.results.pages.library import Library
 from vsacli.results.pages.packing import Packed, as_script
 
 TEMPLATE, STYLE = "page.html", "page.css"
@@ -51,19 +51,18 @@ class InputText(NamedTuple):
     content: str | None
 
 
-def rendered(title: str, facts: Sequence[Facts], data: Mapping[str, Any], packed: Packed) -> str:
+def rendered(
+    library: Library, title: str, facts: Sequence[Facts], data: Mapping[str, Any], packed: Packed
+) -> str:
     """The page.
 
     Args:
+        library: that draws its plots.
         title: of the page.
         facts: what is said of each file.
         data: JSON values for the scripts.
         packed: arrays for the scripts.
-
-    Raises:
-        InputError: what a page needs is not installed.
     """
-    library = plotting_library()
     import jinja2  # what bokeh brings along
 
     folder = files(__package__)

@@ -10,6 +10,7 @@ from vsacli.base.tables import ReportText
 from vsacli.results.pages.chain_motion import chain_motion
 from vsacli.results.pages.document import Facts, rendered
 from vsacli.results.pages.facts import input_text, provenance_rows
+from vsacli.results.pages.library import plotting_library
 from vsacli.results.pages.packing import Packed
 from vsacli.results.pages.result_charts import ResultCharts
 from vsacli.results.pages.sections import Section
@@ -35,6 +36,7 @@ def result_page(
         InputError: the files do not belong on the same axes, hold nothing to draw, or are damaged; or what a
             page needs is not installed.
     """
+    library = plotting_library()
     check_comparable(files)
     packed, labels = Packed(), distinct_labels(files)
     charts = ResultCharts(files, packed)
@@ -53,7 +55,7 @@ def result_page(
         "sections": sections,
     }
     facts = [_facts(file, label, report) for (file, label), report in zip(named, reports, strict=True)]
-    return rendered(_title(files), facts, data, packed)
+    return rendered(library, _title(files), facts, data, packed)
 
 
 def _drawn(section: Section, charts: ResultCharts, bar: Bar) -> dict[str, Any]:

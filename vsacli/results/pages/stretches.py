@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.results.envelopes import marked_spans
+from vsacli.results.store.damage import reporting_damage
 from vsacli.results.store.reader import StoredResult
 
 KINDS = {
@@ -41,21 +38,16 @@ def troubles(result: StoredResult) -> dict[str, list[Spans]]:
 
 
 def doubtful(result: StoredResult) -> Spans:
-    """The stretches at both ends of a record where derivatives of what was fitted to it are doubtful."""
-    lengths = list(map(_doubtful_ends, _fits(result)))
-    if not lengths:
+    """The stretches at both ends of a record where derivatives of what was fitted to it are doubtful.
+
+    Raises:
+        InputError: the report is damaged.
+    """
+    with reporting_damage(result.path, "report"):
+        columns = [column for fit in result.report_json.get("fits", ()) for column in fit["columns"]]
+        ends = [column["doubtful"] for column in columns if "doubtful" in column]
+        start, end = (max((float(each[side]) for each in ends), default=0.0) for side in ("start", "end"))
+    if not start and not end:
         return []
-    time: FloatArray = result.time
-    start, end = np.max(lengths, axis=0)
-    first, last = float(time[0]), float(time[-1])
-    return [[first, min(first + start, last)], [max(last - end, first), last]] if start or end else []
-
-
-def _fits(result: StoredResult) -> Sequence[Any]:
-    fits = result.report_json.get("fits", ())
-    return [each for each in fits if isinstance(each, Mapping)] if isinstance(fits, list) else []
-
-
-def _doubtful_ends(fit: Mapping[str, Any]) -> tuple[float, float]:
-    ends = fit.get("doubtful") or {}
-    return float(ends.get("start") or 0), float(ends.get("end") or 0)
+    first, last = float(result.time[0]), float(result.time[-1])
+    return [[first, min(first + start, last)], [max(last - end, first), last]]

@@ -12,6 +12,7 @@ from vsacli.base.tables import ReportText
 from vsacli.base.texts import one_line
 from vsacli.results.pages.document import Facts, rendered
 from vsacli.results.pages.facts import input_text
+from vsacli.results.pages.library import plotting_library
 from vsacli.results.pages.packing import Packed
 from vsacli.results.store.stored_study import StoredStudy
 from vsacli.results.study_points import StudyPoints
@@ -30,7 +31,7 @@ def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> 
     Raises:
         InputError: a table has no margins, or no rows, or is damaged; or what a page needs is not installed.
     """
-    packed = Packed()
+    library, packed = plotting_library(), Packed()
     labels = [table.study_name for table in tables]
     data = {
         "kind": "study",
@@ -40,7 +41,7 @@ def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> 
         ],
     }
     facts = [_facts(table, report) for table, report in zip(tables, reports, strict=True)]
-    return rendered(", ".join(dict.fromkeys(labels)), facts, data, packed)
+    return rendered(library, ", ".join(dict.fromkeys(labels)), facts, data, packed)
 
 
 def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) -> dict[str, Any]:
