@@ -180,8 +180,9 @@ def test_no_text_of_a_file_acts(vsacli: Any, page: Page, feasible_result: Path, 
     text = TEXTS[kind].encode("utf-8", "backslashreplace").decode().replace("\0", "\\0")
     shutil.copy(feasible_result, "wicked.h5")
     with h5py.File("wicked.h5", "r+") as file:
-        for attribute in ("robot_name", "trajectory_name", "command_line"):
+        for attribute in ("robot_name", "trajectory_name"):
             file.attrs[attribute] = text
+        file.attrs["command_line"] = f"vsacli {text}"
         file["joint"][0] = text
         file["inputs/file_1"].attrs["path"] = text
         file["inputs/file_1/text"][()] = f"# {text}</pre></script><script>alert(1)</script>"
