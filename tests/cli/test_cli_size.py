@@ -63,6 +63,27 @@ def test_steps_that_cannot_be_done_are_left_out_and_told(vsacli, too_soft):
     )
 
 
+def test_where_no_step_can_be_done_nothing_is_drawn_and_nothing_is_made_up(vsacli, motors, tmp_path):
+    source = REPOSITORY / "trajectories" / "rest_to_rest_soft.yaml"
+    soft = edited(source, tmp_path / "soft.yaml", ("value: 850", "value: 700"), ("rate: 1000", "rate: 50"))
+    done = vsacli("size", ROBOT, soft, "--catalogue", motors, "--plot", "figures", "-o", "s.yaml")
+    assert done.code == 3
+    assert "base 1: no step can be done, so that nothing is known of it" in done.out
+    assert "nothing is drawn: no step can be done" in done.err
+    assert not (tmp_path / "figures").exists()
+    assert not (tmp_path / "s.yaml").exists()
+
+
+def test_rotors_that_cannot_be_coupled_so_much_are_not_written(vsacli, tmp_path):
+    arm, swing = (REPOSITORY / name / "awas_1r.yaml" for name in ("robots", "trajectories"))
+    (tmp_path / "m.csv").write_text("name,inertia,max_torque\nm,1e-7,10\n")
+    done = vsacli("size", arm, swing, "--catalogue", "m.csv", "--gear", "10", "-o", "s.yaml")
+    assert done.code == 2
+    assert (
+        "coupled_inertia is 0.001 on the joint's side, that of rotors as those chosen below 1e-05" in done.err
+    )
+
+
 def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
     arm = REPOSITORY / "robots" / "planar_2r.yaml"
     swing = REPOSITORY / "trajectories" / "planar_2r.yaml"

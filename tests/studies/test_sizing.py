@@ -91,6 +91,22 @@ def test_the_robots_own_motors_are_what_the_run_says():
     assert sizing.verdict == "ok"
 
 
+def test_of_a_motor_that_stands_still_any_gear_from_some_on_does(tmp_path):
+    """T = load/n: the smallest that does is taken, as nothing speaks for a larger one but the torque."""
+    robot, _ = shipped("hardening_1r")
+    time = np.linspace(0, 1, 11)
+    held = Trajectory.from_samples(
+        time, np.full((11, 1), 0.5), **{name: np.zeros((11, 1)) for name in ("dq", "ddq", "d3q", "d4q")}
+    )
+    motor = {"name": "m", "inertia": 1e-4, "continuous_torque": 0.1, "max_velocity": 300}
+    sizing = size_drives(robot, [held], write(tmp_path / "m.csv", [motor]))
+    load = abs(inverse_dynamics(robot, held).tau_spring[0, 0, 0])
+    best = sizing.motors[0].best
+    assert (best.low, best.high) == (pytest.approx(load / 0.1, rel=1e-12), math.inf)
+    assert best.ratio == pytest.approx(load / 0.1, rel=1e-3)
+    assert best.does
+
+
 INERTIA, REACH, FREQUENCY = 0.8, 0.5, 3.0
 """Of a turntable, kg m^2, and of its motion, rad and rad/s."""
 

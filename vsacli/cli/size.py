@@ -89,18 +89,21 @@ def size(
         elif output is not None:
             outputs.file(output).write_text(sized_text(loaded, found, Path(output).parent))
         if folder is not None:
-            _draw(found, folder, run_stem(robot, trajectories[0]), outputs)
+            _draw(found, folder, run_stem(robot, trajectories[0]), outputs, talk)
     say(found, as_json)
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]
 
 
-def _draw(found: Sizing, folder: str, stem: str, outputs: Outputs) -> None:
+def _draw(found: Sizing, folder: str, stem: str, outputs: Outputs, talk: Talk) -> None:
     """Torque over speed of every motor of which something is known."""
+    motors = [_torque_speed(motor) for motor in found.motors if motor.points is not None]
+    if not motors:
+        talk.note("nothing is drawn: no step can be done")
+        return
     from vsacli.results.plots import FigureFiles, torque_speed_figure
 
     files = FigureFiles(["torque-speed"], folder, stem, "png", outputs)
-    motors = [_torque_speed(motor) for motor in found.motors if motor.points is not None]
     files.save({"torque-speed": torque_speed_figure(motors, found.title)})
 
 
@@ -116,4 +119,4 @@ def _torque_speed(motor: MotorSizing) -> TorqueSpeed:
     }
     constants = {name: getattr(shaft, name) for name in Bounds._fields}
     rms = points.rms_velocity, points.rms_torque
-    return TorqueSpeed(motor.title, *motor.units, Bounds(**constants), runs, rms)
+    return TorqueSpeed(motor.name, motor.drive, *motor.units, Bounds(**constants), runs, rms)

@@ -14,11 +14,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete
-from vsacli.results.plots.styles import house_style, line_style
+from vsacli.results.plots.panels import PANEL_WIDTH, complete
+from vsacli.results.plots.styles import house_style, line_style, shortened
 
-PANEL_HEIGHT = 2.1
+PANEL_HEIGHT = 2.3
 """Inches."""
+
+TITLE_LENGTH = 32
+"""Characters of each of its two lines that a panel is wide."""
 
 MOST_ROWS = 6
 """Of two panels, before the next begin beside them."""
@@ -79,14 +82,16 @@ class TorqueSpeed(NamedTuple):
     """A motor over some motions.
 
     Attributes:
-        title: of its panel.
+        name: whose motor it is.
+        drive: which motor, with which gear.
         torque_unit, velocity_unit: of what follows.
         bounds: of the motor.
         runs: by trajectory its velocities and torques, each (samples,).
         rms: root mean squares of velocity and torque over all of them.
     """
 
-    title: str
+    name: str
+    drive: str
     torque_unit: str
     velocity_unit: str
     bounds: Bounds
@@ -129,7 +134,8 @@ def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
         handles.append(Line2D([], [], color="black", alpha=BRAKING, label="while it brakes"))
     axes.set_xlim(0, right)
     axes.set_ylim(0, top)
-    add_title(axes, motor.title)
+    title = "\n".join(shortened(line, TITLE_LENGTH) for line in (motor.name, motor.drive))
+    axes.set_title(title, loc="left", parse_math=False)
     axes.set_xlabel(f"speed [{motor.velocity_unit}]")
     axes.set_ylabel(f"torque [{motor.torque_unit}]" if motor.torque_unit != "N" else "force [N]")
     return handles

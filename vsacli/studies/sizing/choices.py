@@ -121,24 +121,16 @@ class _Trials(NamedTuple):
     Attributes:
         ratio: of the gear.
         used: of each limit, (trials, motors, limits).
+        largest: the largest of these shares.
+        does: whether all limits are kept.
         rms: of the torque on the shaft.
     """
 
     ratio: FloatArray
     used: FloatArray
+    largest: FloatArray
+    does: BoolArray
     rms: FloatArray
-
-    @property
-    def largest(self) -> FloatArray:
-        """The largest share of a limit."""
-        largest: FloatArray = self.used.max(axis=-1)
-        return largest
-
-    @property
-    def does(self) -> BoolArray:
-        """Whether all limits are kept."""
-        does: BoolArray = self.largest <= 1 + LIMIT_ROUNDING
-        return does
 
 
 def _trials(
@@ -154,11 +146,10 @@ def _trials(
     listed = [np.full_like(fixed, ratio) for ratio in gears.listed]
     free = listed or [_best_of_range(demand, shafts, possible, gears, criterion)]
     tried = [np.where(np.isnan(fixed), ratios, fixed) for ratios in free]
-    return _Trials(
-        np.stack(tried),
-        np.stack([shares(demand, shafts, ratios) for ratios in tried]),
-        np.stack([rms_torque(demand, shafts, ratios) for ratios in tried]),
-    )
+    used = np.stack([shares(demand, shafts, ratios) for ratios in tried])
+    largest = used.max(axis=-1)
+    rms = np.stack([rms_torque(demand, shafts, ratios) for ratios in tried])
+    return _Trials(np.stack(tried), used, largest, largest <= 1 + LIMIT_ROUNDING, rms)
 
 
 def _best_of_range(
@@ -168,12 +159,11 @@ def _best_of_range(
     ends = Ratios(np.full_like(possible.low, gears.low), np.full_like(possible.high, gears.high))
     within = possible.within(ends)
     wanted = least_rms(demand, shafts)
-    nearest = within.nearest(wanted)
-    if criterion == "utilisation":
-        return np.where(within.empty, balanced(demand, shafts, ends), balanced(demand, shafts, within))
-    if within.empty.any():
-        nearest = np.where(within.empty, balanced(demand, shafts, ends), nearest)
-    return _rounded(nearest, within)
+    if criterion == "utilisation" or within.empty.any():
+        balance = balanced(demand, shafts, ends)
+        wanted = balance if criterion == "utilisation" else np.where(within.empty, balance, wanted)
+    found = np.where(within.empty, ends.nearest(wanted), within.nearest(wanted))
+    return _rounded(found, within)
 
 
 def _rounded(ratios: FloatArray, within: Ratios) -> FloatArray:

@@ -42,14 +42,15 @@ class OwnMotor(Published):
         points: on its shaft; on the joint's side if its gear is not known.
         shares: what it uses of each of its limits, by name.
         does: whether all are kept.
-        low, high: gear ratios between which they would be; NaN if with none, or if that is not known.
+        low, high: gear ratios between which they would be, NaN if with none; None if that is not known, as of
+            a motor without gear, or with smooth friction.
     """
 
     points: WorkingPoints
     shares: dict[str, float]
     does: bool
-    low: float
-    high: float
+    low: float | None = None
+    high: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +99,11 @@ class MotorSizing(Published):
         return f"{self.joint} {self.motor}"
 
     @property
-    def title(self) -> str:
-        """Name, and with which motor and gear."""
-        if self.best is None:
-            return self.name if self.gear_ratio is None else f"{self.name}, gear {abs(self.gear_ratio):.4g}"
-        return f"{self.name}: {self.best.motor}, gear {self.best.ratio:.4g}"
+    def drive(self) -> str:
+        """Which motor with which gear its points are of, as far as that is known."""
+        if self.best is not None:
+            return f"{self.best.motor}, gear {self.best.ratio:.4g}"
+        return "joint side" if self.gear_ratio is None else f"gear {abs(self.gear_ratio):.4g}"
 
     @property
     def units(self) -> tuple[str, str]:

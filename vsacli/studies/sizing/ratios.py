@@ -154,7 +154,12 @@ def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
         return beyond
 
     found = _turning_point(rising, np.full_like(fourth, LOWEST), np.full_like(fourth, HIGHEST))
-    return np.where(found <= 2 * LOWEST, 0.0, np.where(found >= HIGHEST / 2, math.inf, found))
+    return _unbounded(found)
+
+
+def _unbounded(ratio: FloatArray) -> FloatArray:
+    """Ratios, 0 or infinite at the ends of what was looked at."""
+    return np.where(ratio <= 2 * LOWEST, 0.0, np.where(ratio >= HIGHEST / 2, math.inf, ratio))
 
 
 def _rms_within(demand: MotorDemand, shafts: Shaft, bound: FloatArray) -> Ratios:
@@ -187,7 +192,8 @@ def _turning_point(
 def balanced(demand: MotorDemand, shafts: Shaft, allowed: Ratios) -> FloatArray:
     """The ratios at which the largest share of a limit is smallest, (motors,), among those that are allowed.
 
-    By golden section: the largest share falls up to there, and then rises.
+    By golden section: the largest share falls up to there, and then rises. It is 0 or infinite where that
+    becomes ever smaller.
     """
 
     def largest(logarithm: FloatArray) -> FloatArray:
@@ -204,7 +210,7 @@ def balanced(demand: MotorDemand, shafts: Shaft, allowed: Ratios) -> FloatArray:
         at_new = largest(new)
         left, right = np.where(falls, right, new), np.where(falls, new, left)
         at_left, at_right = np.where(falls, at_right, at_new), np.where(falls, at_new, at_left)
-    return np.exp((low + high) / 2)
+    return _unbounded(np.exp((low + high) / 2))
 
 
 def _in_parts(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from vsacli.actuators.limit_check import LIMIT_ROUNDING
 from vsacli.actuators.motor import JointMotor
@@ -113,13 +114,12 @@ def _sized(
 def _own(demand: MotorDemand, motor: JointMotor, points: WorkingPoints) -> OwnMotor:
     shaft = Shaft.of_joint_motor(motor)
     shares = points.shares(shaft)
-    low = high = math.nan
-    if motor.gear_ratio is not None and not (motor.friction and motor.friction.width):
-        possible = ratios_within(demand, Shaft.of([shaft]))
-        if not possible.empty[0]:
-            low, high = float(possible.low[0]), float(possible.high[0])
-    does = max(shares.values(), default=0.0) <= 1 + LIMIT_ROUNDING
-    return OwnMotor(points, shares, does, low, high)
+    own = OwnMotor(points, shares, max(shares.values(), default=0.0) <= 1 + LIMIT_ROUNDING)
+    if motor.gear_ratio is None or (motor.friction is not None and motor.friction.width):
+        return own
+    possible = ratios_within(demand, Shaft.of([shaft]))
+    low, high = (math.nan, math.nan) if possible.empty[0] else (possible.low[0], possible.high[0])
+    return replace(own, low=float(low), high=float(high))
 
 
 def _notes(robot: Robot, table: RecordTable[CatalogueMotor] | None) -> Iterator[str]:

@@ -131,7 +131,7 @@ def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
 
 
 def _other_gears(motor: MotorSizing) -> str:
-    if motor.own is None or motor.gear_ratio is None:
+    if motor.own is None or motor.own.low is None or motor.own.high is None:
         return ""
     if math.isnan(motor.own.low):
         return "; no other gear would do"
@@ -140,12 +140,11 @@ def _other_gears(motor: MotorSizing) -> str:
 
 def spring_table(springs: Sequence[SpringDemand], *, several: bool) -> Iterator[str]:
     """What each spring must bear."""
-    if not springs:
+    known = [spring for spring in springs if math.isfinite(spring.energy.value)]
+    if not known:
         return
     header = ("spring", "energy", "at", "torque", "deflection", "of admissible")
-    yield from aligned(
-        _without_empty([header, *(_spring_row(spring, several=several) for spring in springs)])
-    )
+    yield from aligned(_without_empty([header, *(_spring_row(spring, several=several) for spring in known)]))
 
 
 def _spring_row(spring: SpringDemand, *, several: bool) -> tuple[str, ...]:
