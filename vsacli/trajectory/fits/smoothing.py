@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 DETERMINED = 0.074
-"""Expected relative error of the highest derivative up to which it counts as right to 10 %. Of 1260 records with
-seven motions and twelve noises three with 0.077 were wrong by 10.0 to 10.4 %, none with less."""
+"""Expected relative error of the highest derivative up to which it counts as right to 10 %. Of 1260 records
+with seven motions and twelve noises three with 0.077 were wrong by 10.0 to 10.4 %, none with less."""
 
 
 @dataclass(frozen=True, eq=False)
