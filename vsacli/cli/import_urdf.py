@@ -44,6 +44,8 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 @click.argument("urdf", type=FILE)
 @click.option("--base", metavar="LINK", help="Link that stands still; by default the root.")
 @click.option("--tip", metavar="LINK", help="Link of the end effector; needed if there is a choice.")
+@click.option("--srdf", type=FILE, help="SRDF file, a group of which says base and tip.")
+@click.option("--group", metavar="NAME", help="Which group of it; the only one by default.")
 @click.option("-o", "--output", type=FILE, help="Robot file; by default URDF.yaml in this folder.")
 @click.option(
     "--actuator",
@@ -93,6 +95,8 @@ def import_urdf(
     urdf: str,
     base: str | None,
     tip: str | None,
+    srdf: str | None,
+    group: str | None,
     output: str | None,
     actuator: str,
     motor_inertia: float | None,
@@ -113,11 +117,15 @@ def import_urdf(
     from vsacli.base.outputs import Outputs
     from vsacli.robot import urdf as conversions
 
+    if srdf is None and group is not None:
+        raise click.UsageError("--group is one of a file that --srdf names")
+    if srdf is not None and (base or tip):
+        raise click.UsageError("--srdf says base and tip; leave out --base and --tip")
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
     placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)
-    with Outputs(overwrite=overwrite, inputs=[urdf]) as outputs:
+    with Outputs(overwrite=overwrite, inputs=[urdf, *filter(None, [srdf])]) as outputs:
         file = outputs.file(path)
-        conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold)
+        conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
         file.write_text(conversions.robot_text(conversion))
     click.echo(str(conversion))
     talk.wrote(outputs)

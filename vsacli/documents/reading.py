@@ -11,6 +11,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.kinds.nested import read_record
+from vsacli.documents.other_formats import recognising_other_formats
 from vsacli.documents.source import Problems, Source, read_source
 from vsacli.documents.tree import Scope
 from vsacli.documents.yaml_tree import parse_yaml
@@ -37,12 +38,14 @@ def read_document(
     Raises:
         InputError: with every problem of the file, each with its line.
     """
-    source, text = read_source(path)
-    problems = Problems(source.path)
-    root = parse_yaml(text, problems)
-    if not isinstance(root, tree.Mapping):
-        problems.fail(root.line, f"expected a mapping that begins with `format: {format_name}`, found {root}")
-    _check_format(root, format_name, problems)
+    with recognising_other_formats(path):
+        source, text = read_source(path)
+        problems = Problems(source.path)
+        root = parse_yaml(text, problems)
+        if not isinstance(root, tree.Mapping):
+            beginning = f"`format: {format_name}`"
+            problems.fail(root.line, f"expected a mapping that begins with {beginning}, found {root}")
+        _check_format(root, format_name, problems)
     record = read_record(cls, root, "", Scope(problems, members or {}, exempt or {}), beside=("format",))
     problems.check()
     return record, source

@@ -22,6 +22,9 @@ MAX_DOCUMENT_BYTES = 1_000_000
 MAX_PROBLEMS = 50
 """A document with more problems is given up on: the reader would drown, and so would the user."""
 
+IN_PACKAGE = "package://"
+"""How ROS names files in its packages, which only ROS finds."""
+
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """How an HDF5 file begins, which is what results are."""
 
@@ -135,6 +138,9 @@ def _refusing(name: str) -> Iterator[None]:
 
 
 def _sibling(name: str) -> str:
+    if name.startswith(IN_PACKAGE):
+        package, _, rest = name.removeprefix(IN_PACKAGE).partition("/")
+        return f"; of a file in a ROS package give the path, $(ros2 pkg prefix --share {package})/{rest}"
     path = Path(name)
     if not path.parent.is_dir():
         return f"; there is no folder {str(path.parent)!r} either"

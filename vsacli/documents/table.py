@@ -15,6 +15,7 @@ from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError
 from vsacli.base.streams import place_of
 from vsacli.documents.column_mapping import AS_NAMED, TIME, ChosenColumns, ColumnMapping
+from vsacli.documents.other_formats import recognising_other_formats, refuse_other_formats
 from vsacli.documents.source import MAX_DOCUMENT_BYTES, Source, check_input_file, decode_utf8
 from vsacli.documents.table_header import MAX_BYTES, Header, header_of, split_heading
 from vsacli.documents.table_rows import CHUNK, Rows, filled_lines, read_integers, read_numbers
@@ -123,14 +124,17 @@ def read_table(
     name = os.fspath(path)
     check_input_file(name, MAX_BYTES)
     try:
-        with open(place_of(name), "rb") as content:
-            header = header_of(content, name, strict=not mapping, numbered=mapping.numbers)
-            digest, text = _survey(content, name)
-        chosen = mapping.applied(header, known, name)
-        values, first_stamp = _values(name, header, chosen, empty_cells)
-        source = Source(name, digest, None if text is None else decode_utf8(text, name))
+        with recognising_other_formats(name):
+            with open(place_of(name), "rb") as content:
+                header = header_of(content, name, strict=not mapping, numbered=mapping.numbers)
+                digest, text = _survey(content, name)
+            chosen = mapping.applied(header, known, name)
+            values, first_stamp = _values(name, header, chosen, empty_cells)
+            source = Source(name, digest, None if text is None else decode_utf8(text, name))
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
+    if not chosen.places:
+        refuse_other_formats(name)
     return Table(
         chosen.headings, values, source, header.line, chosen.others, chosen.ignored, first_stamp=first_stamp
     )

@@ -17,6 +17,7 @@ from vsacli.base.streams import place_of
 from vsacli.control import poles
 from vsacli.documents import columns_file, tree
 from vsacli.documents.json_schema import json_schema
+from vsacli.documents.other_formats import recognising_other_formats
 from vsacli.documents.source import HDF5_SIGNATURE, Problems, check_input_file, is_table, read_source
 from vsacli.documents.yaml_tree import parse_yaml
 from vsacli.robot import file as robot_file
@@ -88,7 +89,8 @@ def recognise(path: str | os.PathLike[str]) -> FileKind:
         return FileKind.TABLE
     if start.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
         return FileKind.URDF
-    return _document_kind(path)
+    with recognising_other_formats(path):
+        return _document_kind(path)
 
 
 def _beginning(path: str | os.PathLike[str]) -> bytes:

@@ -14,6 +14,7 @@ from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import orders_of_derivation
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
+from vsacli.documents.other_formats import refuse_other_formats
 from vsacli.documents.paths import find
 from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.info.robot_info import describe_robot
@@ -52,6 +53,7 @@ def describe_file(path: str, robot_path: str | None = None, progress: Progress =
         case FileKind.STUDY_TABLE:
             return describe_study(path)
         case kind:
+            refuse_other_formats(path)
             expected = "a robot, a trajectory, a result, a simulation or the table of a study"
             raise InputError.one(f"is a file of the kind {kind.value}; expected {expected}", path)
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 import os
+import re
+import shlex
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import PurePath
 from typing import TypeVar
 
 import numpy as np
@@ -27,6 +30,12 @@ from vsacli.robot.urdf.link_tree import (
 )
 from vsacli.robot.urdf.rigid_motion import Body, pose_matrix
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
+
+MACRO = re.compile(r"\$[{(]")
+"""How an expression of xacro begins."""
+
+MESH = "filename"
+"""Attribute that names a mesh, which nobody opens here."""
 
 MAX_BYTES = 10_000_000
 MAX_LINKS = 1000
@@ -61,10 +70,17 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
 
 
 def _refuse_macros(root: Element, problems: Problems) -> None:
-    for child in root.children:
-        if child.tag.startswith("xacro:"):
-            how = "expand it first: xacro arm.urdf.xacro > arm.urdf"
-            problems.fail(child.line, f"<{quoted(child.tag)[1:-1]}> belongs to a xacro file; {how}")
+    """Refuse tags and expressions that xacro fills in; its name space alone stays in what it has expanded."""
+    for element in root.everything():
+        macros = [f"<{quoted(element.tag)[1:-1]}>"] if element.tag.startswith("xacro:") else []
+        values = (word for name, word in element.attributes.items() if name != MESH)
+        macros += [quoted(word) for word in values if MACRO.search(word)]
+        for macro in macros:
+            name = PurePath(problems.file).name
+            stem = name.split(".")[0]
+            urdf = f"{stem}.urdf" if name != f"{stem}.urdf" else f"{stem}_expanded.urdf"
+            how = f"expand it first: xacro {shlex.quote(problems.file)} > {shlex.quote(urdf)}"
+            problems.fail(element.line, f"{macro} belongs to a xacro file; {how}")
 
 
 def _by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[str, _Named]:

@@ -26,6 +26,7 @@ from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.residual import kinematic_residual
 from vsacli.robot.urdf.rigid_motion import Body, inverse, roll_pitch_yaw
 from vsacli.robot.urdf.serial_chain import STANDARD_GRAVITY, ChainJoint, SerialChain, serial_chain
+from vsacli.robot.urdf.srdf import ends_of_group
 
 NEGLIGIBLE_INERTIA = 1e-15
 """Inertia, over mass times the arm's size squared, that is rounding of a zero in the file."""
@@ -38,6 +39,8 @@ def import_urdf(
     placeholders: Placeholders | None = None,
     snap: float = SNAP_ANGLE,
     hold: Hold | None = None,
+    srdf: str | os.PathLike[str] | None = None,
+    group: str | None = None,
 ) -> Conversion:
     """A robot from a serial chain of a URDF file.
 
@@ -48,12 +51,18 @@ def import_urdf(
         placeholders: the actuators, of which a URDF says nothing; by default sized to what they carry.
         snap: angle in rad; axes closer to parallel are made parallel if their common normal is far away.
         hold: where joints beside the chain stand, by name, in rad (m) or as "30 deg"; others stand at zero.
+        srdf: an SRDF file, of which a group says base and tip, if these are not given.
+        group: name of the group; the only one by default.
 
     Raises:
         InputError: the file is no URDF, has no such chain, or its joints cannot be held like this.
     """
     file, chosen = os.fspath(path), placeholders or Placeholders()
-    chain = serial_chain(read_urdf(path), base, tip, hold)
+    urdf = read_urdf(path)
+    if srdf is not None:
+        ends = ends_of_group(srdf, group, urdf)
+        base, tip = base or ends.base, tip or ends.tip
+    chain = serial_chain(urdf, base, tip, hold)
     frames = dh_frames(chain.joints, chain.tip_pose, snap)
     links = _links(file, chain.joints, frames)
     loads = joint_loads(chain.joints, frames.rows, links)

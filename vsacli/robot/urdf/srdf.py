@@ -1,0 +1,122 @@
+"""Groups of joints of a URDF, as an SRDF names them for MoveIt: from which link to which a group reaches.
+
+The format: https://docs.ros.org/en/api/srdfdom/html/structsrdf_1_1Model_1_1Group.html
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.documents.source import Problems, read_source
+from vsacli.documents.tree import quoted
+from vsacli.robot.urdf.link_tree import Urdf, UrdfJoint
+from vsacli.robot.urdf.xml_tree import Element, parse_xml
+
+MAX_BYTES = 10_000_000
+"""As large as a URDF may be: pairs of links that may touch make most of an SRDF."""
+
+
+class Ends(NamedTuple):
+    """The base link and the tip link of a chain."""
+
+    base: str
+    tip: str
+
+
+def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -> Ends:
+    """Between which links the chain of a group lies.
+
+    Args:
+        path: the SRDF file.
+        group: its name; None for the only one there is.
+        urdf: the robot.
+
+    Raises:
+        InputError: the file is no SRDF, has no such group, or it is no serial chain of this robot.
+    """
+    source, text = read_source(path, MAX_BYTES)
+    problems = Problems(source.path)
+    root = parse_xml(text, problems)
+    if root.tag != "robot" or any(root.all("link")):
+        problems.fail(root.line, "expected an SRDF, in whose <robot> there are groups and no links")
+    groups = {element.attributes.get("name", ""): element for element in root.all("group")}
+    if not groups:
+        problems.fail(root.line, "there is no <group> in it")
+    if group is None and len(groups) > 1:
+        problems.fail(root.line, f"choose one of its groups with --group: {', '.join(map(quoted, groups))}")
+    name = next(iter(groups)) if group is None else group
+    if name not in groups:
+        problems.fail(root.line, f"there is no group {quoted(name)}{did_you_mean(name, groups)}")
+    return _Groups(groups, urdf, problems).ends(name)
+
+
+class _Groups:
+    """The groups of a file, seen on a robot."""
+
+    def __init__(self, groups: Mapping[str, Element], urdf: Urdf, problems: Problems) -> None:
+        self._groups, self._urdf, self._problems = groups, urdf, problems
+
+    def ends(self, name: str) -> Ends:
+        group = self._groups[name]
+        joints = self._joints(name, ())
+        moving = [joint for joint in joints.values() if not joint.is_fixed]
+        if not moving:
+            self._problems.fail(group.line, f"no joint moves in the group {quoted(name)}")
+        paths = {joint.child: self._urdf.above(joint.child) for joint in joints.values()}
+        serial = [link for link, path in paths.items() if all(joint in path for joint in moving)]
+        if not serial:
+            names = ", ".join(quoted(joint.name) for joint in moving)
+            message = f"the joints of the group {quoted(name)} are no serial chain: {names}"
+            self._problems.fail(group.line, message)
+        tip = max(serial, key=lambda link: len(paths[link]))
+        first = next(joint for joint in paths[tip] if joint in moving)
+        between = paths[tip][paths[tip].index(first) :]
+        missing = [joint for joint in between if not joint.is_fixed and joint not in moving]
+        if missing:
+            names = ", ".join(quoted(joint.name) for joint in missing)
+            self._problems.fail(group.line, f"the group {quoted(name)} leaves out {names} within its chain")
+        chain = next(group.all("chain"), None)
+        return Ends(first.parent if chain is None else chain.attributes["base_link"], tip)
+
+    def _joints(self, name: str, around: tuple[str, ...]) -> dict[str, UrdfJoint]:
+        """The joints of a group by name: its own, those above its links, of its chains and its groups."""
+        group = self._groups[name]
+        if name in around:
+            self._problems.fail(group.line, f"the group {quoted(name)} contains itself")
+        joints = [self._joint(element) for element in group.all("joint")]
+        for element in group.all("link"):
+            joints += self._urdf.above(self._link(element, "name"))[-1:]
+        for element in group.all("chain"):
+            joints += self._chain(element)
+        found = {joint.name: joint for joint in joints}
+        for element in group.all("group"):
+            inner = element.attributes.get("name", "")
+            if inner not in self._groups:
+                self._problems.fail(element.line, f"there is no group {quoted(inner)}")
+            found |= self._joints(inner, (*around, name))
+        return found
+
+    def _joint(self, element: Element) -> UrdfJoint:
+        name = element.attributes.get("name", "")
+        if name not in self._urdf.joints:
+            near = did_you_mean(name, self._urdf.joints)
+            self._problems.fail(element.line, f"{self._urdf.file} has no joint {quoted(name)}{near}")
+        return self._urdf.joints[name]
+
+    def _link(self, element: Element, attribute: str) -> str:
+        name = element.attributes.get(attribute, "")
+        if name not in self._urdf.links:
+            near = did_you_mean(name, self._urdf.links)
+            self._problems.fail(element.line, f"{self._urdf.file} has no link {quoted(name)}{near}")
+        return name
+
+    def _chain(self, element: Element) -> list[UrdfJoint]:
+        base, tip = self._link(element, "base_link"), self._link(element, "tip_link")
+        path = self._urdf.above(tip)
+        start = [number for number, joint in enumerate(path) if joint.parent == base]
+        if not start:
+            self._problems.fail(element.line, f"the link {quoted(tip)} does not hang below {quoted(base)}")
+        return path[start[0] :]
