@@ -241,6 +241,10 @@ def reference(content):
     header, *rows = filled
     separator = ";" if ";" in header else ","
     names = [name.strip() for name in header.split(separator)]
+    if separator == ";" and any("," in row for row in rows):
+        if any("." in row for row in rows):
+            return None
+        rows = [row.replace(",", ".") for row in rows]
     try:
         values = [[float(cell) for cell in row.split(separator)] for row in rows]
     except ValueError:
