@@ -239,9 +239,9 @@ def reference(content):
     if not filled:
         return None
     header, *rows = filled
-    separator = ";" if ";" in header else ","
+    separator = next((mark for mark in "\t;" if mark in header), ",")
     names = [name.strip() for name in header.split(separator)]
-    if separator == ";" and any("," in row for row in rows):
+    if separator != "," and any("," in row for row in rows):
         if any("." in row for row in rows):
             return None
         rows = [row.replace(",", ".") for row in rows]

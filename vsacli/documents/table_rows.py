@@ -150,9 +150,9 @@ def _cleaned(rows: Rows) -> Iterator[str]:
         cells = cells_of(line, header.separator)
         if len(cells) != len(header.columns):
             raise _IrregularError(line)
-        used = [cells[place] for place in rows.used]
+        used = [cells[place].strip() for place in rows.used]  # of tabs, too, which separate what is returned
         if rows.empty_cells:
-            used = [cell if cell.strip() else "nan" for cell in used]
+            used = [cell or "nan" for cell in used]
         yield "\t".join(map(decimals.with_points, used))
 
 
