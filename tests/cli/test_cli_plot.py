@@ -73,23 +73,27 @@ def test_overwrite_replaces_figures_and_verbose_describes_the_result(vsacli, tmp
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (None, "there is no such file; expected a result file, as invdyn or simulate writes it"),
         (b"", "is empty; expected a result file, as invdyn or simulate writes it"),
         (b"time,q1\n", "is not an HDF5 file; expected a result file, as invdyn or simulate writes it"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "is damaged or truncated"),
     ],
-    ids=["absent", "empty", "table", "truncated"],
+    ids=["empty", "table", "truncated"],
 )
 @pytest.mark.parametrize("command", ["plot", "export"])
 def test_what_is_no_result_is_refused(vsacli, tmp_path, command, content, message):
-    if content is not None:
-        (tmp_path / "r.h5").write_bytes(content)
+    (tmp_path / "r.h5").write_bytes(content)
     before = contents(tmp_path)
     done = vsacli(command, "r.h5")
     assert (done.code, done.out) == (2, "")
     assert done.err.startswith(f"r.h5: {message}")
     assert done.err.count("\n") == 1
     assert contents(tmp_path) == before
+
+
+def test_a_result_that_is_not_there(vsacli):
+    missing = "there is no such file; expected a result file, as invdyn or simulate writes it"
+    assert vsacli("plot", "r.h5").err == f"r.h5: {missing}\n"
+    assert vsacli("export", "r.h5").err == "r.h5: no such file\n"
 
 
 def test_unknown_format_is_a_usage_error(vsacli, feasible_result):
