@@ -130,7 +130,7 @@ vsacli.charts = (() => {
       if (this.area) this.area.style.background = this.bandColour || colour("soft");
       this.values.forEach(({ series, part, swatch }) => {
         part.classList.toggle("hidden", !vsacli.shown(series));
-        swatch.style.borderTopColor = curveColour(series.colour);
+        swatch.style.borderTopColor = vsacli.named(series.colour);
         swatch.style.borderTopStyle = dash(series)[1];
       });
       this.keys.forEach((key) => key.classList.toggle("hidden", !key.querySelector(".key:not(.hidden)")));

@@ -50,6 +50,7 @@ const vsacli = (() => {
 
   const COLOURS = 8;
   const curveColour = (index) => colour(`curve-${index % COLOURS}`);
+  const named = (index) => `var(--curve-${index % COLOURS})`;  // which follows the scheme by itself
 
   /* An element with texts that are only ever texts. */
   function element(tag, attributes = {}, ...children) {
@@ -96,6 +97,6 @@ const vsacli = (() => {
   const shown = (series) => (series.joint === null || state.joints.has(series.joint)) && state.files.has(series.file);
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => tell("scheme"));
-  return { data, state, array, after, valueAt, number, colour, curveColour, COLOURS, element,
+  return { data, state, array, after, valueAt, number, colour, curveColour, named, COLOURS, element,
            listen, tell, setCursor, setWindow, shown };
 })();

@@ -1,7 +1,7 @@
 "use strict";
 /* What surrounds the plots: time and zoom, filters, what is wrong when, sections, keys. */
 (() => {
-  const { data, state, element, number, curveColour, colour } = vsacli;
+  const { data, state, element, number } = vsacli;
   const byId = (name) => document.getElementById(name);
   /* Colours of what may be wrong, the worst first. */
   const SHADES = { infeasible: "infeasible", singular: "singular", "near-singular": "near-singular",
@@ -40,9 +40,7 @@
   function addFilters() {
     data.joints.forEach(({ name }, joint) => {
       const swatch = element("i", { class: "swatch" });
-      const paint = () => { swatch.style.borderTopColor = curveColour(joint); };
-      paint();
-      vsacli.listen("scheme", paint);
+      swatch.style.borderTopColor = vsacli.named(joint);
       addFilter(state.joints, joint, name, [swatch]);
     });
     if (data.files.length > 1) {
@@ -172,6 +170,11 @@
     }
     return data.span[0];
   }
+
+  /* The robot stands below what stays on top. */
+  new ResizeObserver(() => {
+    document.documentElement.style.setProperty("--stage", `${byId("stage").offsetHeight}px`);
+  }).observe(byId("stage"));
 
   state.cursor = beginning();
   addSections();
