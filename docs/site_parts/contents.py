@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
 SECTION = re.compile(r"^## (?P<title>.+)\n(?P<text>(?:(?!## ).*\n?)*)", re.MULTILINE)
-ENTRY = re.compile(r"^- \[[^\]]+\]\((?P<page>[\w/-]+)\.md\)", re.MULTILINE)
+ENTRY = re.compile(r"^- \[(?P<title>[^\]]+)\]\((?P<page>[\w/-]+)\.md\)", re.MULTILINE)
 CONTENTS = "```{{toctree}}\n:hidden:\n:caption: {title}\n\n{pages}\n```\n"
 
 
@@ -25,7 +25,7 @@ def with_contents(text: str) -> str:
 
 
 def _contents(section: re.Match[str]) -> str:
-    pages = ENTRY.findall(section["text"])
+    pages = [f"{title} <{page}>" for title, page in ENTRY.findall(section["text"])]
     if not pages:
         return section[0]
     contents = CONTENTS.format(title=section["title"], pages="\n".join(pages))
