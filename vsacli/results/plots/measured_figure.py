@@ -62,7 +62,7 @@ def measured_figure(curves: Sequence[MeasuredCurve], title: str) -> Figure:
 def _draw(over: Axes, apart: Axes, curve: MeasuredCurve) -> list[Artist]:
     """Draw both panels of a signal; returns what a legend shows besides the lines."""
     handles = []
-    for index, values in ((1, curve.measured), (0, curve.computed)):
+    for index, values in ((0, curve.computed), (1, curve.measured)):
         handles += draw_curve(over, Curve.reduced(curve.time, values), index, line_style(index))
     apart.axhline(0.0, **ZERO)
     difference = Curve.reduced(curve.time, curve.measured - curve.computed)

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import TORQUE
@@ -16,11 +15,14 @@ from vsacli.base.variables import MOTORS
 from vsacli.results.curves import Curve
 from vsacli.results.plots.drawing import draw_curve, draw_uncertainty
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, joint_panels
-from vsacli.results.plots.styles import house_style, line_handle, line_style
+from vsacli.results.plots.styles import house_style, line_handle, line_style, shortened
 
 MOST_ROWS = 7
 ROW_HEIGHT, BAR_HEIGHT = 1.6, 0.28
 """Inches."""
+
+LABEL_LENGTH, ROOM_FOR_LABELS = 16, 0.35
+"""Characters of a joint's name beside its bar, and the space for it, relative to the longest bar."""
 
 
 class Bar(NamedTuple):
@@ -48,7 +50,7 @@ class Torque(NamedTuple):
 
 
 def ranking_figure(bars: Sequence[Bar], title: str) -> Figure:
-    """A bar for each number, the most important on top, coloured by the joint that it moves most."""
+    """A bar for each number, the most important on top, with the joint that it moves most."""
     with house_style():
         figure = Figure((2 * PANEL_WIDTH, BAR_HEIGHT * len(bars) + 1.2), layout="constrained")
         axes = figure.add_subplot()
@@ -57,11 +59,13 @@ def ranking_figure(bars: Sequence[Bar], title: str) -> Figure:
         axes.barh(range(len(bars)), [100 * bar.share for bar in bars], color=colors, height=0.7)
         axes.set_yticks(range(len(bars)), [bar.label for bar in bars], parse_math=False)
         axes.invert_yaxis()
-        axes.margins(x=0.05)
+        for place, bar in enumerate(bars):
+            text = f" {shortened(bar.joint, LABEL_LENGTH)}"
+            axes.text(100 * bar.share, place, text, va="center", fontsize=8, parse_math=False)
+        axes.margins(x=ROOM_FOR_LABELS)
         axes.grid(visible=False, axis="y")
         axes.set_xlabel("change of motor torque [% of its peak]")
-        handles = [Patch(color=line_style(at).color, label=joint) for at, joint in enumerate(joints)]
-        return complete(figure, title, handles)
+        return complete(figure, title, [])
 
 
 def band_figure(time: FloatArray, torques: Sequence[Torque], title: str) -> Figure:
