@@ -366,3 +366,21 @@ def test_of_many_limits_those_farthest_off_are_told():
     *told, rest = sentences(joints)
     assert [sentence.partition(":")[0] for sentence in told] == ["j3", "j4", "j5", "j6"]
     assert rest == "also over the velocity limit: j1 (4 rad/s, limit 3), j2 (5 rad/s, limit 3)"
+
+
+def test_of_many_joints_those_alike_are_named_together():
+    steps = [2, 2, 2, 9, 8, 7, 6, 1, 2, 2]
+    *_, rest = sentences(many(Worst("infeasible", 4.0, 790.0, 803.1, "N m/rad"), steps))
+    assert rest.splitlines() == [
+        "also infeasible: j0 to j2, j8, j9 (2 steps, from 3.588 s);",
+        "                 j7 (1 step)",
+    ]
+
+
+def test_motors_of_many_joints_that_start_alike_are_named_together():
+    joints = [replace(QUIET, name=f"j{number}") for number in range(8)]
+    joints[5] = replace(joints[5], start_theta=(0.1, 0.2))
+    text = render(report(*joints))
+    assert "start motors at: j0 to j4, j6, j7 +0.07276 -0.05513 rad;\n" in text
+    assert "                 j5 +0.1 +0.2 rad\n" in text
+    assert "end motors at: j0 to j7 -0.8426 -1.24 rad\n" in text

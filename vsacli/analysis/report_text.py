@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.self_check import SelfCheck
+from vsacli.base.texts import together
 from vsacli.base.units import POSITION, TORQUE, VELOCITY, time_text
 
 WIDTH = 78
 JOINTS_PER_LINE = 3
+MOST_APART = 7
+"""Joints of a robot up to which each is spoken of by itself."""
+
 
 HUGE = 1e8
 """Torque or stiffness shown with an exponent, as next to a singular step."""
@@ -121,7 +125,9 @@ def count(steps: int) -> str:
 
 def start(joints: Sequence[JointReport]) -> Iterator[str]:
     """Where the motors are at the first step, which of them move, and the largest step of a torque there."""
-    yield by_joint("start motors at: ", [_positions(joint, joint.start_theta, "first") for joint in joints])
+    yield _all(
+        "start motors at: ", joints, [_positions(joint, joint.start_theta, "first") for joint in joints]
+    )
     yield from _moving("motors move at the start: ", joints, [joint.start_dtheta for joint in joints])
     steps = [(max(of_motors(joint, joint.torque_step)), joint) for joint in joints]
     defined = [entry for entry in steps if not math.isnan(entry[0])]
@@ -134,15 +140,19 @@ def end(joints: Sequence[JointReport]) -> Iterator[str]:
     """Where the motors are at the last step, and which of them still move; nothing if it was not computed."""
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
-    yield by_joint("end motors at: ", [_positions(joint, joint.end_theta, "last") for joint in joints])
+    yield _all("end motors at: ", joints, [_positions(joint, joint.end_theta, "last") for joint in joints])
     yield from _moving("motors move at the end: ", joints, [joint.end_dtheta for joint in joints])
+
+
+def _all(label: str, joints: Sequence[JointReport], said: Sequence[str]) -> str:
+    return of_joints(label, dict(enumerate(said)), [joint.name for joint in joints])
 
 
 def _positions(joint: JointReport, theta: tuple[float, float], step: str) -> str:
     positions = of_motors(joint, theta)
     if any(map(math.isnan, positions)):
-        return f"{joint.name} undefined ({step} step infeasible)"
-    return f"{joint.name} {_signed(positions)} {POSITION.unit(joint.type)}"
+        return f"undefined ({step} step infeasible)"
+    return f"{_signed(positions)} {POSITION.unit(joint.type)}"
 
 
 def _moving(
@@ -150,16 +160,16 @@ def _moving(
 ) -> Iterator[str]:
     """The joints whose motors do not rest at an end of the motion, and how fast they are."""
     fastest = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
-    moving = [
-        f"{joint.name} {_signed(of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
-        for joint, dtheta in zip(joints, velocities, strict=True)
+    moving = {
+        number: f"{_signed(of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
+        for number, (joint, dtheta) in enumerate(zip(joints, velocities, strict=True))
         if any(
             abs(speed) > max(RESTING_SHARE * peak, ROUNDING_SHARE * fastest)
             for speed, peak in zip(dtheta, joint.peak_dtheta, strict=True)
         )
-    ]
+    }
     if moving:
-        yield by_joint(label, moving)
+        yield of_joints(label, moving, [joint.name for joint in joints])
 
 
 def _signed(values: Iterable[float]) -> str:
@@ -195,6 +205,17 @@ def by_joint(label: str, entries: Sequence[str]) -> str:
         for first in range(0, len(entries), JOINTS_PER_LINE)
     ]
     return label + (",\n" + " " * len(label)).join(lines)
+
+
+def of_joints(label: str, said: Mapping[int, str], names: Sequence[str]) -> str:
+    """What is to be said of joints, by number; where they are many, those alike are named together."""
+    alike: dict[str, list[int]] = {}
+    for number, words in said.items():
+        alike.setdefault(words, []).append(number)
+    if len(names) <= MOST_APART or len(alike) == len(said):
+        return by_joint(label, [f"{names[number]} {words}" for number, words in said.items()])
+    lines = [f"{together(numbers, names)} {words}" for words, numbers in alike.items()]
+    return label + (";\n" + " " * len(label)).join(lines)
 
 
 def self_check_line(check: SelfCheck) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from vsacli.analysis.joint_report import JointReport, Worst
-from vsacli.analysis.report_text import apart, by_joint, count, kind_of, number
+from vsacli.analysis.report_text import apart, count, kind_of, number, of_joints
 from vsacli.base.flags import Flag
 from vsacli.base.units import time_text
 
@@ -28,9 +28,13 @@ def sentences(joints: Sequence[JointReport]) -> Iterator[str]:
                 where = "; this lies between the steps" if worst.time in between else ""
                 yield f"{joint.name}: {_SENTENCES.get(kind, _limit)(joint, worst)}{where}"
     for kind in kinds:
-        others = [joint for joint in joints if kind in joint.worst and joint not in told[kind]]
+        others = {
+            number: _briefly(joint, kind)
+            for number, joint in enumerate(joints)
+            if kind in joint.worst and joint not in told[kind]
+        }
         if others:
-            yield by_joint(f"also {_words(kind)}: ", [_briefly(joint, kind) for joint in others])
+            yield of_joints(f"also {_words(kind)}: ", others, [joint.name for joint in joints])
 
 
 def _told(joints: Sequence[JointReport], kind: str) -> Sequence[JointReport]:
@@ -55,10 +59,10 @@ def _words(kind: str) -> str:
 
 def _briefly(joint: JointReport, kind: str) -> str:
     if kind in joint.steps:
-        return f"{joint.name} ({_steps(joint, kind)})"
+        return f"({_steps(joint, kind)})"
     worst = joint.worst[kind]
     value, bound = apart(worst.value, worst.bound)
-    return f"{joint.name} ({value} {worst.unit}, limit {bound})"
+    return f"({value} {worst.unit}, limit {bound})"
 
 
 def _steps(joint: JointReport, kind: str) -> str:

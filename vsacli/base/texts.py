@@ -52,6 +52,25 @@ def sentence(clause: str) -> str:
     return clause if clause.endswith(("?", ".")) else f"{clause}."
 
 
+FEWEST_IN_A_ROW = 3
+"""Names one after the other from which on only the first and the last are said."""
+
+
+def together(numbers: Sequence[int], names: Sequence[str]) -> str:
+    """The names with these numbers, which ascend; of those in a row the first and the last."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and runs[-1][-1] == number - 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    words = []
+    for run in runs:
+        several = [names[number] for number in run]
+        words += several if len(run) < FEWEST_IN_A_ROW else [f"{several[0]} to {several[-1]}"]
+    return ", ".join(words)
+
+
 def shown(content: Any) -> Any:
     """JSON values with every text in one line."""
     match content:

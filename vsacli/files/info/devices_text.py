@@ -7,15 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vsacli.actuators.kinds import ACTUATORS
+from vsacli.base.texts import together
 from vsacli.base.units import DIMENSIONLESS, Quantity
 from vsacli.documents.fields import declared
 from vsacli.documents.records import Field
 
 Values = Mapping[str, Any]
 """Of a record, by field, as JSON has them."""
-
-FEWEST_IN_A_ROW = 3
-"""Joints one after the other from which on only the first and the last are named."""
 
 
 def device_lines(joints: Sequence[Values]) -> Iterator[str]:
@@ -27,25 +25,10 @@ def device_lines(joints: Sequence[Values]) -> Iterator[str]:
         alike.setdefault((joint["actuator"]["type"], *parts), []).append(number)
     names = [joint["name"] for joint in joints]
     for (kind_name, *lines), numbers in alike.items():
-        yield f"{_together(numbers, names)}: {kind_name}"
+        yield f"{together(numbers, names)}: {kind_name}"
         yield from (f"  {line}" for line in lines)
     if any("gear_ratio" in line for parts in alike for line in parts):
         yield "numbers of a motor with gear_ratio are those of its shaft"
-
-
-def _together(numbers: Sequence[int], names: Sequence[str]) -> str:
-    """Names of joints, base to tip; of those in a row the first and the last."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and runs[-1][-1] == number - 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    words = []
-    for run in runs:
-        several = [names[number] for number in run]
-        words += several if len(run) < FEWEST_IN_A_ROW else [f"{several[0]} to {several[-1]}"]
-    return ", ".join(words)
 
 
 def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
