@@ -79,14 +79,11 @@ def test_the_completion_of_bash_itself(tmp_path: Path) -> None:
     assert answer.stdout.split() == ["check-feasibility"]
 
 
-def test_every_argument_but_two_is_a_file() -> None:
-    others = {
-        parameter.name
-        for command in commands(vsacli)
-        for parameter in command.params
-        if isinstance(parameter, click.Argument) and parameter.type.name != "file"
-    }
-    assert others == set(NO_FILES)
+def test_whatever_names_a_file_or_a_folder_is_of_that_kind() -> None:
+    parameters = [parameter for command in commands(vsacli) for parameter in command.params]
+    texts = [each for each in parameters if each.type.name not in ("file", "folder")]
+    assert {each.name for each in texts if isinstance(each, click.Argument)} == set(NO_FILES)
+    assert not [each.opts for each in texts if each.metavar in ("FILE", "FOLDER")]
 
 
 def commands(group: click.Group) -> Iterator[click.Command]:

@@ -20,7 +20,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
-from vsacli.cli.file_names import FILE
+from vsacli.cli.file_names import FILE, FOLDER
 
 if TYPE_CHECKING:
     from vsacli.analysis.result import Result
@@ -80,7 +80,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
     help="Write the best trajectory, with a CSV beside it for what is no formula.",
 )
 @click.option(
-    "--plot", "folder", metavar="FOLDER", help="Save figures of stiffness, torques and pace there, as png."
+    "--plot", "folder", type=FOLDER, help="Save figures of stiffness, torques and pace there, as png."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the starts drawn.")
 @json_option
