@@ -13,6 +13,7 @@ from samples.marks import slow
 from vsacli import (
     DenavitHartenberg,
     Inertia,
+    InputError,
     Joint,
     Link,
     Motor,
@@ -105,6 +106,25 @@ def test_of_a_motor_that_stands_still_any_gear_from_some_on_does(tmp_path):
     assert (best.low, best.high) == (pytest.approx(load / 0.1, rel=1e-12), math.inf)
     assert best.ratio == pytest.approx(load / 0.1, rel=1e-3)
     assert best.does
+
+
+def test_what_is_no_list_of_trajectories_is_refused():
+    robot, trajectory = shipped("hardening_1r")
+    with pytest.raises(TypeError, match=r"trajectories must be a Sequence, not a .*Trajectory; size_drives"):
+        size_drives(robot, trajectory)
+    with pytest.raises(InputError, match="there is no trajectory to size for"):
+        size_drives(robot, [])
+    with pytest.raises(TypeError, match="robot must be a Robot"):
+        size_drives("arm.yaml", [trajectory])
+
+
+def test_a_motion_twice_is_as_often_once_and_has_two_names():
+    robot, trajectory = shipped("hardening_1r")
+    once, twice = size_drives(robot, [trajectory]), size_drives(robot, [trajectory, trajectory])
+    assert [each.trajectory for each in twice.outcomes] == ["hardening-1r", "hardening-1r (2)"]
+    one, two = (sizing.motors[0].own.points for sizing in (once, twice))
+    assert two.rms_torque == pytest.approx(one.rms_torque, rel=1e-12)  # sums of twice as many
+    assert two.torque == one.torque
 
 
 INERTIA, REACH, FREQUENCY = 0.8, 0.5, 3.0

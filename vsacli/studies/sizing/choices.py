@@ -14,8 +14,8 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Published, named
 from vsacli.studies.sizing.catalogue import CatalogueMotor
-from vsacli.studies.sizing.demand import MotorDemand
 from vsacli.studies.sizing.gears import Gears
+from vsacli.studies.sizing.motor_demand import MotorDemand
 from vsacli.studies.sizing.ratios import Ratios, balanced, least_rms, ratios_within, rms_torque, shares
 from vsacli.studies.sizing.shaft import LIMITS, Shaft
 

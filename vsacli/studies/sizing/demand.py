@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import ClassVar, NamedTuple
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, over_time
+from vsacli.base.arrays import BoolArray, FloatArray, over_time
 from vsacli.base.flags import Flag, has
-from vsacli.base.json_records import Published, named
+from vsacli.base.json_records import Published
 from vsacli.base.variables import Block
 from vsacli.dynamics.dampers import motor_torques
 from vsacli.robot.model import Robot
-from vsacli.studies.sizing.shaft import shaft_signals
+from vsacli.studies.sizing.motor_demand import MotorDemand
+from vsacli.studies.sizing.spring_demand import SpringDemand, SpringPeaks
 from vsacli.trajectory.trajectory import Trajectory
 
 UNDONE = Flag.INFEASIBLE | Flag.SINGULAR | Flag.INTERNAL_INSTABILITY | Flag.NOT_FINITE
@@ -46,114 +45,6 @@ class Outcome(Published):
     samples: int
 
 
-@dataclass(frozen=True)
-class Peak(Published):
-    """The largest size of something, and when it is; NaN if it never exists.
-
-    Attributes:
-        value: the size.
-        trajectory: its name.
-        time: in it, s.
-    """
-
-    value: float = math.nan
-    trajectory: str = ""
-    time: float = math.nan
-
-
-@dataclass(frozen=True, eq=False)
-class MotorDemand:
-    """What is asked of a motor on the joint's side of its gear, at all steps that can be done; (samples,).
-
-    Attributes:
-        joint, joint_type: whose motor it is.
-        number: 1 or 2.
-        trajectories: their names.
-        run: index of the trajectory that the step belongs to.
-        time: of the step in it, s.
-        weight: time that the step stands for in means over time, s.
-        velocity, acceleration: of the motor.
-        load: what springs, a damper and a coupled rotor exert against it.
-        torque: of the motor that the robot file has.
-    """
-
-    joint: str
-    joint_type: str
-    number: int
-    trajectories: tuple[str, ...]
-    run: IndexArray = field(repr=False)
-    time: FloatArray = field(repr=False)
-    weight: FloatArray = field(repr=False)
-    velocity: FloatArray = field(repr=False)
-    acceleration: FloatArray = field(repr=False)
-    load: FloatArray = field(repr=False)
-    torque: FloatArray = field(repr=False)
-
-    @property
-    def name(self) -> str:
-        """Of the motor."""
-        return f"{self.joint} {self.number}"
-
-    def peak(self, values: FloatArray) -> Peak:
-        """The largest size of values, (samples,)."""
-        step = int(np.abs(values).argmax())
-        return Peak(float(abs(values[step])), self.trajectories[int(self.run[step])], float(self.time[step]))
-
-    def rms(self, values: FloatArray) -> float:
-        """Root mean square over time of values, (samples,)."""
-        return float(np.sqrt(self.mean(values * values)))
-
-    @cached_property
-    def signals(self) -> FloatArray:
-        """The seven that the torque on a shaft is a sum of, (7, samples)."""
-        return shaft_signals(self.velocity, self.acceleration, self.load)
-
-    def mean(self, values: FloatArray) -> FloatArray:
-        """Over time, of the last axis; NaN if no time passes."""
-        total = self.weight.sum()
-        mean: FloatArray = values @ self.weight / total if total else np.full(values.shape[:-1], np.nan)
-        return mean
-
-    @cached_property
-    def moments(self) -> FloatArray:
-        """Means over time of the products of the signals, (7, 7), with which squares of torques average."""
-        return self.mean(self.signals[:, None] * self.signals)
-
-    @cached_property
-    def top_speed(self) -> float:
-        """Largest speed."""
-        return float(np.abs(self.velocity).max(initial=0.0))
-
-
-@dataclass(frozen=True)
-class SpringDemand(Published):
-    """What a spring must bear.
-
-    Attributes:
-        joint, joint_type: whose it is.
-        spring: which of its springs.
-        energy: largest energy in it, J.
-        torque: largest |torque|, N m (N).
-        deflection: largest |deflection|, rad (m).
-        max_deflection: what the robot file admits; infinite if it says nothing.
-    """
-
-    joint: str
-    joint_type: str
-    spring: str
-    energy: Peak
-    torque: Peak
-    deflection: Peak
-    max_deflection: float
-
-    shape: ClassVar = named("joint", "spring", "energy", "torque", "deflection", "max_deflection", "share")
-
-    @property
-    def share(self) -> float:
-        """Of the deflection that is admissible; NaN if nothing is said of that."""
-        return self.deflection.value / self.max_deflection if math.isfinite(self.max_deflection) else math.nan
-
-
 class Demand(NamedTuple):
     """What trajectories ask of a robot."""
 
@@ -175,7 +66,7 @@ def demanded(
     Raises:
         InputError: a trajectory does not fit the robot.
     """
-    springs = _Springs(robot)
+    springs = SpringPeaks(robot)
     parts: list[dict[str, FloatArray]] = []
     outcomes = []
     for name, trajectory in zip(_told_apart([each.name for each in trajectories]), trajectories, strict=True):
@@ -209,6 +100,7 @@ def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
     for index, joint in enumerate(robot.joints):
         if joint.actuator.coupled_rotors:
             load[:, index] += joint.actuator.coupled_rotors * block.ddtheta[:, index, ::-1]
+    load[has(block.flags, UNDONE)] = np.nan
     of_motors = (block.dtheta, block.ddtheta, load, block.tau_motor)
     return dict(zip(MOVED, (block.time, *(each.copy() for each in of_motors)), strict=True))
 
@@ -231,49 +123,3 @@ def _kept(part: dict[str, FloatArray], index: int, side: int) -> dict[str, Float
     intervals = np.where(known[:-1] & known[1:], np.diff(of_motor["time"]), 0.0)
     weight = (np.append(intervals, 0.0) + np.append(0.0, intervals)) / 2
     return {name: values[known] for name, values in {**of_motor, "weight": weight}.items()}
-
-
-class _Springs:
-    """Keeps what springs bear at most; `add` blocks in order."""
-
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        self._found: dict[tuple[str, str], SpringDemand] = {}
-
-    def add(self, block: Block, trajectory: str) -> None:
-        """Merge a block of a trajectory."""
-        for index, joint in enumerate(self._robot.joints):
-            for load in joint.actuator.spring_loads(block.of_joint(index)):
-                energy, torque, deflection = (
-                    _peak(block.time, values, trajectory)
-                    for values in (load.energy, load.torque, load.deflection)
-                )
-                new = SpringDemand(
-                    joint.name, joint.type, load.name, energy, torque, deflection, load.max_deflection
-                )
-                key = joint.name, load.name
-                self._found[key] = _larger(self._found.get(key, new), new)
-
-    def report(self) -> tuple[SpringDemand, ...]:
-        """What was found of each spring."""
-        return tuple(self._found.values())
-
-
-def _peak(time: FloatArray, values: FloatArray, trajectory: str) -> Peak:
-    """The largest size of values that exist."""
-    sizes = np.where(np.isfinite(values), np.abs(values), -1.0)
-    step = int(sizes.argmax())
-    return Peak(float(sizes[step]), trajectory, float(time[step])) if sizes[step] >= 0 else Peak()
-
-
-def _larger(one: SpringDemand, other: SpringDemand) -> SpringDemand:
-    """The larger of the peaks of both."""
-    energy, torque, deflection = (
-        before if before.value >= after.value or math.isnan(after.value) else after
-        for before, after in (
-            (one.energy, other.energy),
-            (one.torque, other.torque),
-            (one.deflection, other.deflection),
-        )
-    )
-    return replace(one, energy=energy, torque=torque, deflection=deflection)

@@ -10,7 +10,8 @@ from vsacli.base.json_records import Published, named
 from vsacli.base.units import TORQUE, VELOCITY
 from vsacli.studies.sizing.catalogue import CatalogueMotor
 from vsacli.studies.sizing.choices import Choice
-from vsacli.studies.sizing.demand import MotorDemand, Peak
+from vsacli.studies.sizing.motor_demand import MotorDemand
+from vsacli.studies.sizing.peak import Peak
 from vsacli.studies.sizing.shaft import Shaft
 from vsacli.studies.sizing.working_points import WorkingPoints
 

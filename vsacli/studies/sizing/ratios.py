@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.studies.sizing.demand import MotorDemand
+from vsacli.studies.sizing.motor_demand import MotorDemand
 from vsacli.studies.sizing.shaft import Shaft
 
 LOWEST, HIGHEST = 1e-9, 1e9

@@ -9,13 +9,14 @@ from dataclasses import replace
 
 from vsacli.actuators.limit_check import LIMIT_ROUNDING
 from vsacli.actuators.motor import JointMotor
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, check_type
 from vsacli.documents.record_table import RecordTable
-from vsacli.robot.model import Robot
+from vsacli.robot.model import Robot, check_robot
 from vsacli.studies.sizing.catalogue import CatalogueMotor, read_catalogue
 from vsacli.studies.sizing.choices import CRITERIA, check_criterion, choices, usual_criterion
-from vsacli.studies.sizing.demand import MotorDemand, demanded
+from vsacli.studies.sizing.demand import demanded
 from vsacli.studies.sizing.gears import Gears, gears_of_joints
+from vsacli.studies.sizing.motor_demand import MotorDemand
 from vsacli.studies.sizing.motor_sizing import MotorSizing, OwnMotor
 from vsacli.studies.sizing.ratios import ratios_within
 from vsacli.studies.sizing.shaft import Shaft
@@ -48,18 +49,24 @@ def size_drives(
         progress: is told how many further steps are done.
 
     Raises:
-        InputError: a trajectory does not fit the robot, the catalogue cannot be read, or gears or criterion
-            are none.
+        InputError: there is no trajectory, one does not fit the robot, the catalogue cannot be read, or gears
+            or criterion are none.
+        TypeError: an argument is of another type.
     """
+    check_robot(robot)
+    check_type("trajectories", trajectories, Sequence, "size_drives(robot, [trajectory]) takes one")
+    if not trajectories:
+        raise InputError.one("there is no trajectory to size for")
     by_joint = gears_of_joints(gears, robot.joint_names)
     table = None if catalogue is None else read_catalogue(catalogue)
     criterion = _criterion(table, gears, minimize)
     demand = demanded(robot, trajectories, progress)
-    own = [(joint, motor) for joint in robot.joints for motor in joint.actuator.motors]
+    own = [motor for joint in robot.joints for motor in joint.actuator.motors]
     found = [
         _sized(asked, motor, table, by_joint[asked.joint], criterion)
-        for asked, (_, motor) in zip(demand.motors, own, strict=True)
+        for asked, motor in zip(demand.motors, own, strict=True)
     ]
+    warnings = [*robot.warnings, *(warning for motion in trajectories for warning in motion.warnings)]
     return Sizing(
         robot=robot.name,
         outcomes=demand.outcomes,
@@ -68,6 +75,7 @@ def size_drives(
         criterion=criterion,
         motors=tuple(found),
         springs=demand.springs,
+        warnings=tuple(dict.fromkeys(warnings)),
         notes=tuple(_notes(robot, table)),
     )
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
 from vsacli.studies.sizing import sizing_text as text
 from vsacli.studies.sizing.choices import CRITERIA
-from vsacli.studies.sizing.demand import Outcome, SpringDemand
+from vsacli.studies.sizing.demand import Outcome
 from vsacli.studies.sizing.motor_sizing import MotorSizing
+from vsacli.studies.sizing.spring_demand import SpringDemand
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +26,7 @@ class Sizing(Published):
         criterion: by which the best is chosen, one of `CRITERIA`; None without a catalogue.
         motors: those of all joints in turn.
         springs: what each must bear.
+        warnings: why the inputs may not be what was meant.
         notes: how the numbers are meant, where that is not obvious.
     """
 
@@ -34,13 +37,14 @@ class Sizing(Published):
     criterion: str | None
     motors: tuple[MotorSizing, ...]
     springs: tuple[SpringDemand, ...]
+    warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     format: ClassVar[str] = "vsacli-sizing/1"
     shape: ClassVar = {
         **named("format", "verdict", "robot"),
         "trajectories": "outcomes",
-        **named("catalogue", "criterion", "motors", "springs", "notes"),
+        **named("catalogue", "criterion", "warnings", "notes", "motors", "springs"),
     }
 
     @property
@@ -76,7 +80,7 @@ class Sizing(Published):
                 *(text.choice_table(known) if self.catalogue else text.own_table(known, several=several)),
                 *text.lacking(self.lacking),
                 *text.spring_table(self.springs, several=several),
-                *(f"note: {note}" for note in self.notes),
+                *warnings_and_notes(self.warnings, self.notes),
             ]
         )
 

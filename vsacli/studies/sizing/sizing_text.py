@@ -8,9 +8,11 @@ from collections.abc import Iterator, Sequence
 from vsacli.base.tables import aligned
 from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, time_text
 from vsacli.studies.sizing.choices import Choice
-from vsacli.studies.sizing.demand import Outcome, Peak, SpringDemand
+from vsacli.studies.sizing.demand import Outcome
 from vsacli.studies.sizing.motor_sizing import MotorSizing
+from vsacli.studies.sizing.peak import Peak
 from vsacli.studies.sizing.shaft import LIMITS
+from vsacli.studies.sizing.spring_demand import SpringDemand
 
 WORDS = {
     "torque": "peak torque",

@@ -10,7 +10,8 @@ import numpy as np
 from vsacli.actuators.motor import JointMotor
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
-from vsacli.studies.sizing.demand import MotorDemand, Peak
+from vsacli.studies.sizing.motor_demand import MotorDemand
+from vsacli.studies.sizing.peak import Peak
 from vsacli.studies.sizing.shaft import LIMITS, Shaft
 
 
