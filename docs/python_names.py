@@ -16,7 +16,7 @@ GROUPS = {
     "Trajectories": "load_trajectory Trajectory Motion Wrench",
     "Inverse dynamics and its results": "inverse_dynamics Result Report Flag open_result suggest "
     "compare Comparison sensitivity Sensitivity identify Identification plan_excitation Excitation "
-    "excitation_text optimize Optimum size_drives Sizing",
+    "excitation_text optimize Optimum size_drives Sizing run_study StudySummary",
     "Links": "link_torques forward_kinematics jacobian mass_matrix",
     "Control and simulation": "State state_derivative Gains feedback_linearization FeedbackLinearization "
     "Integral simulate perturbed InitialError Sensors GoalTolerance Tolerances",
@@ -29,6 +29,7 @@ METHODS = (
     "from_samples",
     "at",
     "stretched",
+    "of",
     "save",
     "plot",
     "to_xarray",

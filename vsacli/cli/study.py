@@ -58,10 +58,10 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
 @click.option("--merge", is_flag=True, help="Put tables of all parts together, given in place of STUDY.")
 @click.option(
     "--engine",
-    type=click.Choice(["numpy", "c"]),
+    type=click.Choice(["numpy", "c", "auto"]),
     default="numpy",
     show_default=True,
-    help="What computes; C code is compiled for each robot anew, and so for motions of one robot.",
+    help="What computes: NumPy, or C code, compiled for each robot; auto takes what is faster, once for all.",
 )
 @json_option
 @overwrite_option

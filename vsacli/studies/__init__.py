@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from vsacli.studies.remedies import suggest
     from vsacli.studies.sensitivities import Sensitivity, sensitivity
     from vsacli.studies.sizing import Sizing, size_drives
+    from vsacli.studies.sweeps import StudySummary, run_study
 
 __all__ = [
     "Comparison",
@@ -20,11 +21,13 @@ __all__ = [
     "Optimum",
     "Sensitivity",
     "Sizing",
+    "StudySummary",
     "compare",
     "excitation_text",
     "identify",
     "optimize",
     "plan_excitation",
+    "run_study",
     "sensitivity",
     "size_drives",
     "suggest",

@@ -1,6 +1,6 @@
 """Who carries out a computation on rows of samples: NumPy, or code from the system's C compiler."""
 
-from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, choose, processors
+from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, Settled, choose, processors, settle
 from vsacli.compute.engine.engines import Engine, Kernel, Tell, samples_per_pass, unheard
 
 __all__ = [
@@ -9,9 +9,11 @@ __all__ = [
     "Choice",
     "Engine",
     "Kernel",
+    "Settled",
     "Tell",
     "choose",
     "processors",
     "samples_per_pass",
+    "settle",
     "unheard",
 ]

@@ -91,6 +91,46 @@ def choose(
     return Choice(engine, reason, compiler.name, threads)
 
 
+class Settled(NamedTuple):
+    """An engine by its name, "numpy" or "c", and what compiles its code, empty if nothing does."""
+
+    name: str
+    compiler: str = ""
+
+
+def settle(name: str, kernel: Kernel, samples: int) -> Settled:
+    """The engine for many computations that are to agree, whoever carries out each of them, and when.
+
+    So it does not depend on what was compiled before.
+
+    Args:
+        name: one of `NAMES`; "auto" takes compiled code where that saves time.
+        kernel: what most of them compute.
+        samples: over how many samples all of them compute it.
+
+    Raises:
+        InputError: there is no engine of that name, or it is "c" and there is no C compiler that works.
+    """
+    if name not in NAMES:
+        raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
+    if name == "numpy" or (name == "auto" and samples < LOOK_FROM):
+        return Settled("numpy")
+    from vsacli.compute.engine.compiled_engine import MOST_RECORDED, operation_count
+    from vsacli.compute.engine.compiler import CompilerError, system_compiler
+    from vsacli.compute.engine.engines import kernel_program
+
+    try:
+        compiler = system_compiler()
+        repays = name == "c" or _repays(operation_count(kernel_program(kernel, MOST_RECORDED)), samples)
+    except CompilerError as error:
+        if name == "c":
+            raise InputError.one(f"{error}; the engine numpy needs none") from error
+        return Settled("numpy")
+    except NotImplementedError:
+        return Settled("numpy")
+    return Settled("c", compiler.name) if repays else Settled("numpy")
+
+
 def _repays(operations: int, samples: int) -> bool:
     """Whether NumPy would be busy for longer than the compiler."""
     from vsacli.compute.engine.compiled_engine import MOST_OPERATIONS, compiling_seconds

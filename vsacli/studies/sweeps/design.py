@@ -42,6 +42,13 @@ class Design:
             raise InputError.one(f"{total} are more than {MOST_RUNS:,}; {advice}")
         self._shares = None if file.method == GRID else _shares(file, self.points, len(self._own))
 
+    def different(self, dimensions: Sequence[Dimension]) -> int:
+        """How many different values some dimensions have together."""
+        own = [each for each in dimensions if not each.linked]
+        if self._shares is not None and own:
+            return self.points
+        return math.prod(len(each.values) for each in own)
+
     def values(self, point: int) -> dict[str, Any]:
         """The value of each dimension at a point, by path."""
         if self._shares is None:

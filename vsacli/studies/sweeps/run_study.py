@@ -64,7 +64,8 @@ def run_study(
         processes: how many compute; by default one a processor. Rows do not depend on it. A script that calls
             this with more than one needs `if __name__ == "__main__":`, as the module `multiprocessing` says.
         dask: address of the scheduler of a Dask cluster that computes instead, or "local".
-        engine: what computes, "numpy" or compiled "c".
+        engine: what computes, "numpy" or compiled "c", or "auto", which takes the latter for all runs where
+            that saves time.
         overwrite: whether a table that exists may be replaced.
         command_line: what to remember of how it was called.
         progress: opens a bar over the runs that are missing.

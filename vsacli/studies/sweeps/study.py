@@ -24,6 +24,7 @@ from vsacli.robot.file import ReadRobot, read_robot
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.design import Design
 from vsacli.studies.sweeps.dimensions import Dimension
+from vsacli.studies.sweeps.engine_of_all import settled_engine
 from vsacli.studies.sweeps.entries import Entries
 from vsacli.studies.sweeps.kept import KEPT, Kept
 from vsacli.studies.sweeps.optimised import Cost
@@ -212,9 +213,9 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     """Read a study, its robot and its trajectories.
 
     Raises:
-        InputError: with every problem of the first file that has some; or there is no C compiler for "c".
+        InputError: with every problem of the first file that has some; or there is no such engine, or no C
+            compiler for it.
     """
-    compiler = _compiler(engine)
     file, source = read_document(path, StudyFile, FORMAT)
     folder = Path(source.path).parent
     read = read_robot(folder / file.robot)
@@ -232,19 +233,8 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
         raise InputError.one(str(error), source.path) from None
     entries.try_values()
     sources = tuple(each.sources for each in loaded)
-    return Study(file, source, read, robot, trajectories, sources, dimensions, design, engine, compiler)
-
-
-def _compiler(engine: str) -> str:
-    """What compiles the code of an engine, if anything does."""
-    if engine != "c":
-        return ""
-    from vsacli.compute.engine.compiler import CompilerError, system_compiler
-
-    try:
-        return system_compiler().name
-    except CompilerError as error:
-        raise InputError.one(f"{error}; the engine numpy needs none") from None
+    settled = settled_engine(engine, robot, trajectories, dimensions, design)
+    return Study(file, source, read, robot, trajectories, sources, dimensions, design, *settled)
 
 
 def _trajectories(file: StudyFile, folder: Path, path: str) -> tuple[str, ...]:

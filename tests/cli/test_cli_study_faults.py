@@ -1,0 +1,175 @@
+"""`vsacli study`: what goes wrong, and what is kept whatever happens."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from samples.studies import GRID, HEAD, column, content, study
+
+from vsacli import StorageError
+from vsacli.results.store.study_table import StudyWriter
+from vsacli.studies.sweeps import journal as journal_module
+from vsacli.studies.sweeps.journal import Journal
+from vsacli.studies.sweeps.rows import Computer
+from vsacli.studies.sweeps.run_study import gather
+from vsacli.studies.sweeps.study import load_study
+
+
+def test_a_run_that_fails_is_a_row(vsacli: Any, own_folder: Path) -> None:
+    """A mass that is drawn below zero makes no robot; the others are computed."""
+    text = "method: random\nsamples: 4\nvary:\n  joints.elbow.link.mass: {normal: 100 %}\n"
+    done = vsacli("study", study(own_folder, text))
+    masses, verdicts = column("study.h5", "joints.elbow.link.mass"), column("study.h5", "verdict")
+    assert done.code == 3
+    assert 0 < (masses < 0).sum() < 4
+    np.testing.assert_array_equal(verdicts == "failed", masses < 0)
+    assert all("must be zero or positive" in error for error in column("study.h5", "error")[masses < 0])
+    np.testing.assert_array_equal(np.isnan(column("study.h5", "margin")).all(axis=1), masses < 0)
+    assert "failed: joints.elbow.link.mass: must be zero or positive" in done.out
+
+
+def test_an_interrupted_study_goes_on(vsacli: Any, grid_study: str, grid_table: Path) -> None:
+    """From the rows in the journal, of which the last was cut off."""
+    journal = Path("study.h5.journal")
+    with Journal(journal) as rows:
+        gather(map(Computer(load_study(grid_study)).row, range(5)), rows, lambda _: None)
+    journal.write_bytes(journal.read_bytes()[:-9])
+    done = vsacli("study", grid_study)
+    assert done.err.splitlines() == [f"4 of 6 runs are in {journal} already", "wrote study.h5"]
+    assert content("study.h5") == content(grid_table)
+    assert not journal.exists()
+
+
+def test_a_full_disk_costs_no_finished_row(
+    vsacli: Any, grid_study: str, grid_table: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    room = [2]
+
+    def write(file: int, data: memoryview) -> int:
+        room[0] -= 1
+        if room[0] < 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return original(file, data if room[0] else data[:40])  # the disk becomes full in the second row
+
+    original = os.write
+    with monkeypatch.context() as patch:
+        patch.setattr(journal_module.os, "write", write)
+        full = vsacli("study", grid_study)
+    assert full.code == 4
+    assert "the disk is full; the 1 rows in it stay" in full.err
+    assert not Path("study.h5").exists()
+    assert vsacli("study", grid_study).err.startswith("1 of 6 runs are in ")
+    assert content("study.h5") == content(grid_table)
+
+
+def test_a_study_that_is_edited_before_it_goes_on_computes_what_is_new(vsacli: Any, grid_study: str) -> None:
+    """Rows whose values are still asked for stay; a robot that is edited leaves none."""
+    journal = Path("study.h5.journal")
+    with Journal(journal) as rows:
+        gather(map(Computer(load_study(grid_study)).row, range(6)), rows, lambda _: None)
+    Path(grid_study).write_text(Path(grid_study).read_text().replace("[1000, 1275]", "[1000, 1300]"))
+    kept = journal.read_bytes()
+    assert vsacli("study", grid_study).err.startswith("3 of 6 runs are in ")
+    whole = content("study.h5")
+    assert vsacli("study", grid_study, "-o", "anew.h5", "-q").code == 0
+    assert content("anew.h5") == whole
+    journal.write_bytes(kept)
+    Path("arm.yaml").write_text(Path("arm.yaml").read_text() + "# as measured\n")
+    assert " runs are in " not in vsacli("study", grid_study, "--overwrite").err
+
+
+@pytest.mark.parametrize(("old", "new"), [("end: 1275", "end: 1274"), ("degree: 7", "degree: 2")])
+def test_a_file_that_changes_meanwhile_ends_the_study(
+    vsacli: Any, own_folder: Path, monkeypatch: pytest.MonkeyPatch, old: str, new: str
+) -> None:
+    """No row of what it says now is kept under the key of what it said; the rows before stay."""
+    study(own_folder, "vary: {duration: [2, 3, 4]}\n")
+    move = own_folder / "move.yaml"
+    text, original = move.read_text(), Journal.add
+
+    def add(journal: Journal, row: Any) -> None:
+        original(journal, row)
+        move.write_text(text.replace(old, new))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "add", add)
+        ended = vsacli("study", "study.yaml")
+    assert (ended.code, Path("study.h5").exists()) == (2, False)
+    assert "move.yaml: was changed while the study was computed; run it again" in ended.err
+    assert "1 finished runs are kept in study.h5.journal; the same command goes on from there" in ended.err
+    move.write_text(text)
+    assert vsacli("study", "study.yaml").err.startswith("1 of 3 runs are in ")
+
+
+def test_a_disk_that_is_full_when_the_table_is_written_costs_no_row(
+    vsacli: Any, grid_study: str, grid_table: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def write(*_: Any) -> None:
+        raise StorageError("study.h5", "the disk is full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(StudyWriter, "write", write)
+        full = vsacli("study", grid_study)
+    assert (full.code, Path("study.h5").exists(), list(Path().glob(".*"))) == (4, False, [])
+    assert "6 finished runs are kept in study.h5.journal" in full.err
+    assert vsacli("study", grid_study).err.startswith("6 of 6 runs are in ")
+    assert content("study.h5") == content(grid_table)
+
+
+def test_two_do_not_compute_the_same_study(vsacli: Any, grid_study: str) -> None:
+    with Journal(Path("study.h5.journal")):
+        done = vsacli("study", grid_study)
+    assert (done.code, "another process computes this study" in done.err) == (4, True)
+
+
+SPRING = "joints.*.actuator.spring.k"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"vary: {{{SPRING}x: [1]}}", f"study.yaml:5: {SPRING}x: joints.0.actuator.spring has no 'kx'"),
+        (f"vary: {{{SPRING}: [400, -1]}}", "study.yaml:5: joints.*.actuator.spring.k: joints.0"),
+        (f"vary: {{{SPRING}: []}}", f"study.yaml:5: {SPRING}: expected a list of values, "),
+        (f"vary: {{{SPRING}: {{linspace: [1, 2, 0]}}}}", "linspace: expected a count from 1 to 1,000,000"),
+        (f"vary: {{{SPRING}: {{linspce: [1, 2, 3]}}}}", "did you mean 'linspace'?"),
+        (f"vary: {{{SPRING}: {{normal: 5 %}}}}", "vary: a grid has no values drawn from distributions"),
+        ("vary: {foo.k: [1]}", "study.yaml:5: foo.k: neither robot nor trajectory has a 'foo'"),
+        ("vary: {name: [a, b]}", "study.yaml:5: name says what the file is and stays"),
+        ("vary: {duration: [1, 2], rate: {linked: durations}}", "no path above it that varies by itself"),
+        ("method: random\nvary: {duration: [1]}", "samples: how many runs? The method random draws them"),
+        ("method: random\nsamples: 3", "vary: nothing varies that the method random could draw"),
+        ("method: random\nsamples: 3\nvary: {joints.*.link.com: {normal: 5 %}}", "is zero, of which a share"),
+        ("keep: [margins]", "keep: unknown word 'margins'; did you mean 'margin'?"),
+        ("trajectry: x", "unknown key 'trajectry'"),
+        (
+            "vary:\n" + "".join(f"  joints.{i}.link.mass: {{linspace: [1, 2, 1000]}}\n" for i in range(3)),
+            "study.yaml: 1,000,000,000 runs (1 x 1,000 x 1,000 x 1,000) are more than 1,000,000",
+        ),
+    ],
+)  # fmt: skip
+def test_a_study_that_cannot_be_computed(vsacli: Any, own_folder: Path, text: str, message: str) -> None:
+    study(own_folder, text)
+    done = vsacli("study", "study.yaml")
+    assert (done.code, done.out) == (2, "")
+    assert message in done.err
+    assert not list(own_folder.glob("*.h5*"))
+
+
+def test_command_lines_that_make_no_sense(vsacli: Any, grid_study: str) -> None:
+    assert "a study is read by several processes" in vsacli("study", "-").err
+    assert "expected one study, found 2 files" in vsacli("study", grid_study, grid_study).err
+    assert "expected K/N with K from 1 to N" in vsacli("study", grid_study, "--shard", "4/3").err
+    assert "give -o FILE" in vsacli("study", "--merge", grid_study).err
+    assert "is not an HDF5 file" in vsacli("study", "--merge", grid_study, "-o", "x.h5").err
+
+
+def test_no_file_is_replaced_or_read_for_nothing(vsacli: Any, own_folder: Path) -> None:
+    study(own_folder, GRID, HEAD.replace("move.yaml", "moves/*.yaml"))
+    none = vsacli("study", "study.yaml")
+    assert (none.code, none.err) == (2, "study.yaml: trajectory: no file fits 'moves/*.yaml'\n")
