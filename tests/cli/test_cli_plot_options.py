@@ -71,8 +71,15 @@ def test_results_without_a_number_are_drawn(vsacli, tmp_path, feasible_result, o
         for name in OF_JOINTS:
             file[name][...] = np.nan
         file["flags"][...] = 1
-    assert vsacli("plot", "r.h5", *options).code == 0
-    assert vsacli("plot", "r.h5", "r.h5", *options).code == 0
+    assert vsacli("plot", "r.h5", "--format", "svg", *options).code == 0
+
+
+@pytest.mark.slow
+def test_results_without_a_number_are_compared(vsacli, tmp_path, feasible_result):
+    shutil.copy(feasible_result, tmp_path / "r.h5")
+    with h5py.File(tmp_path / "r.h5", "r+") as file:
+        file["tau_motor"][...] = np.nan
+    assert vsacli("plot", "r.h5", "r.h5").code == 0
 
 
 def test_studies_have_no_joints_to_choose(vsacli, tmp_path):

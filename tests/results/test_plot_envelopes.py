@@ -83,7 +83,7 @@ def test_means_of_infinities_do_not_warn() -> None:
 def test_a_noisy_result_says_what_its_bands_are() -> None:
     result = rest_to_rest(20_001)
     result.read("tau_motor")[...] += 5 * NOISE.standard_normal((20_001, 3, 2))
-    figure = plot_stored(result)["motor-torque"]
+    figure = plot_stored(result, ["tau_motor"])["tau_motor"]
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["base", "shoulder", "elbow", "smallest to largest"]
     assert len(figure.axes[0].collections) == 3

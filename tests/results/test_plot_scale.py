@@ -28,8 +28,12 @@ def peaked(peak: float = 1e4, flags: int = Flag.NEAR_SINGULAR) -> Result:
     return result
 
 
+def torques(result: Result) -> Figure:
+    return plot_stored(result, ["tau_motor"])["tau_motor"]
+
+
 def test_a_near_singular_peak_is_cut_off_and_its_height_is_written() -> None:
-    figure = plot_stored(peaked())["motor-torque"]
+    figure = torques(peaked())
     first, second = figure.axes
     calm = np.delete(peaked().read("tau_motor")[..., 0], np.s_[95:105], axis=0)
     low, high = first.get_ylim()
@@ -42,7 +46,7 @@ def test_a_near_singular_peak_is_cut_off_and_its_height_is_written() -> None:
 
 
 def test_peaks_downwards_are_marked_below() -> None:
-    first = plot_stored(peaked(-1e4))["motor-torque"].axes[0]
+    first = torques(peaked(-1e4)).axes[0]
     assert [text.get_text() for text in first.texts] == ["-10000"]
     assert [line.get_marker() for line in first.lines].count("v") == 1
 
@@ -51,7 +55,7 @@ def test_peaks_downwards_are_marked_below() -> None:
     ("peak", "flags"), [(1e4, 0), (1e4, Flag.MOTOR_TORQUE_LIMIT), (90.0, Flag.NEAR_SINGULAR)]
 )
 def test_other_peaks_are_shown_whole(peak: float, flags: int) -> None:
-    figure = plot_stored(peaked(peak, flags))["motor-torque"]
+    figure = torques(peaked(peak, flags))
     assert figure.axes[0].get_ylim()[1] > peak
     assert "cut off, near-singular" not in legend(figure)
 
@@ -59,7 +63,7 @@ def test_other_peaks_are_shown_whole(peak: float, flags: int) -> None:
 def test_a_run_that_is_near_singular_throughout_is_shown_whole() -> None:
     result = peaked()
     result.read("flags")[:] = Flag.NEAR_SINGULAR
-    assert plot_stored(result)["motor-torque"].axes[0].get_ylim()[1] > 1e4
+    assert torques(result).axes[0].get_ylim()[1] > 1e4
 
 
 def test_what_does_not_grow_near_singular_steps_is_shown_whole() -> None:
@@ -94,9 +98,9 @@ def test_limits_in_sight_are_drawn_and_within_the_panel() -> None:
 
 def test_limits_far_off_do_not_flatten_curves() -> None:
     result = rest_to_rest(401)
-    before = plot_stored(result)["motor-torque"].axes[0].get_ylim()
+    before = torques(result).axes[0].get_ylim()
     result.bounds["tau_motor"] = np.tile([-1000.0, 1000.0], (3, 2, 1))
-    figure = plot_stored(result)["motor-torque"]
+    figure = torques(result)
     assert figure.axes[0].get_ylim() == before
     assert "limit" not in legend(figure)
 
