@@ -86,16 +86,17 @@ def plot(
 
     shown = _Shown(joints or (), _span(start, end), variables)
     with Outputs(overwrite=overwrite, inputs=files) as outputs:
+        studies = _are_studies(files)
+        if studies and shown != _EVERYTHING:
+            raise click.UsageError("times, joints and variables can be chosen of results, not of studies")
         if file_format == "html":
             from vsacli.cli.plot_page import write_page
 
-            if shown != _EVERYTHING:
-                raise click.UsageError("a page shows all joints, variables and times, and zooms in itself")
-            paths = [Path(file) for file in files]
-            write_page(paths, Path(folder), outputs, talk, studies=_are_studies(files))
-        elif _are_studies(files):
-            if shown != _EVERYTHING:
-                raise click.UsageError("times, joints and variables can be chosen of results, not of studies")
+            if shown._replace(span=_EVERYTHING.span) != _EVERYTHING:
+                raise click.UsageError("a page shows all joints and variables; leave these options out")
+            span = None if studies else shown.span
+            write_page([Path(file) for file in files], span, Path(folder), outputs, talk)
+        elif studies:
             _draw_studies([Path(file) for file in files], Path(folder), file_format, outputs)
         elif len(files) == 1:
             _draw_file(Path(files[0]), shown, Path(folder), file_format, outputs, talk)

@@ -17,8 +17,10 @@ LONG_PAGE = 2_000_000
 """Samples, of all files together, from which on a page takes so long that its progress is shown."""
 
 
-def write_page(paths: list[Path], folder: Path, outputs: Outputs, talk: Talk, *, studies: bool) -> None:
-    """Write the page of results, of simulations, or of studies.
+def write_page(
+    paths: list[Path], span: tuple[float, float] | None, folder: Path, outputs: Outputs, talk: Talk
+) -> None:
+    """Write the page of results, or of simulations, over a stretch of time; of studies if there is none.
 
     Raises:
         InputError: nothing can be drawn from these files, they do not belong together, or what a page needs
@@ -27,18 +29,20 @@ def write_page(paths: list[Path], folder: Path, outputs: Outputs, talk: Talk, *,
     """
     outputs.folder(folder)
     page = outputs.file(folder / f"{'-'.join(path.stem for path in paths)}.html")
-    page.write_text(_studies(paths) if studies else _results(paths, talk))
+    page.write_text(_studies(paths) if span is None else _results(paths, span, talk))
 
 
-def _results(paths: list[Path], talk: Talk) -> str:
+def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
     from vsacli.files.stored_reports import stored_report
     from vsacli.results.pages import result_page
+    from vsacli.results.store.excerpt import Excerpt
     from vsacli.results.store.simulation import open_stored
 
     with ExitStack() as stack:
-        files = [stack.enter_context(open_stored(path)) for path in paths]
-        for each in files:
+        whole = [stack.enter_context(open_stored(path)) for path in paths]
+        for each in whole:
             talk.detail(result_line(each))
+        files = [Excerpt(each, (), span) for each in whole]
         reports = [stored_report(each.kind, each.report_json) for each in files]
         samples = sum(each.samples for each in files)
 

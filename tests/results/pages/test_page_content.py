@@ -48,8 +48,8 @@ def page(feasible_result: Path, tmp_path_factory: pytest.TempPathFactory) -> Pag
 
 
 def test_a_page_says_verdict_and_report_before_anything_else(page: Page) -> None:
-    body = page.text[page.text.index("vsa-3r, rest-to-rest: 401 steps") :]
-    assert re.match(r"vsa-3r, rest-to-rest: 401 steps\s*ok\s*Report\s*joint", body)
+    body = page.text[page.text.index("vsa-3r, rest-to-rest: 401 steps, 0 to 4 s") :]
+    assert re.match(r"vsa-3r, rest-to-rest: 401 steps, 0 to 4 s\s*ok\s*Report\s*joint", body)
     assert body.index("self-check passed") < body.index("Inputs and provenance")
 
 
@@ -152,10 +152,17 @@ def test_a_peak_of_one_sample_survives(vsacli: Any, tmp_path: Path) -> None:
     assert vsacli("invdyn", ROBOT, motion, "-o", "long.h5", "-q", "--variables", "q,tau_e,flags").code == 0
     with h5py.File("long.h5", "r+") as file:
         file["tau_e"][4321, 0] = 777.0
-    page = page_of(vsacli, "long.h5")
+    whole = _base_torque(page_of(vsacli, "long.h5"))
+    assert whole.max() == 777.0
+    assert whole.size < 8001
+    part = page_of(vsacli, "long.h5", "--from", 2, "--to", 3)
+    assert part.data["span"] == [0, 1]
+    assert (_base_torque(part).max(), _base_torque(part).size) == (777.0, 2001)
+
+
+def _base_torque(page: Page) -> np.ndarray:
     [values] = [page.array(each["values"]) for each in page.chart("tau_e")["series"] if each["joint"] == 0]
-    assert values.max() == 777.0
-    assert values.size < 8001
+    return values
 
 
 def test_scripts_are_those_that_the_policy_names_and_nothing_leads_outside(page: Page) -> None:
@@ -243,6 +250,8 @@ def test_a_recorded_motion_has_bands_and_doubtful_ends(vsacli: Any, feasible_res
         page.array(base["band"][1]), q + 2 * deviation, atol=2 * SINGLE * np.abs(q).max()
     )
     assert page.chart("q")["band"] == "two standard deviations"
+    inside = page_of(vsacli, "again.h5", "--from", 1, "--to", 3)
+    assert inside.data["files"][0]["doubtful"] == []
 
 
 WRONG = [{"fits": 3}, {"fits": [3]}, {"fits": [{"columns": [{"doubtful": {"start": "long", "end": 0}}]}]}]

@@ -91,8 +91,9 @@ def _after(start: float, spans: Sequence[Sequence[float]]) -> list[list[float]]:
 
 def _facts(file: StoredResult, label: str, report: ReportText) -> Facts:
     ended = "" if file.complete else ", ended early"
+    first, last = file.time[[0, -1]].tolist()
     steps = "1 step" if file.samples == 1 else f"{file.samples} steps"
-    title = f"{file.robot_name}, {label}: {steps}{ended}"
+    title = f"{file.robot_name}, {label}: {steps}, {first:g} to {last:g} s{ended}"
     inputs = [input_text(each) for each in file.inputs()]
     tone = "good" if file.verdict == "ok" else "fair" if file.verdict in FAIR else "bad"
     provenance = provenance_rows(file.provenance())

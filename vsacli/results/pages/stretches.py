@@ -49,5 +49,8 @@ def doubtful(result: StoredResult) -> Spans:
         start, end = (max((float(each[side]) for each in ends), default=0.0) for side in ("start", "end"))
     if not start and not end:
         return []
-    first, last = float(result.time[0]), float(result.time[-1])
-    return [[first, min(first + start, last)], [max(last - end, first), last]]
+    first, last = result.whole_span()
+    shown = float(result.time[0]), float(result.time[-1])
+    spans = (first, first + start), (last - end, last)
+    clipped = [[max(ends[0], shown[0]), min(ends[1], shown[1])] for ends in spans]
+    return [span for span in clipped if span[0] < span[1]]

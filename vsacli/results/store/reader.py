@@ -158,6 +158,16 @@ class StoredResult(StoredFile):
             raise ValueError("joints and times do not fit together")
         return int(shape[0])
 
+    def whole_span(self) -> tuple[float, float]:
+        """First and last time of the run, also of an excerpt of it, s.
+
+        Raises:
+            InputError: they are damaged.
+        """
+        with reporting_damage(self.path, "time"):
+            stored = self._dataset("time")
+            return float(stored[0]), float(stored[-1])
+
     @cached_property
     def time(self) -> FloatArray:
         """Times, (samples,), s.
