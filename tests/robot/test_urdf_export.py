@@ -5,12 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 import xml.etree.ElementTree as ElementTree
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 import pytest
 from samples.marks import slow
-from samples.robots import ODD_GRAVITY, random_motion, random_robot, vsa_3r
+from samples.robots import ODD_GRAVITY, random_motion, random_robot, robot_of_ones, vsa_3r
 from samples.shipped import shipped_robot
 
 from vsacli import Placeholders, forward_kinematics, import_urdf
@@ -61,6 +62,29 @@ CHAINS = [(types, seed) for types in ("RRR", "RPRP", "PPR") for seed in range(3)
 def test_random_chains_come_back(types, seed, tmp_path):
     robot = dataclasses.replace(random_robot(types, seed), base=BASE, tool=TOOL)
     check_same(robot, imported(robot, tmp_path))
+
+
+def test_rods_lie_between_the_origins():
+    """Both ends of each cylinder are origins of frames i - 1 and i."""
+    robot, q = dataclasses.replace(robot_of_ones("RRPR"), base=BASE), np.zeros(4)
+    origins = [np.array(BASE.xyz), *forward_kinematics(robot, q)[:-1, :3, 3]]
+    links = {link.get("name"): link for link in ElementTree.fromstring(urdf_model(robot).text).iter("link")}
+    for joint, pose, ends in zip(robot.joints, forward_kinematics(robot, q), pairwise(origins), strict=False):
+        visual = links[f"{joint.name}_link"].find("visual")
+        (x, y, z), (_, pitch, _) = (
+            map(float, visual.find("origin").get(name).split()) for name in ("xyz", "rpy")
+        )
+        half = float(visual.find("geometry/cylinder").get("length")) / 2
+        axis = half * np.array([math.sin(pitch), 0, math.cos(pitch)])
+        to_link = np.linalg.inv(rotation_x(joint.dh.alpha))  # from the frame of the link to frame i
+        for end, sign in zip(ends, (-1, 1), strict=True):
+            local = to_link @ (np.array([x - joint.dh.a, y, z]) + sign * axis)
+            np.testing.assert_allclose(pose[:3, :3] @ local + pose[:3, 3], end, atol=1e-14)
+
+
+def rotation_x(angle):
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
 
 
 def test_pinocchio_reads_it(tmp_path):

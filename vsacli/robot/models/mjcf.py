@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 from vsacli.base.version import __version__
 from vsacli.robot.joint import Joint, Pose
 from vsacli.robot.model import Robot
+from vsacli.robot.models.drawing import arm_length, rod_radius
 from vsacli.robot.models.exported_model import ExportedModel
 from vsacli.robot.models.mjcf_drive import Sections, add_dampers, add_drive
 from vsacli.robot.models.mjcf_lever import DRAWN, GHOST, draw_rod
@@ -26,9 +27,6 @@ LOWEST_VERSION = "3.7"
 
 TIME_STEP = 1e-3
 """s. With torques that are known at each stage, the motion of the shipped 3R is 4e-13 rad off with it."""
-
-THICKNESS_SHARE = 0.07
-"""Radius of a drawn link as a share of the mean length of links."""
 
 SEEN = 2
 """Size of what a viewer shows at first, as a multiple of the length of the arm."""
@@ -48,12 +46,11 @@ def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     element(root, "compiler", angle="radian")
     option = element(root, "option", gravity=robot.gravity, integrator="RK4", timestep=TIME_STEP)
     element(option, "flag", contact="disable")
-    lengths = [math.hypot(joint.dh.a, joint.dh.d) for joint in robot.joints]
-    element(root, "statistic", center=robot.base.xyz, extent=SEEN * sum(lengths) or 1)
+    element(root, "statistic", center=robot.base.xyz, extent=SEEN * arm_length(robot))
     _add_light(root)
     sections = Sections(*(element(root, tag) for tag in ("worldbody", "tendon", "actuator")))
     body = _placed(sections.world, "base", robot.base)
-    radius = THICKNESS_SHARE * (sum(lengths) / len(lengths) or 1)
+    radius = rod_radius(robot)
     for joint in robot.joints:
         below, body = body, _link(body, joint, radius)
         add_drive(sections, joint, below, body)

@@ -6,6 +6,7 @@ the file needs NumPy and MuJoCo alone.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -31,9 +32,10 @@ MuJoCo has one such callback for all models; this one leaves others alone. While
 no model: mujoco.set_mjcb_passive(None) takes it away.
 """
 
-from numpy import *
+from numpy import {imports}
 
 JOINTS = {joints}
+
 
 {function}
 
@@ -94,7 +96,9 @@ def forces_text(robot: Robot) -> str | None:
     names = [name for joint in joints for name in _coordinates(joint)]
     program = trace(lambda rows: _forces(joints, rows), [Kind.REAL] * (2 * len(names)))
     function = function_text(program, "forces", {"positions": len(names), "velocities": len(names)})
+    words = set(re.findall(r"[a-z]\w*", function))
     return _TEXT.format(
+        imports=", ".join(sorted({"array", "errstate", *(word for word in words if hasattr(np, word))})),
         name=one_line(robot.name).replace('"', "'").replace("\\", "/"),
         version=__version__,
         words=forces_words(robot),

@@ -17,6 +17,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.version import __version__
 from vsacli.robot.joint import UNBOUNDED, Joint
 from vsacli.robot.model import Robot
+from vsacli.robot.models.drawing import rod_radius
 from vsacli.robot.models.exported_model import ExportedModel
 from vsacli.robot.models.start import Start
 from vsacli.robot.models.xml_text import Element, add, document, element
@@ -46,7 +47,7 @@ def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     for joint in robot.joints:
         link = f"{joint.name}_link"
         dh = joint.dh
-        _add_link(root, link, joint)
+        _add_link(root, link, joint, rod_radius(robot))
         moving = _add_joint(root, joint.name, _type(joint), parent, link)
         _place(moving, end @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
         _add_drive(moving, joint)
@@ -58,10 +59,10 @@ def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     return ExportedModel(document(root, f"{robot.name}, by vsacli {__version__}"), None, notes)
 
 
-def _add_link(root: Element, name: str, joint: Joint) -> None:
+def _add_link(root: Element, name: str, joint: Joint, radius: float) -> None:
     """A link; what is known along the axes of its Denavit-Hartenberg frame stays as it is known there."""
-    link = joint.link
-    body = element(element(root, "link", name=name), "inertial")
+    link, whole = joint.link, element(root, "link", name=name)
+    body = element(whole, "inertial")
     end = pose_matrix((joint.dh.a, 0, 0), (joint.dh.alpha, 0, 0))
     com = end[:3, :3] @ np.array(link.com) + end[:3, 3]
     element(body, "origin", xyz=com, rpy=(joint.dh.alpha, 0, 0))
@@ -69,6 +70,19 @@ def _add_link(root: Element, name: str, joint: Joint) -> None:
     inertia = link.inertia
     entries = {f"i{name}": getattr(inertia, name) for name in ("xx", "xy", "xz", "yy", "yz", "zz")}
     element(body, "inertia", **entries)
+    _draw(whole, joint, radius)
+
+
+def _draw(link: Element, joint: Joint, radius: float) -> None:
+    """A rod from origin to origin of the Denavit-Hartenberg frames, which nothing collides with."""
+    a, d = joint.dh.a, joint.dh.d
+    visual = element(link, "visual")
+    element(visual, "origin", xyz=(a / 2, 0, -d / 2), rpy=(0, math.atan2(a, d), 0))
+    length = math.hypot(a, d)
+    if length > radius:
+        element(element(visual, "geometry"), "cylinder", radius=radius, length=length)
+    else:
+        element(element(visual, "geometry"), "sphere", radius=radius)
 
 
 def _add_joint(root: Element, name: str, kind: str, parent: str, child: str) -> Element:
