@@ -120,7 +120,7 @@ def test_the_chain_moves_as_forward_kinematics_says(page: Page, feasible_result:
     with h5py.File(feasible_result) as stored:
         poses = forward_kinematics(robot, stored["q"][...])
     origins = page.array(chain["origins"]).reshape(401, 5, 3)
-    np.testing.assert_allclose(origins[:, 1:], poses[..., :3, 3], atol=2 * SINGLE * chain["reach"])
+    np.testing.assert_allclose(origins[:, 1:], poses[..., :3, 3], atol=2 * SINGLE)  # within 1 m
     axes = page.array(chain["axes"]).reshape(401, 3, 3)
     np.testing.assert_allclose(axes[:, 1:], poses[:, :2, :3, 2], atol=2 * SINGLE)
     elbows = page.array(chain["elbows"]).reshape(401, 3, 3)

@@ -27,14 +27,12 @@ class ChainMotion(Published):
         elbows: where the common normal of two axes meets the first, (instants, joints, 3): from the frame
             before, along its z axis, to there reaches the offset d, and from there to the next frame a.
         axes: unit vectors along the axes of the joints, (instants, joints, 3).
-        reach: no point is further from frame 0.
     """
 
     time: int
     origins: int
     elbows: int
     axes: int
-    reach: float
 
 
 def chain_motion(result: StoredResult, start: float, packed: Packed) -> ChainMotion | None:
@@ -57,11 +55,9 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> ChainMot
     lengths = np.array([joint.dh.a for joint in geometry.joints])
     normals = np.stack([frame.axes[..., 0] for frame in frames[1:-1]], axis=1)
     axes = np.stack([frame.axes[..., 2] for frame in frames[:-2]], axis=1)
-    away = np.linalg.norm(origins - origins[:1, :1], axis=-1)
     return ChainMotion(
         time=packed.add(result.time[steps] - start),
         origins=packed.add(origins),
         elbows=packed.add(origins[:, 1:-1] - lengths[:, None] * normals),
         axes=packed.add(axes),
-        reach=float(np.nanmax(away, initial=0.0)) or 1.0,
     )

@@ -76,7 +76,6 @@ def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[
     """What scripts have to know of a file."""
     return {
         "label": label,
-        "samples": file.samples,
         "troubles": {
             kind: [_after(start, spans) for spans in joints] for kind, joints in troubles(file).items()
         },
