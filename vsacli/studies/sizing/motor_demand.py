@@ -60,9 +60,9 @@ class MotorDemand:
         return shaft_signals(self.velocity, self.acceleration, self.load)
 
     def mean(self, values: FloatArray) -> FloatArray:
-        """Over time, of the last axis; NaN if no time passes."""
-        total = self.weight.sum()
-        mean: FloatArray = values @ self.weight / total if total else np.full(values.shape[:-1], np.nan)
+        """Over time, of the last axis; over the steps if no two that follow each other can be done."""
+        weight = self.weight if self.weight.any() else np.ones_like(self.weight)
+        mean: FloatArray = values @ weight / weight.sum()
         return mean
 
     @cached_property

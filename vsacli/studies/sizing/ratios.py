@@ -74,7 +74,10 @@ def shares(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
 def rms_torque(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
     """Root mean square over time of torques on shafts, (motors,)."""
     coefficients = shafts.coefficients(ratio)
-    return np.sqrt(_mean_product(coefficients, demand.moments, coefficients))
+    square = _mean_product(coefficients, demand.moments, coefficients)
+    return np.sqrt(
+        np.maximum(square, 0.0)
+    )  # where load and rotor cancel, rounding may leave less than nothing
 
 
 def _peaks(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
