@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
+from samples.marks import slow_but
 from samples.results import PlannedTrajectory, writing
 
 from vsacli.dynamics.limits import limit_checks
@@ -19,7 +20,11 @@ NOT_STORED = ("tau_e",)
 """What a spring carries at most, which follows from its law."""
 
 
-@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
+QUICK = [path for path in ROBOTS if path.stem in ("scara_4", "compact_1r", "coupled_1r", "hardening_1r")]
+"""Joints of both types, one motor and two, dampers, springs with and without limits."""
+
+
+@pytest.mark.parametrize("path", slow_but(QUICK, ROBOTS), ids=lambda path: path.stem)
 def test_bounds_of_a_file_are_those_that_steps_are_checked_against(path: Path, tmp_path: Path) -> None:
     robot = load_robot(path)
     with writing(tmp_path / "r.h5", robot, PlannedTrajectory(1)) as writer:

@@ -94,6 +94,7 @@ def test_stiffness_is_drawn_inside_what_can_be_reached(page: Page, feasible_resu
     assert bottom < 800 < 1275 < top
 
 
+@pytest.mark.slow
 def test_limits_are_those_of_the_robot(vsacli: Any) -> None:
     files = [REPOSITORY / folder / "scara_4.yaml" for folder in ("robots", "trajectories")]
     assert vsacli("invdyn", *files, "-o", "r.h5").code == 0
