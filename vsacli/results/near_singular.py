@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,19 +34,25 @@ class CalmRange(NamedTuple):
     above: bool
 
 
-def calm_range(values: FloatArray, calm: BoolArray) -> CalmRange | None:
+def calm_range(curves: Sequence[FloatArray], calm: Sequence[BoolArray]) -> CalmRange | None:
     """The range of an axis for all curves of a panel; None if no point is far beyond the calm ones.
 
+    Half of the points of each curve that are not calm are shown as well: a curve that is near-singular from
+    one end of the panel to the other does not vanish from it.
+
     Args:
-        values: of all points, (points,); NaN where there is none.
+        curves: values of each, (points,); NaN where there is none.
         calm: which of them are not nearly singular.
     """
-    there = np.isfinite(values)
-    calm = there & calm
-    if not calm.any():
+    finite = [np.isfinite(values) for values in curves]
+    steady = np.concatenate([each[there & at] for each, there, at in zip(curves, finite, calm, strict=True)])
+    if not steady.size:
         return None
-    low, high = float(values[calm].min()), float(values[calm].max())
-    least, most = float(values[there].min()), float(values[there].max())
+    near = [each[there & ~at] for each, there, at in zip(curves, finite, calm, strict=True)]
+    shown = np.concatenate([steady, [np.median(each) for each in near if each.size]])
+    low, high = float(shown.min()), float(shown.max())
+    every = np.concatenate([steady, *near])
+    least, most = float(every.min()), float(every.max())
     size = high - low or abs(high) or 1.0
     below, above = least < low - TOLERATED * size, most > high + TOLERATED * size
     if not below and not above:

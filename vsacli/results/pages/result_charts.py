@@ -145,7 +145,7 @@ class ResultCharts:
         places = [(file, row, joint) for file in range(len(curves)) for row in rows for joint in joints]
         values = [curves[file][joint].values[row] for file, row, joint in places]
         calm = [self._failures[file].calm(joint, curves[file][joint].time) for file, _, joint in places]
-        found = calm_range(np.concatenate(values), np.concatenate(calm))
+        found = calm_range(values, calm)
         return None if found is None else (found.bottom, found.top)
 
     def _series(self, joint: int, file: int, role: str, curve: Banded, **further: Any) -> Series:

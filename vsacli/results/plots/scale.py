@@ -40,8 +40,7 @@ def cut_peaks(axes: Axes, curves: Sequence[Peaked]) -> list[Artist]:
     Returns:
         What a legend shows for the marks.
     """
-    values = np.concatenate([curve.values for curve in curves])
-    found = calm_range(values, np.concatenate([curve.calm for curve in curves]))
+    found = calm_range([curve.values for curve in curves], [curve.calm for curve in curves])
     if found is None:
         return []
     bottom, top = found.bottom, found.top
