@@ -10,7 +10,7 @@ import sys
 import h5py
 import mujoco
 import pytest
-from samples.command_line import REPOSITORY, ROBOT, contents, installed
+from samples.command_line import REPOSITORY, ROBOT, contents
 
 ROBOTS = REPOSITORY / "robots"
 
@@ -142,8 +142,3 @@ def test_files_that_exist_are_kept(vsacli, tmp_path):
     done = vsacli("export", ROBOTS / "awas_1r.yaml", "--format", "mjcf", "-o", "awas.xml")
     assert done.code == 4
     assert contents(tmp_path) == {"awas_forces.py": b"precious"}
-
-
-def test_the_installed_command_writes_a_model(tmp_path):
-    done = installed("export", ROBOT, "--format", "urdf", folder=tmp_path)
-    assert (done.returncode, done.stdout.count("<link ")) == (0, 5)

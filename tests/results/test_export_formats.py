@@ -10,6 +10,7 @@ import pytest
 import yaml
 from pyarrow import parquet
 from samples.joint_trajectory import check_message, nanoseconds
+from samples.marks import slow_but
 from samples.results import STORED, python, random_block, write_result
 from scipy.io import loadmat
 
@@ -19,7 +20,7 @@ from vsacli.results.exports import FORMATS, mat_file, selection
 from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
 from vsacli.results.store.reader import StoredResult
 
-SAMPLES = 241
+SAMPLES, FEW = 241, 40
 MOTION = ["q", "dq", "ddq", "tau_e"]
 
 
@@ -121,9 +122,9 @@ def test_parquet_comes_in_groups_of_rows(stored, monkeypatch):
 
 @pytest.mark.parametrize("read", [json.loads, yaml.safe_load])
 def test_a_joint_trajectory_is_the_message_in_json_and_in_yaml(stored, read):
-    block = random_block(SAMPLES, 2)
-    odd = np.tile([5e-324, -0.0, 1.7976931348623157e308, 1e22, 1e-5, -1.5e-300, 3.0], SAMPLES)[: 2 * SAMPLES]
-    block = Block(**{**block.arrays(), "dq": odd.reshape(SAMPLES, 2), "time": block.time + 0.25})
+    block = random_block(FEW, 2)
+    odd = np.tile([5e-324, -0.0, 1.7976931348623157e308, 1e22, 1e-5, -1.5e-300, 3.0], FEW)[: 2 * FEW]
+    block = Block(**{**block.arrays(), "dq": odd.reshape(FEW, 2), "time": block.time + 0.25})
     message = read(exported(stored(block), "joint-trajectory").read())
     check_message(message)
     assert message["joint_names"] == ["j0", "j1"]
@@ -132,7 +133,7 @@ def test_a_joint_trajectory_is_the_message_in_json_and_in_yaml(stored, read):
         values = np.array([point[field] for point in message["points"]])
         assert values.tobytes() == np.ascontiguousarray(getattr(block, name)).tobytes(), name
     times = [nanoseconds(point["time_from_start"]) for point in message["points"]]
-    assert times == [1_000_000 * step for step in range(SAMPLES)]
+    assert times == [1_000_000 * step for step in range(FEW)]
 
 
 def test_a_joint_trajectory_leaves_out_fields_that_are_not_asked_for(stored):
@@ -236,7 +237,7 @@ except StorageError as error:
 """
 
 
-@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("name", slow_but(["parquet"], FORMATS))
 def test_a_full_disk_leaves_no_file(tmp_path, name):
     write_result(tmp_path / "r.h5", random_block(SAMPLES, 2))
     output, errors = python(FULL, name, folder=tmp_path).communicate()
