@@ -7,13 +7,8 @@ python docs/generate.py --check    changes nothing; exit code 1 if a part is sta
 from __future__ import annotations
 
 import math
-import os
 import re
-import shutil
-import subprocess
 import sys
-import sysconfig
-import tempfile
 import textwrap
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -23,10 +18,8 @@ from typing import Any
 import click
 from click.testing import CliRunner
 from field_tables import record_sections, table, variant_sections
-from five_figures import draw as draw_five_figures
-from noise_study import draw as draw_noise
 from noise_study import table_rows
-from page_picture import take_picture
+from page_images import draw_images
 from python_names import public_names
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
@@ -53,15 +46,6 @@ from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 ROBOT = ROOT / "robots" / "vsa_3r.yaml"
-IMAGES = ROOT / "docs" / "images"
-
-DRAWING = ("gallery.md", "optimisation.md", "pages.md", "sizing.md", "studies.md")
-"""Pages whose commands draw the figures of the tool, wherever they are shown."""
-
-FILE_OR_COMMANDS = re.compile(
-    r"(?:^Save as `(?P<name>\S+)`:\n\n)?^```(?:yaml|csv|sh)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
-)
-IMAGE = re.compile(r"\]\(images/(\S+\.png)\)")
 
 HELP_WIDTH = 80
 END = "<!-- end of generated part -->"
@@ -325,33 +309,6 @@ def stale(pages: Iterable[Path] = PAGES) -> list[Path]:
     return [page for page, text in texts.items() if text != regenerated(text)]
 
 
-def draw_images() -> None:
-    """Draw the pictures of the pages: those of the tool by the commands that stand beside them."""
-    shown = {name for page in PAGES for name in IMAGE.findall(page.read_text(encoding="utf-8"))}
-    with tempfile.TemporaryDirectory() as folder:
-        for name in ("robots", "trajectories"):
-            shutil.copytree(ROOT / name, Path(folder) / name)
-        for page in DRAWING:
-            _do_what_it_says(ROOT / "docs" / page, Path(folder))
-        for drawn in Path(folder).rglob("*.png"):
-            if drawn.name in shown:
-                shutil.copy(drawn, IMAGES)
-        take_picture(Path(folder) / "pages" / "hasty.html", IMAGES / "page.png")
-    draw_noise(IMAGES / "recorded-noise.png")
-    draw_five_figures(IMAGES)
-
-
-def _do_what_it_says(page: Path, folder: Path) -> None:
-    """Save the files of a page and run its commands; that they work is for the tests."""
-    path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
-    for block in FILE_OR_COMMANDS.finditer(page.read_text(encoding="utf-8")):
-        if block["name"]:
-            (folder / block["name"]).write_text(block["text"], encoding="utf-8")
-        else:
-            environment = {**os.environ, "PATH": path}
-            subprocess.run(["sh", "-c", block["text"]], cwd=folder, env=environment, check=False)
-
-
 def main() -> int:
     """Run the script; returns its exit code."""
     if "--check" in sys.argv[1:]:
@@ -360,7 +317,7 @@ def main() -> int:
         return 1 if outdated else 0
     for page in PAGES:
         page.write_text(regenerated(page.read_text(encoding="utf-8")), encoding="utf-8")
-    draw_images()
+    draw_images(PAGES)
     return 0
 
 
