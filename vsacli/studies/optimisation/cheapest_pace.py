@@ -10,13 +10,20 @@ from vsacli.base.arrays import FloatArray
 from vsacli.studies.optimisation.interior_point import Minimum
 from vsacli.studies.optimisation.paced_joints import CLEARANCE, PacedJoint
 from vsacli.studies.optimisation.paced_motion import PacedMotion
-from vsacli.studies.optimisation.paced_search import STIFFER, PacedSearch, Start
+from vsacli.studies.optimisation.paced_search import PacedSearch, Start
 from vsacli.studies.optimisation.paced_splines import PacedSpaces
 from vsacli.studies.optimisation.separable import Group, SeparableProblem
 from vsacli.studies.optimisation.smoothing import smoothed_minimum
 
+STIFFER = 1.0, 1.5, 2.0
+"""Multiples of that stiffness to begin with."""
+
 DRAWN_PACES = 0.6, 1.6
 """Paces between which those that are drawn lie, before they are scaled to the duration."""
+
+LIFTED = 1.1
+"""Multiple of a stiffness with which a search begins: from an end of the corridor, where the best often is, a
+pendulum took more than two hundred steps, and from here fifty."""
 
 FIRST_LEVEL = 1.05
 """Multiple of what a level bounds, to begin with."""
@@ -57,14 +64,14 @@ class CheapestPaceSearch(PacedSearch):
         return kind(self._span, pieces, self._varied).lasting_as_commanded()
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
-        """The pace as commanded with some stiffnesses, and the stiffness as commanded with drawn paces."""
-        asked = {joint: self._motion.stiffness(joint) for joint in self._varied}
+        """The pace as commanded with some stiffnesses, and drawn paces with the first of these."""
+        asked = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
         even = np.ones_like(self._s)
-        as_commanded = self._levelled(spaces, spaces.fitted(self._s, even, asked))
-        inside = as_commanded if self._kept(spaces, as_commanded) else None
+        first = self._levelled(spaces, spaces.fitted(self._s, even, asked))
+        inside = first if self._kept(spaces, first) else None
         stiffer = [
             {joint: multiple * row for joint, row in asked.items()}
-            for multiple in (STIFFER if self._varied else STIFFER[:1])
+            for multiple in (STIFFER if self._varied else (1.0,))
         ]
         wanted = [spaces.fitted(self._s, even, stiffness) for stiffness in stiffer]
         wanted += [
@@ -74,7 +81,7 @@ class CheapestPaceSearch(PacedSearch):
         return [(self._levelled(spaces, unknowns), inside) for unknowns in wanted]
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
-        stiffness = {key: row for key, row in rows.items() if key is not None}
+        stiffness = {key: LIFTED * row for key, row in rows.items() if key is not None}
         return self._levelled(spaces, spaces.fitted(self._s, rows[None], stiffness)), None
 
     def _kept(self, spaces: PacedSpaces, unknowns: FloatArray) -> bool:
