@@ -91,7 +91,7 @@ def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
     weak = edited(arm, tmp_path / "weak.yaml", ("gear_ratio: 100", "gear_ratio: 100, max_torque: 5"))
     done = vsacli("size", weak, swing)
     assert done.code == 3
-    assert "its limits do not suffice, it would use" in done.out
+    assert "its limits do not suffice, it uses" in done.out
 
 
 @pytest.mark.parametrize(

@@ -140,5 +140,5 @@ class MotorSizing(Published):
             rms_load=demand.rms(demand.load),
             velocity=demand.peak(demand.velocity),
             acceleration=demand.peak(demand.acceleration).value,
-            power=float((demand.load * demand.velocity).max(initial=0.0)),
+            power=max(0.0, float((demand.load * demand.velocity).max())),
         )

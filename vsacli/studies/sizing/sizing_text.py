@@ -128,7 +128,7 @@ def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
             with_gear = f"{motor.best.motor} with the gear {motor.best.ratio:.4g}"
             yield f"{motor.name}: no motor does; nearest is {with_gear}, which would use {_listed(beyond)}"
         else:
-            reason = f"it would use {_listed(beyond)}{_other_gears(motor)}"
+            reason = f"it uses {_listed(beyond)}{_other_gears(motor)}"
             yield f"{motor.name}: its limits do not suffice, {reason}"
 
 

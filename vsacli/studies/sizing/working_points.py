@@ -60,7 +60,7 @@ class WorkingPoints(Published):
             rms_torque=rms,
             velocity=demand.peak(velocities),
             rms_velocity=demand.rms(velocities),
-            power=float((torques * velocities).max(initial=0.0)),
+            power=max(0.0, float((torques * velocities).max())),
             current=peak.value / shaft.torque_constant,
             rms_current=rms / shaft.torque_constant,
             voltage=float(np.abs(voltages).max()),
