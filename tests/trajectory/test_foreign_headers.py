@@ -211,3 +211,11 @@ def test_files_whose_stamps_begin_at_other_instants_are_not_combined(tmp_path):
     )
     with pytest.raises(InputError, match=rf"b.csv: times begin with {FIRST + 1}, but {FIRST} in .*a.csv"):
         load_trajectory(tmp_path / "motion.yaml", ROBOT)
+
+
+def test_a_table_without_any_known_column_is_one_problem(tmp_path):
+    (tmp_path / "log.csv").write_text(EXPORTS["rostopic"](motion()).content)
+    with pytest.raises(InputError) as caught:
+        load_trajectory(tmp_path / "log.csv", ROBOT)
+    (problem,) = caught.value.problems
+    assert problem.message.startswith("has no column of a trajectory (time, shoulder.q, ...); `vsacli info ")

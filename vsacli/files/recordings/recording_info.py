@@ -39,6 +39,9 @@ TOGETHER = 16
 AS_WRITTEN = "-"
 """In place of a unit: numbers are shown as they stand."""
 
+JITTERS = "jitters"
+"""How the fault of stamps begins that equal steps mend."""
+
 FEWEST_ROWS = 10
 """Numbers of a column below which nothing is said of its health."""
 
@@ -73,16 +76,18 @@ def describe_recording(
         "columns": surveyed.columns,
         "warnings": surveyed.warnings,
         "mapping": "\n".join([f"format: {FORMAT}", *lines]),
-        "trajectory": "\n".join(_trajectory(Path(path).name, lines, taken, robot)),
+        "trajectory": "\n".join(_trajectory(Path(path).name, lines, taken, robot, surveyed.rate)),
     }
 
 
 def _trajectory(
-    file: str, mapping: Sequence[str], taken: Sequence[Guess], robot: Robot | None
+    file: str, mapping: Sequence[str], taken: Sequence[Guess], robot: Robot | None, rate: str
 ) -> Iterator[str]:
     """A trajectory file that takes the positions from the recording."""
     yield f"format: {trajectory_file.FORMAT}"
     yield "name: recorded"
+    if rate:
+        yield f"# rate: {rate}  # stamps jitter; this makes the steps of the torques equal"
     yield "position:"
     yield "  type: csv"
     yield f"  file: {for_yaml(file)}"
@@ -110,6 +115,7 @@ class _Survey:
         time: what is known of the stamps; None without any.
         columns: what is known of each.
         warnings: on their health.
+        rate: 1/s, in a few digits; empty unless stamps jitter.
     """
 
     def __init__(
@@ -120,6 +126,7 @@ class _Survey:
         self.rows = 0
         self.time: dict[str, Any] | None = None
         self.warnings: list[str] = []
+        self.rate = ""
         stamps = () if time is None else (time.place, time.nanoseconds)
         numbers = [place for place in rows.of_numbers if place not in stamps]
         numbers.sort(key=lambda place: place not in self._guesses)
@@ -189,7 +196,10 @@ class _Survey:
             self.time = self._described(own, unit, table.first_stamp)
             file = Path(self._rows.path).name
             if rising and len(own) > 1:
-                self.warnings += [f"{file}: time {fault.message}" for fault in stamp_faults(own)]
+                faults = [fault.message for fault in stamp_faults(own)]
+                self.warnings += [f"{file}: time {fault}" for fault in faults]
+                if any(fault.startswith(JITTERS) for fault in faults):
+                    self.rate = f"{self.time['rate']:.3g}"
             elif len(stamps) > 1:
                 row = int(np.argmin(np.diff(stamps) > 0)) + 1
                 self.warnings.append(

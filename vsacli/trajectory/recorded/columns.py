@@ -97,6 +97,10 @@ def column_layout(
     expected = [TIME, *_all(way), *(_all(_WRENCH_WAY) if WRENCH in wanted else ())]
 
     known = known_columns(joints)
+    if _is_foreign(names, known):
+        examples = f"{', '.join(expected[:2])}, ..."
+        message = f"has no column of a trajectory ({examples}); {_remedy(file)}"
+        raise InputError.one(message, file, line)
     problems = list(_strangers(names, expected, known))
     problems += [f"column {name!r} appears {n} times" for name, n in Counter(names).items() if n > 1]
     way = way | _WRENCH_WAY
@@ -107,7 +111,8 @@ def column_layout(
         problems += _gaps(names, way, {signal.names[0] for signal in wanted})
     units = [unit for _, unit in headings]
     columns = dict(_measured(names, units, way, joints, problems))
-    problems += _remedy([name for name in names if name not in known], expected, file)
+    if any(name not in known and nearest(name, expected) is None for name in names):
+        problems.append(_remedy(file))
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
     return ColumnLayout(
@@ -160,13 +165,19 @@ def _strangers(header: Sequence[str], expected: Sequence[str], known: Collection
             yield f"unknown column {column!r}{did_you_mean(column, missing)}"
 
 
-def _remedy(strangers: Collection[str], expected: Collection[str], file: str) -> Iterator[str]:
+def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
+    """Whether no column is known but the time, nor like one that is."""
+    columns = [name for name in names if name != TIME]
+    signals = [name for name in known if name != TIME]
+    return bool(columns) and all(name not in known and nearest(name, signals) is None for name in columns)
+
+
+def _remedy(file: str) -> str:
     """What to do about columns with other people's names."""
-    if any(nearest(column, expected) is None for column in strangers):
-        yield (
-            f"`vsacli info {file}` shows how a trajectory file says what columns of other names stand for;"
-            f" ignore: {REST} there leaves out those without use"
-        )
+    return (
+        f"`vsacli info {file}` shows how a trajectory file says what columns of other names stand for;"
+        f" ignore: {REST} there leaves out those without use"
+    )
 
 
 def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[str]:
