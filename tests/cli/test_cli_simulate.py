@@ -71,7 +71,7 @@ def test_feedback_from_a_poles_file(vsacli, quick, tmp_path):
         [0.01, 0, 0.01], abs=1e-9
     )
     assert all(abs(joint["q_error"]["final"]) < 1e-8 for joint in report["joints"])  # 1 s at 25/s
-    names = ("position-error", "stiffness-error", "motor-torque")
+    names = ("motion", "position-error", "stiffness-error", "motor-torque")
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {f"s-{name}.png" for name in names}
     with h5py.File(tmp_path / "s.h5") as file:
         read = [group.attrs["path"] for name, group in file["inputs"].items() if name.startswith("file_")]
