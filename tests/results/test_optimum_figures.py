@@ -31,6 +31,12 @@ def test_a_joint_without_stiffness_has_torques_alone():
     assert labels == ["place on the path [s]", "", "place on the path [s]"]
 
 
+def test_without_any_stiffness_there_are_torques_alone():
+    figure = change_figure([joint("stiff", np.nan)], "arm", along_path=False)
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["stiff: motors"]
+    assert figure.axes[0].get_xlabel() == "time [s]"
+
+
 def test_the_fastest_motion_as_a_whole_is_drawn_where_there_is_one():
     assert texts(pace_figure(TIME, 1 + TIME, np.nan, "arm")) == ["optimum", "as commanded"]
     assert texts(pace_figure(TIME, 1 + TIME, 1.5, "arm"))[-1] == "fastest as a whole"

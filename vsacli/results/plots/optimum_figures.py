@@ -73,14 +73,15 @@ def change_figure(joints: Sequence[JointChange], title: str, *, along_path: bool
         along_path: whether places are on the path, rather than times.
     """
     rows, folds = folding(len(joints), MOST_ROWS)
-    present = np.array([[bool(np.isfinite(joint.after.stiffness).any()), True] for joint in joints])
+    variable = [bool(np.isfinite(joint.after.stiffness).any()) for joint in joints]
+    present = np.array([[has_stiffness, True] for has_stiffness in variable])[:, 0 if any(variable) else 1 :]
     with house_style():
         figure = Figure((2 * PANEL_WIDTH * folds, ROW_HEIGHT * rows + 1), layout="constrained")
         panels = joint_panels(figure.add_gridspec()[0], joints[0].before.place, present, MOST_ROWS)
         handles = [line_handle(line_style(BEFORE), "as commanded"), line_handle(line_style(AFTER), "optimum")]
-        for joint, (stiffness, torque), [variable, _] in zip(joints, panels, present, strict=True):
-            if variable:
-                handles += _draw_stiffness(stiffness, joint)
+        for joint, (*stiffness, torque), has_stiffness in zip(joints, panels, variable, strict=True):
+            if has_stiffness:
+                handles += _draw_stiffness(*stiffness, joint)
             handles += _draw_torques(torque, joint)
         for axes in panels[present] if along_path else ():
             if axes.get_xlabel():
