@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from jsonschema import ValidationError, validate
 from samples.exports import EXPORTS, FIRST, motion, plain
 from samples.shipped import shipped_robot
 
 from vsacli import inverse_dynamics, load_trajectory
 from vsacli.base.errors import InputError
+from vsacli.files.file_kinds import DOCUMENTS
 
 ROBOT = shipped_robot("planar_2r")
 
@@ -219,3 +221,16 @@ def test_a_table_without_any_known_column_is_one_problem(tmp_path):
         load_trajectory(tmp_path / "log.csv", ROBOT)
     (problem,) = caught.value.problems
     assert problem.message.startswith("has no column of a trajectory (time, shoulder.q, ...); `vsacli info ")
+
+
+def test_an_editor_knows_what_may_be_said_of_columns():
+    schema = DOCUMENTS["columns"].schema()
+    said = {
+        "time": {"column": "%time", "unit": "ns"},
+        "a.q": 3,
+        "b.q": {"column": "t", "factor": "2*pi/4096"},
+    }
+    validate({"format": "vsacli-columns/1", "columns": said, "ignore": ["c", 4]}, schema)
+    for wrong in ({"columns": {}}, {"columns": {"time": {"colunm": "a"}}}, {"ignore": "all"}):
+        with pytest.raises(ValidationError):
+            validate({"format": "vsacli-columns/1", **wrong}, schema)
