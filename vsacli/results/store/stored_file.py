@@ -27,9 +27,13 @@ class StoredFile:
     def __init__(self, path: str | Path, file: CheckedFile) -> None:
         self.path = Path(path)
         self._file = file
+        self._checked: dict[str, h5py.Dataset] = {}
 
     def _dataset(self, name: str) -> h5py.Dataset:
-        return bounded(own_dataset(self._file, name))
+        """A dataset, which is checked when it is first asked for."""
+        if name not in self._checked:
+            self._checked[name] = bounded(own_dataset(self._file, name))
+        return self._checked[name]
 
     def _labels(self, name: str, rows: slice = slice(None)) -> tuple[str, ...]:
         return tuple(map(one_line, self._dataset(name).asstr()[rows]))
@@ -45,6 +49,7 @@ class StoredFile:
 
     def close(self) -> None:
         """Close the file."""
+        self._checked.clear()
         self._file.close()
 
     def __enter__(self) -> Self:

@@ -30,7 +30,7 @@ TEXTS = {
 }
 
 
-ROWS_AT_ONCE = 1024
+ROWS_AT_ONCE = 8192
 """That are written together, or as many as have so many steps over time."""
 
 

@@ -95,6 +95,16 @@ class Cluster:
 
     def rows(self, runs: Sequence[int]) -> Iterator[Row]:
         """As of `Rows`."""
+        try:
+            yield from self._rows(runs)
+        except InputError:
+            raise
+        except Exception as error:  # which one it is depends on what was asked when the scheduler went
+            if self._client.status == "running" and not isinstance(error, OSError):
+                raise
+            raise InputError.one(f"the connection to the scheduler {self._address} was lost") from error
+
+    def _rows(self, runs: Sequence[int]) -> Iterator[Row]:
         from distributed import as_completed
 
         waiting, given = deque(runs), dict[str, list[int]]()
@@ -119,7 +129,8 @@ class Cluster:
         """The rows of a task that has ended.
 
         Raises:
-            InputError: no worker can compute, or the cluster has gone.
+            InputError: no worker can compute.
+            FutureCancelledError: the connection was lost.
         """
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
@@ -129,7 +140,7 @@ class Cluster:
         except KilledWorker:
             return [lost(self._study, run, "was killed") for run in runs]
         except FutureCancelledError:
-            raise InputError.one(f"the connection to the scheduler {self._address} was lost") from None
+            raise
         except Exception as error:
             raise InputError.one(_unable(error)) from error
         if found.problems:
