@@ -81,7 +81,7 @@ def change_figure(joints: Sequence[JointChange], title: str, *, along_path: bool
         handles = [line_handle(line_style(BEFORE), "as commanded"), line_handle(line_style(AFTER), "optimum")]
         for joint, (*stiffness, torque), has_stiffness in zip(joints, panels, variable, strict=True):
             if has_stiffness:
-                handles += _draw_stiffness(*stiffness, joint)
+                handles += _draw_stiffness(stiffness[0], joint)
             handles += _draw_torques(torque, joint)
         for axes in panels[present] if along_path else ():
             if axes.get_xlabel():
