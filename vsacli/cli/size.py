@@ -20,9 +20,7 @@ if TYPE_CHECKING:
 @click.command(
     "size",
     short_help="Size motors, gears and springs for motions.",
-    epilog=example(
-        "vsacli size robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --catalogue motors.csv --gear 50..160"
-    ),
+    epilog=example("vsacli size robots/vsa_3r.yaml trajectories/rest_to_rest.yaml --catalogue motors.csv"),
 )
 @robot_argument
 @click.argument("trajectories", nargs=-1, required=True, metavar="TRAJECTORY...", type=FILE)

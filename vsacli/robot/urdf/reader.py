@@ -31,8 +31,8 @@ from vsacli.robot.urdf.link_tree import (
 from vsacli.robot.urdf.rigid_motion import Body, pose_matrix
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
-MACRO = re.compile(r"\$[{(]")
-"""How an expression of xacro begins."""
+MACRO = re.compile(r"\$\{|\$\((anon|arg|dirname|env|eval|find|optenv)\b")
+"""How an expression of xacro begins; names may hold other signs, as a shell's."""
 
 MESH = "filename"
 """Attribute that names a mesh, which nobody opens here."""
