@@ -267,9 +267,7 @@ def test_simulation_on_the_command_line(vsacli: Any, motion: Path) -> None:
 def test_other_kinds_are_refused(vsacli: Any) -> None:
     done = vsacli("info", REPOSITORY / "robots" / "desk_arm.urdf")
     assert done.code == 2
-    assert (
-        "is a file of the kind urdf; expected a robot, a trajectory, a result, a simulation or " in done.err
-    )
+    assert "desk_arm.urdf: is a URDF; make a robot file of it: vsacli import-urdf " in done.err
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (REPOSITORY / "robots").glob("*.yaml")))
