@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,12 @@ from vsacli.cli.console import Talk
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.base.progress import Bar
+    from vsacli.results.pages import RemedyText
+    from vsacli.results.store.reader import StoredResult
+    from vsacli.studies.remedies import Suggestions
+
+MENDABLE = ("infeasible", "singular", "over_limit")
+"""Verdicts on results for which remedies are looked for."""
 
 LONG_PAGE = 2_000_000
 """Samples, of all files together, from which on a page takes so long that its progress is shown."""
@@ -44,13 +51,91 @@ def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
             talk.detail(result_line(each))
         files = [Excerpt(each, (), span) for each in whole]
         reports = [stored_report(each.kind, each.report_json) for each in files]
+        remedies = _remedies(whole, talk)
         samples = sum(each.samples for each in files)
 
         def progress(variables: int) -> AbstractContextManager[Bar]:
             shown_from = 0 if samples >= LONG_PAGE else variables + 1
             return talk.progress(variables, shown_from=shown_from, label="drawing")
 
-        return result_page(files, reports, progress)
+        return result_page(files, reports, remedies, progress)
+
+
+def _remedies(files: list[StoredResult], talk: Talk) -> list[RemedyText | None]:
+    """What would mend each file, None where nothing has to be; how far the search is stands on a terminal."""
+    failed = [each.kind == "result" and each.verdict in MENDABLE for each in files]
+    remedies: list[RemedyText | None] = []
+    with talk.progress(sum(failed), shown_from=1, label="looking for remedies") as bar:
+        for each, mendable in zip(files, failed, strict=True):
+            remedies.append(_remedy(each, talk) if mendable else None)
+            bar.update(int(mendable))
+    return remedies
+
+
+def _remedy(result: StoredResult, talk: Talk) -> RemedyText | None:
+    """What `check-feasibility --suggest` says of the inputs of a result; if it cannot, a note says why."""
+    from vsacli.base.errors import InputError, StorageError
+    from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+    from vsacli.files.repetition import rebuilt
+    from vsacli.results.pages import RemedyText
+    from vsacli.studies.remedies import suggest
+
+    try:
+        provenance = result.provenance()
+        _check_version(provenance["generated_by"], result.path)
+        margin = provenance["options"].get("near_singular", NEAR_SINGULAR_MARGIN)
+        suggestions = suggest(*rebuilt(result), margin)
+    except (InputError, StorageError) as error:
+        reason = str(error).removeprefix(f"{result.path}: ")
+        talk.note(f"{result.path}: no suggestions on its page: {reason}")
+        return None
+    lines = str(suggestions).splitlines()
+    if not suggestions.remedies:
+        return RemedyText(lines, "")
+    announced, command = _command(result, suggestions)
+    return RemedyText([*lines, announced], command)
+
+
+def _check_version(made_by: str, path: Path) -> None:
+    """Another version may read the same inputs as something else than was computed.
+
+    Raises:
+        InputError: the result is of another one.
+    """
+    from vsacli.base.errors import InputError
+    from vsacli.base.version import __version__
+
+    if made_by != (this := f"vsacli {__version__}"):
+        raise InputError.one(
+            f"was computed by {made_by}, and this is {this}; check-feasibility --suggest looks for them", path
+        )
+
+
+def _command(result: StoredResult, suggestions: Suggestions) -> tuple[str, str]:
+    """What a shell does next: write the first suggestion, or list all again; announced, and as a command."""
+    from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+    from vsacli.base.texts import one_line
+    from vsacli.documents.changes import written
+
+    inputs = result.inputs()
+    files = [_named(each.path) for role in ("robot", "trajectory") for each in inputs if each.role == role]
+    parts = ["vsacli", "check-feasibility", *files]
+    if suggestions.near_singular != NEAR_SINGULAR_MARGIN:
+        parts += ["--near-singular", f"{suggestions.near_singular}"]
+    changes = written({path: value for each in inputs for path, value in each.changes.items()})
+    parts += [part for change in changes for part in ("--set", change)]
+    if changes:
+        announced = "this lists them again; to have one written, change the files themselves as --set does:"
+        parts += ["--suggest"]
+    else:
+        announced = "this writes the first as a trajectory, and --remedy another one:"
+        parts += ["--suggest", "--write-fixed", "fixed.yaml"]
+    return announced, one_line(shlex.join(parts))
+
+
+def _named(path: str) -> str:
+    """A path that a command takes for no option; of "-", standard input, it stays as it is."""
+    return f"./{path}" if path.startswith("-") and path != "-" else path
 
 
 def _studies(paths: list[Path]) -> str:

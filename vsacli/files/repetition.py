@@ -23,7 +23,9 @@ from vsacli.results.store.inputs import StoredInput
 from vsacli.results.store.reader import StoredResult, stored_format
 from vsacli.results.store.stored_study import StoredStudy
 from vsacli.robot.file import load_robot
+from vsacli.robot.model import Robot
 from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -60,17 +62,28 @@ def repeat(path: str | Path, tell: Tell = unheard) -> list[Difference]:
     Raises:
         InputError: the result does not hold its inputs, they cannot be used, or its engine is not to be had.
     """
-    with StoredResult.open(path) as result, _reading(result.inputs(), path) as (of_robot, of_trajectory):
-        robot = load_robot(of_robot.path, of_robot.changes)
+    with StoredResult.open(path) as result:
+        robot, trajectory = rebuilt(result)
         options: dict[str, Any] = result.provenance()["options"]
         engine = str(result.attributes.get("engine", "numpy"))
-        trajectory = load_trajectory(of_trajectory.path, robot, of_trajectory.changes)
         run = Run(robot, trajectory, engine=engine, tell=tell, **options)
         comparisons = [_Comparison(result, name) for name in result.variables]
         for block in run:
             for comparison in comparisons:
                 comparison.add(block)
         return [comparison.difference for comparison in comparisons if comparison.values]
+
+
+def rebuilt(result: StoredResult) -> tuple[Robot, Trajectory]:
+    """Robot and trajectory that an open result was computed from, as its inputs say that it holds.
+
+    Raises:
+        InputError: the result does not hold its inputs, or they cannot be used.
+        StorageError: there is no room for them beside it while they are read.
+    """
+    with _reading(result.inputs(), result.path) as (of_robot, of_trajectory):
+        robot = load_robot(of_robot.path, of_robot.changes)
+        return robot, load_trajectory(of_trajectory.path, robot, of_trajectory.changes)
 
 
 @contextmanager

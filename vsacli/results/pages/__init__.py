@@ -4,7 +4,8 @@ What is drawn is packed here, by the same envelopes, corridors and limits as in 
 acts is in `page.html`, `page.css` and the scripts beside them.
 """
 
+from vsacli.results.pages.document import RemedyText
 from vsacli.results.pages.result_page import result_page
 from vsacli.results.pages.study_page import study_page
 
-__all__ = ["result_page", "study_page"]
+__all__ = ["RemedyText", "result_page", "study_page"]

@@ -21,6 +21,18 @@ LARGEST_SHOWN = 200_000
 """Letters of an input up to which a page shows all of it; tables of samples are longer."""
 
 
+class RemedyText(NamedTuple):
+    """What would mend a run that failed, as a page says it.
+
+    Attributes:
+        lines: a sentence or more each.
+        command: that the last line announces; empty if there is none.
+    """
+
+    lines: Sequence[str]
+    command: str
+
+
 class Facts(NamedTuple):
     """What a page says of a file in words.
 
@@ -32,6 +44,7 @@ class Facts(NamedTuple):
         report: what the command printed that made it.
         provenance: pairs of a word and what it says.
         inputs: the files that were read.
+        remedy: what would mend it; None if it needs none, or none was looked for.
     """
 
     title: str
@@ -41,6 +54,7 @@ class Facts(NamedTuple):
     report: ReportText
     provenance: Sequence[tuple[str, str]]
     inputs: Sequence[InputText]
+    remedy: RemedyText | None = None
 
 
 class InputText(NamedTuple):

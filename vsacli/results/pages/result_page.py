@@ -8,7 +8,7 @@ from typing import Any
 from vsacli.base.progress import Bar, Progress, unseen
 from vsacli.base.tables import ReportText
 from vsacli.results.pages.chain_motion import chain_motion
-from vsacli.results.pages.document import Facts, rendered
+from vsacli.results.pages.document import Facts, RemedyText, rendered
 from vsacli.results.pages.facts import input_text, provenance_rows
 from vsacli.results.pages.library import plotting_library
 from vsacli.results.pages.packing import Packed
@@ -23,13 +23,17 @@ FAIR = ("over_limit", "doubtful", "strayed")
 
 
 def result_page(
-    files: Sequence[StoredResult], reports: Sequence[ReportText], progress: Progress = unseen
+    files: Sequence[StoredResult],
+    reports: Sequence[ReportText],
+    remedies: Sequence[RemedyText | None],
+    progress: Progress = unseen,
 ) -> str:
     """The page of results, or of simulations, as HTML.
 
     Args:
         files: open; the differences are those to the first.
         reports: what each file says of itself.
+        remedies: what would mend each, where something would be worth saying.
         progress: called with the number of variables that are drawn.
 
     Raises:
@@ -54,7 +58,10 @@ def result_page(
         "span": [0.0, max(float(file.time[-1]) for file in files) - charts.start],
         "sections": sections,
     }
-    facts = [_facts(file, label, report) for (file, label), report in zip(named, reports, strict=True)]
+    facts = [
+        _facts(file, label, report)._replace(remedy=remedy)
+        for (file, label), report, remedy in zip(named, reports, remedies, strict=True)
+    ]
     return rendered(library, _title(files), facts, data, packed)
 
 
