@@ -7,7 +7,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-SIZE = "1400,1180"
+SIZE = "1400,1480"
 """Pixels: down to the second row of plots."""
 
 SWITCHES = (
