@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 from collections.abc import Callable
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from samples.command_line import ROBOT, Outcome
 from samples.excited import Excitation, excited
+from samples.pages import Page
 
 from vsacli import load_robot
 
@@ -72,6 +74,27 @@ def test_figures_and_report(vsacli: Command, record: Path) -> None:
     assert found.code == 3
     assert found.out.startswith("vsa-3r from 1 record: MISFIT\n")
     assert "filtered to " in found.out
+
+
+def test_a_page_of_report_and_records(vsacli: Command, record: Path) -> None:
+    found = vsacli("identify", ROBOT, record, *SPRINGS, "--plot", "figures", "--format", "html")
+    assert found.code == 3
+    page = Page(Path("figures/vsa_3r-identification.html"))
+    assert re.search(r"vsa-3r from 1 record\s*misfit\s*Report\s*number", page.text)
+    for line in found.out.splitlines()[1:]:
+        for cell in filter(None, map(str.strip, line.split("   "))):
+            assert cell in page.text
+    [section] = page.data["sections"]
+    assert section["heading"] == str(record)
+    assert len(section["charts"]) == 2 * 6  # torques, and differences, of six motors
+    assert hashlib.sha256(record.read_bytes()).hexdigest() in page.text
+    assert hashlib.sha256(ROBOT.read_bytes()).hexdigest() in page.text
+
+
+def test_a_format_is_that_of_plots(vsacli: Command, record: Path) -> None:
+    refused = vsacli("identify", ROBOT, record, "--format", "html")
+    assert refused.code == 2
+    assert "--format needs --plot" in refused.err
 
 
 @pytest.mark.slow

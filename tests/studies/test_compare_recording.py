@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 
 import numpy as np
 import pytest
 from samples.command_line import ROBOT, edited
+from samples.pages import Page
 
 from vsacli import compare
 
@@ -147,6 +149,12 @@ def test_report_figures_and_json(vsacli, computed, tmp_path):
     assert "3 s of 3 s compared; the result begins 0.5137 s into the recording" in done.out
     names = {"q", "theta", "tau_motor"}
     assert {path.name for path in (tmp_path / "figures").iterdir()} == {f"r-m-{name}.png" for name in names}
+    assert vsacli("compare", "r.h5", "m.csv", "--plot", "pages", "--format", "html").code == 0
+    page = Page(tmp_path / "pages" / "r-m-comparison.html")
+    assert {section["heading"] for section in page.data["sections"]} == names
+    assert len(page.charts) == 2 * 15
+    assert "3 s of 3 s compared; the result begins 0.5137 s into the recording" in page.text
+    assert hashlib.sha256((tmp_path / "m.csv").read_bytes()).hexdigest() in page.text
     report = json.loads(vsacli("compare", "r.h5", "m.csv", "--json", "--begins-at", str(BEGIN)).out)
     assert report["format"] == "vsacli-comparison/1"
     assert (report["begins_at"], report["found"], len(report["signals"])) == (BEGIN, False, 15)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
+from click.core import ParameterSource
 
 from vsacli.base.errors import InputError
 from vsacli.base.streams import STANDARD
@@ -90,6 +91,14 @@ columns_option = click.option(
     help="What columns with other names stand for, and which to ignore; `vsacli info` of a recording makes "
     "such a file.",
 )
+format_option = click.option(
+    "--format",
+    "file_format",
+    type=click.Choice(["png", "pdf", "svg", "html"]),
+    default="png",
+    show_default=True,
+    help="Format of the figures; html is one page of everything.",
+)
 stop_option = click.option("--stop-on-infeasible", is_flag=True, help="End with the first infeasible step.")
 
 
@@ -101,6 +110,17 @@ set_option = click.option(
     help="Another value in the robot or the trajectory, e.g. joints.*.link.mass=2.5 or duration=3; may be "
     "given several times.",
 )
+
+
+def check_plotted(folder: str | None) -> None:
+    """Refuse `--format` of a command that draws only with `--plot`, if no folder is given.
+
+    Raises:
+        click.UsageError: the format would be of nothing.
+    """
+    source = click.get_current_context().get_parameter_source("file_format")
+    if folder is None and source is not ParameterSource.DEFAULT:
+        raise click.UsageError("--format needs --plot")
 
 
 def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:

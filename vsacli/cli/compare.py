@@ -7,12 +7,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.cli.command_parts import columns_option, example, json_option, overwrite_option, result_line
+from vsacli.cli.command_parts import (
+    check_plotted,
+    columns_option,
+    example,
+    format_option,
+    json_option,
+    overwrite_option,
+    result_line,
+)
 from vsacli.cli.console import Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from vsacli.base.outputs import Outputs
+    from vsacli.results.measured_curves import MeasuredCurve
+    from vsacli.results.pages.document import InputText
     from vsacli.studies.measured import Comparison
 
 
@@ -32,6 +44,7 @@ if TYPE_CHECKING:
 @columns_option
 @json_option
 @click.option("--plot", "folder", type=FOLDER, help="Save figures of measured and computed signals there.")
+@format_option
 @overwrite_option
 @talk_options
 def compare(
@@ -41,6 +54,7 @@ def compare(
     columns: str | None,
     as_json: bool,
     folder: str | None,
+    file_format: str,
     overwrite: bool,
     talk: Talk,
 ) -> None:
@@ -53,34 +67,69 @@ def compare(
     The report gives, for each signal, the error, the gain and offset of measured over computed values, and
     the lag behind the others.
     """
+    check_plotted(folder)
     from vsacli.base.outputs import Outputs
+    from vsacli.cli.plot_page import staged_page
+    from vsacli.results.pages.facts import input_text
     from vsacli.results.store.simulation import open_stored
     from vsacli.studies.measured import compare as compared
 
     with Outputs(overwrite=overwrite, inputs=[result, recording, *filter(None, [columns])]) as outputs:
+        stem = f"{Path(result).stem}-{Path(recording).stem}"
+        page = None
+        if folder is not None and file_format == "html":
+            page = staged_page(folder, f"{stem}-comparison", outputs)
         with open_stored(result) as stored:
             talk.detail(result_line(stored))
             comparison = compared(stored, recording, begins_at, columns)
-        if folder is not None:
-            _draw(comparison, folder, outputs)
+            if page is not None:
+                page.write_text(_page(comparison, [input_text(each) for each in stored.inputs()]))
+        if page is None and folder is not None:
+            _draw(comparison, stem, folder, file_format, outputs)
     say(comparison, as_json)
     talk.wrote(outputs)
 
 
-def _draw(comparison: Comparison, folder: str, outputs: Outputs) -> None:
+def _draw(comparison: Comparison, stem: str, folder: str, file_format: str, outputs: Outputs) -> None:
     """A figure for each variable that was measured."""
-    from vsacli.results.plots import FigureFiles, MeasuredCurve, measured_figure
+    from vsacli.results.plots import FigureFiles, measured_figure
 
-    curves: dict[str, list[MeasuredCurve]] = {}
-    for signal in comparison.signals:
-        if signal.samples:
-            curve = MeasuredCurve(
-                signal.column, signal.unit, signal.rms, signal.time, signal.computed, signal.measured
-            )
-            curves.setdefault(signal.variable, []).append(curve)
-    stems = [Path(path).stem for path in (comparison.result, comparison.recording)]
-    files = FigureFiles(curves, folder, "-".join(stems), "png", outputs)
-    title = ", ".join(stems)
+    curves = _curves(comparison)
+    files = FigureFiles(curves, folder, stem, file_format, outputs)
+    title = ", ".join(Path(path).stem for path in (comparison.result, comparison.recording))
     files.save(
         {variable: measured_figure(of_it, f"{title}: {variable}") for variable, of_it in curves.items()}
     )
+
+
+def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
+    """A page of the report and all variables, as HTML."""
+    from vsacli.base.texts import one_line
+    from vsacli.base.version import __version__
+    from vsacli.results.pages import measured_page
+    from vsacli.results.pages.document import Facts
+    from vsacli.results.pages.facts import printable, source_text
+
+    report = printable(comparison.as_text())
+    facts = Facts(
+        title=report.headline,
+        label=one_line(f"{comparison.result}, {comparison.recording}"),
+        verdict="",
+        tone="",
+        report=report,
+        provenance=[("vsacli version", __version__), ("result", one_line(comparison.result))],
+        inputs=[*inputs, *map(source_text, comparison.sources)],
+    )
+    return measured_page(facts, _curves(comparison))
+
+
+def _curves(comparison: Comparison) -> dict[str, list[MeasuredCurve]]:
+    """The signals that were compared, by variable."""
+    from vsacli.results.measured_curves import MeasuredCurve
+
+    curves: dict[str, list[MeasuredCurve]] = {}
+    for each in comparison.signals:
+        if each.samples:
+            curve = MeasuredCurve(each.column, each.unit, each.rms, each.time, each.computed, each.measured)
+            curves.setdefault(each.variable, []).append(curve)
+    return curves

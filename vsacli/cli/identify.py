@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from vsacli.cli.command_parts import (
+    check_plotted,
     columns_option,
     example,
+    format_option,
     json_option,
     numbers,
     overwrite_option,
@@ -19,10 +20,6 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
-
-if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
-    from vsacli.studies.identification import Identification
 
 
 @click.command(
@@ -75,6 +72,7 @@ if TYPE_CHECKING:
     help="Write the robot file with the numbers found; with --plan, the trajectory.",
 )
 @click.option("--plot", "folder", type=FOLDER, help="Save figures of measured and predicted torques there.")
+@format_option
 @json_option
 @overwrite_option
 @talk_options
@@ -90,6 +88,7 @@ def identify(
     seed: int | None,
     output: str | None,
     folder: str | None,
+    file_format: str,
     as_json: bool,
     overwrite: bool,
     talk: Talk,
@@ -107,6 +106,7 @@ def identify(
     With --plan it says instead which motion and stiffness to record so that the numbers can be told, within
     all limits of ROBOT and from rest to rest. What follows ROBOT is then a TRAJECTORY of yours, to compare.
     """
+    check_plotted(folder)
     if planned:
         _check_options(
             {"--fit": fit, "--bandwidth": bandwidth, "--columns": columns, "--plot": folder},
@@ -127,6 +127,8 @@ def identify(
     if not recordings:
         raise click.UsageError("Missing argument 'RECORDING...'; to plan a motion to record, give --plan")
     from vsacli.base.outputs import Outputs
+    from vsacli.cli.identify_plots import draw_figures, identification_page
+    from vsacli.cli.plot_page import staged_page
     from vsacli.robot.file import load_robot
     from vsacli.studies.identification import WORDS, fitted_text
     from vsacli.studies.identification import identify as identified
@@ -135,11 +137,16 @@ def identify(
     inputs = [*(source.path for source in loaded.sources), *recordings, *filter(None, [columns])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         file = None if output is None else outputs.file(Path(output))
+        page = None
+        if folder is not None and file_format == "html":
+            page = staged_page(folder, f"{Path(robot).stem}-identification", outputs)
         found = identified(loaded, recordings, fit or WORDS, bandwidth, columns)
         if file is not None:
             file.write_text(fitted_text(loaded, found, Path(output or "").parent))
-        if folder is not None:
-            _draw(found, robot, folder, outputs)
+        if page is not None:
+            page.write_text(identification_page(found, columns))
+        elif folder is not None:
+            draw_figures(found, robot, folder, file_format, outputs)
     say(found, as_json)
     talk.wrote(outputs)
     return EXIT_OF_VERDICT[found.verdict]
@@ -150,27 +157,3 @@ def _check_options(given: dict[str, object], reason: str) -> None:
     for option, value in given.items():
         if value is not None:
             raise click.UsageError(f"{option} {reason}")
-
-
-def _draw(found: Identification, robot: str, folder: str, outputs: Outputs) -> None:
-    """A figure for each record."""
-    from vsacli.results.plots import FigureFiles, MeasuredCurve, measured_figure
-
-    records = list(dict.fromkeys(each.record for each in found.torques))
-    names = {record: f"{number}-{Path(record).stem}" for number, record in enumerate(records, 1)}
-    files = FigureFiles(names.values(), folder, Path(robot).stem, "png", outputs)
-    files.save(
-        {
-            names[record]: measured_figure(
-                [
-                    MeasuredCurve(
-                        each.group, each.unit, each.residual, each.time, each.predicted, each.measured
-                    )
-                    for each in found.torques
-                    if each.record == record
-                ],
-                f"{found.robot}, {Path(record).stem}: predicted by the numbers found, filtered",
-            )
-            for record in records
-        }
-    )

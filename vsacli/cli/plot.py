@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from vsacli.cli.command_parts import example, overwrite_option, result_line, words_of
+from vsacli.cli.command_parts import example, format_option, overwrite_option, result_line, words_of
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
 
@@ -28,14 +28,7 @@ if TYPE_CHECKING:
 @click.option(
     "-o", "--output", "folder", type=FOLDER, default=".", help="Where to save; by default this folder."
 )
-@click.option(
-    "--format",
-    "file_format",
-    type=click.Choice(["png", "pdf", "svg", "html"]),
-    default="png",
-    show_default=True,
-    help="Format of the figures; html is one page of everything.",
-)
+@format_option
 @click.option("--from", "start", metavar="SECONDS", type=float, help="First time to show.")
 @click.option("--to", "end", metavar="SECONDS", type=float, help="Last time to show.")
 @click.option(

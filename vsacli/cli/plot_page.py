@@ -1,4 +1,4 @@
-"""`vsacli plot --format html`: a page in place of figures."""
+"""`--format html`: a page in place of figures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vsacli.cli.command_parts import result_line
 from vsacli.cli.console import Talk
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
+    from vsacli.base.outputs import Outputs, Staged
     from vsacli.base.progress import Bar
     from vsacli.results.pages import RemedyText
     from vsacli.results.store.reader import StoredResult
@@ -34,9 +34,22 @@ def write_page(
             is not installed.
         StorageError: the page cannot be written.
     """
-    outputs.folder(folder)
-    page = outputs.file(folder / f"{'-'.join(path.stem for path in paths)}.html")
+    page = staged_page(folder, "-".join(path.stem for path in paths), outputs)
     page.write_text(_studies(paths) if span is None else _results(paths, span, talk))
+
+
+def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
+    """The file of a page, before anything is computed for it.
+
+    Raises:
+        InputError: what a page needs is not installed.
+        StorageError: as `Outputs.folder` and `Outputs.file`.
+    """
+    from vsacli.results.pages.library import plotting_library
+
+    plotting_library()
+    outputs.folder(folder)
+    return outputs.file(Path(folder) / f"{stem}.html")
 
 
 def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:

@@ -15,6 +15,7 @@ import pytest
 from samples.browser import Browser, browsing
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited, rest_to_rest
 from samples.marks import needs
+from samples.measured_pages import wicked_page
 from samples.studies import study
 
 from vsacli.cli.main import run
@@ -254,3 +255,19 @@ def test_the_page_itself_is_small(pages: Pages) -> None:
     content = pages["result"].read_text(encoding="utf-8")
     packed = sum(map(len, re.findall(r'<script type="text/plain"[^>]*>([^<]*)<', content)))
     assert len(content.encode()) - packed < 2e6
+
+
+def test_pages_of_what_was_measured_are_drawn_and_linked(browser: Browser, tmp_path: Path) -> None:
+    browser.media(prefers_color_scheme="light")
+    browser.open(wicked_page(tmp_path / "wicked.html"))  # an alert would keep Selenium from going on
+    assert browser.run("return document.querySelectorAll('.plot .bk-Figure').length") == 2
+    browser.run("vsacli.setCursor(1)")
+    browser.press("+")
+    assert browser.settled(WINDOWS) == [pytest.approx([0.5, 1.5])] * 2
+    over, apart = browser.texts(".chart .legend")
+    np.testing.assert_allclose(
+        [float(value) for value in re.findall(r"0\.\d+", over)], [np.sin(1), np.sin(1) + 0.1], rtol=SIX_DIGITS
+    )
+    assert apart.endswith("rms 0.1, now\n0.1")
+    assert browser.run("return document.images.length") == 0
+    assert browser.complaints() == []

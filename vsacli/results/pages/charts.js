@@ -29,7 +29,7 @@ vsacli.charts = (() => {
     key(label) {
       const box = element("span", { class: "key" }, `${label} `);
       for (const series of this.chart.series.filter((each) => each.label === label)) {
-        const swatch = element("i", { class: "swatch" }), value = element("b"), role = series.role === "computed" ? "" : series.role;
+        const swatch = element("i", { class: "swatch" }), value = element("b"), role = ["computed", label].includes(series.role) ? "" : series.role;
         const rms = series.rms === null ? "" : `rms ${number(series.rms)}, now `;
         const part = element("span", { class: "key", title: data.files[series.file].label }, swatch, role, rms, value);
         this.values.push({ series, swatch, value, part });

@@ -39,12 +39,13 @@ class Facts(NamedTuple):
     Attributes:
         title: what was run.
         label: short, to tell it from the others on the page.
-        verdict: as in the report.
+        verdict: as in the report; empty without one.
         tone: "good", "fair" or "bad".
         report: what the command printed that made it.
         provenance: pairs of a word and what it says.
         inputs: the files that were read.
         remedy: what would mend it; None if it needs none, or none was looked for.
+        table: what the report has beside the table in it; header first, empty if there is nothing.
     """
 
     title: str
@@ -55,14 +56,23 @@ class Facts(NamedTuple):
     provenance: Sequence[tuple[str, str]]
     inputs: Sequence[InputText]
     remedy: RemedyText | None = None
+    table: Sequence[tuple[str, ...]] = ()
 
 
 class InputText(NamedTuple):
-    """A file that was read: its path, SHA-256, and what it held, as far as a page shows it."""
+    """A file that was read.
+
+    Attributes:
+        path: of it.
+        sha256: of its content, in hex.
+        content: what it held; None if a page does not show it.
+        instead: what is said then.
+    """
 
     path: str
     sha256: str
     content: str | None
+    instead: str
 
 
 def rendered(

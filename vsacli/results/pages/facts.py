@@ -6,9 +6,21 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from vsacli.base.texts import one_line
+from vsacli.base.tables import ReportText
+from vsacli.base.texts import for_terminal, one_line
+from vsacli.documents.source import Source
 from vsacli.results.pages.document import LARGEST_SHOWN, InputText
 from vsacli.results.store.inputs import StoredInput
+
+FAIR = ("over_limit", "doubtful", "strayed", "untold")
+"""Verdicts on what was computed all the same."""
+
+TOO_LONG = "too long for a page"
+
+
+def tone_of(verdict: str) -> str:
+    """How a verdict looks, as of `Facts`."""
+    return "good" if verdict == "ok" else "fair" if verdict in FAIR else "bad"
 
 
 def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -25,6 +37,23 @@ def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
 def input_text(file: StoredInput) -> InputText:
     """An input as a page shows it."""
     text = None if file.content is None else file.content.decode("utf-8", "backslashreplace")
-    if text is not None:
-        text = None if len(text) > LARGEST_SHOWN else "\n".join(map(one_line, text.splitlines()))
-    return InputText(one_line(file.path), file.sha256, text)
+    instead = f"{TOO_LONG}; vsacli info --extract gets it from the file"
+    return InputText(one_line(file.path), file.sha256, _shown(text), instead)
+
+
+def source_text(file: Source) -> InputText:
+    """A file as it was read, as a page shows it."""
+    return InputText(one_line(file.path), file.sha256, _shown(file.text), TOO_LONG)
+
+
+def _shown(text: str | None) -> str | None:
+    """What a page shows of a text: all of it, or nothing."""
+    if text is None or len(text) > LARGEST_SHOWN:
+        return None
+    return "\n".join(map(one_line, text.splitlines()))
+
+
+def printable(report: ReportText) -> ReportText:
+    """A report whose texts name files or columns, with nothing in it that a page would not show."""
+    rows = [tuple(map(one_line, row)) for row in report.rows]
+    return ReportText(one_line(report.headline), rows, list(map(for_terminal, report.lines)))

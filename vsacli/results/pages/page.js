@@ -15,9 +15,9 @@
   byId("stage").hidden = byId("keys").hidden = false;
 
   function addSections() {
-    for (const { heading, shown, charts } of data.sections) {
+    for (const { heading, shown, paired, charts } of data.sections) {
       const section = element("details", { class: "section" }, element("summary", {}, heading));
-      const place = element("div", { class: "charts" });
+      const place = element("div", { class: paired ? "charts paired" : "charts" });
       section.append(place);
       section.open = shown;
       section.addEventListener("toggle", () => { if (section.open) vsacli.charts.buildRest(); });

@@ -9,7 +9,7 @@ from vsacli.base.progress import Bar, Progress, unseen
 from vsacli.base.tables import ReportText
 from vsacli.results.pages.chain_motion import chain_motion
 from vsacli.results.pages.document import Facts, RemedyText, rendered
-from vsacli.results.pages.facts import input_text, provenance_rows
+from vsacli.results.pages.facts import input_text, provenance_rows, tone_of
 from vsacli.results.pages.library import plotting_library
 from vsacli.results.pages.packing import Packed
 from vsacli.results.pages.result_charts import ResultCharts
@@ -17,9 +17,6 @@ from vsacli.results.pages.sections import Section
 from vsacli.results.pages.stretches import doubtful, troubles
 from vsacli.results.several import check_comparable, distinct_labels
 from vsacli.results.store.reader import StoredResult
-
-FAIR = ("over_limit", "doubtful", "strayed")
-"""Verdicts on what was computed all the same."""
 
 
 def result_page(
@@ -101,6 +98,7 @@ def _facts(file: StoredResult, label: str, report: ReportText) -> Facts:
     steps = "1 step" if file.samples == 1 else f"{file.samples} steps"
     title = f"{file.robot_name}, {label}: {steps}, {first:g} to {last:g} s{ended}"
     inputs = [input_text(each) for each in file.inputs()]
-    tone = "good" if file.verdict == "ok" else "fair" if file.verdict in FAIR else "bad"
     provenance = provenance_rows(file.provenance())
-    return Facts(title, label, file.verdict.replace("_", " "), tone, report, provenance, inputs)
+    return Facts(
+        title, label, file.verdict.replace("_", " "), tone_of(file.verdict), report, provenance, inputs
+    )

@@ -24,7 +24,7 @@ from vsacli.results.plots.figures import (
     result_drawings,
 )
 from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
-from vsacli.results.plots.measured_figure import MeasuredCurve, measured_figure
+from vsacli.results.plots.measured_figure import measured_figure
 from vsacli.results.plots.optimum_figures import JointChange, Moved, change_figure, pace_figure
 from vsacli.results.plots.sensitivity_figures import Bar, Torque, band_figure, ranking_figure
 from vsacli.results.plots.simulation_figures import simulation_drawings
@@ -41,7 +41,6 @@ __all__ = [
     "Bounds",
     "FigureFiles",
     "JointChange",
-    "MeasuredCurve",
     "Moved",
     "Torque",
     "TorqueSpeed",

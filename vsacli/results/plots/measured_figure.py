@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vsacli.base.arrays import FloatArray
 from vsacli.results.curves import Curve
+from vsacli.results.measured_curves import MeasuredCurve
 from vsacli.results.plots.drawing import ZERO, draw_curve
 from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete, joint_panels
 from vsacli.results.plots.styles import DIFFERENCE, house_style, line_handle, line_style
@@ -20,25 +19,6 @@ from vsacli.results.plots.styles import DIFFERENCE, house_style, line_handle, li
 MOST_ROWS = 8
 ROW_HEIGHT = 1.6
 """Inches."""
-
-
-class MeasuredCurve(NamedTuple):
-    """A signal as it was measured and computed.
-
-    Attributes:
-        name: of the signal.
-        unit: of its values.
-        rms: root mean square of measured minus computed.
-        time: (samples,), s.
-        computed, measured: (samples,).
-    """
-
-    name: str
-    unit: str
-    rms: float
-    time: FloatArray
-    computed: FloatArray
-    measured: FloatArray
 
 
 def measured_figure(curves: Sequence[MeasuredCurve], title: str) -> Figure:

@@ -110,6 +110,7 @@ def identify(
         ),
         fitted=_fitted(robot, sought, reports, links),
         torques=tuple(torques(robot, found, records, signals)),
+        sources=(*robot.sources, *(each.source for each in records)),
     )
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import aligned
+from vsacli.base.tables import ReportText, aligned
+from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
 
 OK, UNTOLD, MISFIT, DOUBTFUL = "ok", "untold", "misfit", "doubtful"
@@ -166,6 +167,7 @@ class Identification(Published):
         notes: what else is to be known, sentences.
         fitted: the robot with the numbers found.
         torques: measured and predicted, for figures; not in JSON.
+        sources: the files of the robot and the records, as they were read; not in JSON.
     """
 
     robot: str
@@ -175,6 +177,7 @@ class Identification(Published):
     notes: tuple[str, ...]
     fitted: Robot = field(repr=False)
     torques: tuple[Torques, ...] = field(repr=False, default=())
+    sources: tuple[Source, ...] = field(repr=False, default=())
 
     format: ClassVar[str] = "vsacli-identification/1"
     shape: ClassVar = {"format": "format", **named("robot", "verdict", "records", "systems", "notes")}
@@ -185,41 +188,47 @@ class Identification(Published):
         return tuple(number for system in self.systems for number in system.numbers)
 
     def __str__(self) -> str:
-        count = f"{len(self.records)} record" + ("s" if len(self.records) > 1 else "")
-        title = f"{self.robot} from {count}: {self.verdict.upper()}"
         return "\n".join(
             [
-                title,
-                *(_used(each) for each in self.records),
-                *(line.rstrip() for line in aligned(list(self._numbers()))),
-                *aligned(list(self._residuals())),
+                self._headline(),
+                *map(_used, self.records),
+                *(line.rstrip() for line in aligned(self._numbers())),
+                *aligned(self.residual_rows()),
                 *self._sentences(),
             ]
         )
 
-    def _numbers(self) -> Iterator[tuple[str, ...]]:
-        yield "number", "file", "found", "+-", "unit", ""
+    def as_text(self) -> ReportText:
+        """The report in its parts, of its tables the numbers; the other is `residual_rows`."""
+        lines = [*map(_used, self.records), *self._sentences()]
+        return ReportText(self._headline(), self._numbers(), lines)
+
+    def _headline(self) -> str:
+        count = f"{len(self.records)} record" + ("s" if len(self.records) > 1 else "")
+        return f"{self.robot} from {count}: {self.verdict.upper()}"
+
+    def _numbers(self) -> list[tuple[str, ...]]:
+        rows: list[tuple[str, ...]] = [("number", "file", "found", "+-", "unit", "")]
         for each in self.numbers:
             said = each.note or ("changed" if each.changed else "as in the file")
-            yield (
-                each.path,
-                f"{each.before:.6g}",
-                significant(each.value, each.standard_error),
-                f"{each.standard_error:.2g}" if each.told else "-",
-                each.unit,
-                said,
-            )
+            found = significant(each.value, each.standard_error)
+            error = f"{each.standard_error:.2g}" if each.told else "-"
+            rows.append((each.path, f"{each.before:.6g}", found, error, each.unit, said))
+        return rows
 
-    def _residuals(self) -> Iterator[tuple[str, ...]]:
-        yield "rms, filtered", "torque", "residual", "noise", "held out", "condition"
+    def residual_rows(self) -> list[tuple[str, ...]]:
+        """A table of what the equations of each motor, or link, leave; its header first."""
+        rows: list[tuple[str, ...]] = [
+            ("rms, filtered", "torque", "residual", "noise", "held out", "condition")
+        ]
         for system in self.systems:
             for each in system.residuals:
-                figures = (each.torque, each.residual, each.noise, each.held_out)
-                yield (
-                    each.group,
-                    *(f"{value:.3g} {each.unit}" if math.isfinite(value) else "-" for value in figures),
-                    f"{system.condition:.3g}",
+                torque, residual, noise, held_out = (
+                    f"{value:.3g} {each.unit}" if math.isfinite(value) else "-"
+                    for value in (each.torque, each.residual, each.noise, each.held_out)
                 )
+                rows.append((each.group, torque, residual, noise, held_out, f"{system.condition:.3g}"))
+        return rows
 
     def _sentences(self) -> Iterator[str]:
         for system in self.systems:

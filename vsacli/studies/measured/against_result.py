@@ -92,6 +92,7 @@ def compare(
         compared=covered,
         signals=signals,
         notes=notes,
+        sources=(recorded.table.source,),
     )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from vsacli.base.json_records import Published
-from vsacli.base.tables import aligned
+from vsacli.base.tables import ReportText
+from vsacli.documents.source import Source
 from vsacli.studies.measured.agreement import Agreement
 
 SHOWN_LAG = 5e-4
@@ -26,6 +27,7 @@ class Comparison(Published):
         compared: how much of it the recording covers, s.
         signals: a record of each column that was compared.
         notes: what looks like a slip, and what was not compared.
+        sources: the recording as it was read; not in JSON.
     """
 
     result: str
@@ -36,6 +38,7 @@ class Comparison(Published):
     compared: float
     signals: tuple[Agreement, ...]
     notes: tuple[str, ...] = ()
+    sources: tuple[Source, ...] = field(repr=False, default=())
 
     format: ClassVar[str] = "vsacli-comparison/1"
     shape: ClassVar = {
@@ -45,9 +48,11 @@ class Comparison(Published):
     }
 
     def __str__(self) -> str:
-        return "\n".join(
-            [self._headline(), *aligned(self._rows()), *(f"note: {note}" for note in self.notes)]
-        )
+        return str(self.as_text())
+
+    def as_text(self) -> ReportText:
+        """The report in its parts."""
+        return ReportText(self._headline(), self._rows(), [f"note: {note}" for note in self.notes])
 
     def _headline(self) -> str:
         where = f"{abs(self.begins_at):.4f} s {'into' if self.begins_at >= 0 else 'before'} the recording"

@@ -14,6 +14,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES, measured
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
+from vsacli.documents.source import Source
 from vsacli.documents.table_header import split_heading
 from vsacli.robot.model import Robot
 from vsacli.studies.measured.measured_columns import Measured, known_columns, read_recording
@@ -73,8 +74,8 @@ class _RobotColumns(NamedTuple):
 
 def recorded_columns(
     robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
-) -> tuple[list[Column], tuple[str, ...]]:
-    """The columns that are needed, and the names of the others.
+) -> tuple[list[Column], tuple[str, ...], Source]:
+    """The columns that are needed, the names of the others, and the file as it was read.
 
     Args:
         robot: that was recorded.
@@ -95,7 +96,7 @@ def recorded_columns(
         columns.append(Column(signal.column, place, stamps[there], values, signal.column in united))
     used = {column.name for column in columns}
     others = [signal.column for signal in recording.signals if signal.column not in used]
-    return columns, (*others, *recording.others)
+    return columns, (*others, *recording.others), recording.table.source
 
 
 def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:

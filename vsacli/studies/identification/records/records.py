@@ -14,6 +14,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.variables import MOTORS
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
+from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.records.record_columns import (
     MOTOR,
@@ -37,6 +38,7 @@ class Record(NamedTuple):
 
     Attributes:
         path: of the file.
+        source: the file as it was read.
         time: (samples,), s, from the first row of the file on.
         q: positions of the joints, (samples, joints), NaN throughout where there is none.
         theta: positions of the motors, (samples, joints, 2), likewise; of a motor that moves with its joint
@@ -48,6 +50,7 @@ class Record(NamedTuple):
     """
 
     path: str
+    source: Source
     time: FloatArray
     q: FloatArray
     theta: FloatArray
@@ -69,7 +72,7 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
         InputError: there is no such column, a unit is one of something else, times do not ascend, or there
             are faults with which nothing can be fitted.
     """
-    columns, unused = recorded_columns(robot, path, mapping)
+    columns, unused, source = recorded_columns(robot, path, mapping)
     faults = list(stopping_faults(columns, robot))
     if faults:
         raise InputError(Problem(str(path), 0, sentence) for sentence in faults)
@@ -86,6 +89,7 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
             arrays[MOTOR][:, index, 0] = arrays[POSITION][:, index, 0]
     return Record(
         path=str(path),
+        source=source,
         time=time,
         q=arrays[POSITION][..., 0],
         theta=arrays[MOTOR],

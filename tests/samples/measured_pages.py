@@ -1,0 +1,32 @@
+"""Pages of measured signals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from vsacli.base.tables import ReportText
+from vsacli.results.measured_curves import MeasuredCurve
+from vsacli.results.pages import measured_page
+from vsacli.results.pages.document import Facts, InputText
+
+WICKED = "<img src=x onerror=alert(1)><script>alert(2)</script></script><b>$$x$$\"'"
+
+
+def without_words() -> Facts:
+    """Nothing to say."""
+    return Facts("title", "label", "", "", ReportText("", [], []), [], [])
+
+
+def wicked_page(file: Path) -> Path:
+    """A page whose texts would act if they were no texts."""
+    time = np.linspace(0, 2, 101)
+    curves = [MeasuredCurve(WICKED, "N m", 0.1, time, np.sin(time), np.sin(time) + 0.1)]
+    report = ReportText(WICKED, [("a", WICKED), (WICKED, "b")], [WICKED])
+    inputs = [InputText(WICKED, "0" * 64, WICKED, WICKED), InputText(WICKED, "0" * 64, None, WICKED)]
+    facts = Facts(
+        WICKED, WICKED, WICKED, "bad", report, [(WICKED, WICKED)], inputs, table=[(WICKED,), (WICKED,)]
+    )
+    file.write_text(measured_page(facts, {WICKED: curves}, WICKED), encoding="utf-8")
+    return file

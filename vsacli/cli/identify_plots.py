@@ -1,0 +1,73 @@
+"""`vsacli identify --plot`: measured and predicted torques, as figures or as a page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from vsacli.base.outputs import Outputs
+    from vsacli.results.measured_curves import MeasuredCurve
+    from vsacli.studies.identification import Identification
+
+
+def draw_figures(found: Identification, robot: str, folder: str, file_format: str, outputs: Outputs) -> None:
+    """A figure for each record."""
+    from vsacli.results.plots import FigureFiles, measured_figure
+
+    curves = _curves(found)
+    names = {record: f"{number}-{Path(record).stem}" for number, record in enumerate(curves, 1)}
+    files = FigureFiles(names.values(), folder, Path(robot).stem, file_format, outputs)
+    files.save(
+        {
+            names[record]: measured_figure(
+                of_it, f"{found.robot}, {Path(record).stem}: predicted by the numbers found, filtered"
+            )
+            for record, of_it in curves.items()
+        }
+    )
+
+
+def identification_page(found: Identification, columns: str | None) -> str:
+    """A page of the report and all records, as HTML.
+
+    Args:
+        found: what is shown.
+        columns: the file that said what columns stand for, if one did.
+
+    Raises:
+        InputError: what a page needs is not installed.
+    """
+    from vsacli.base.texts import one_line
+    from vsacli.base.version import __version__
+    from vsacli.results.pages import measured_page
+    from vsacli.results.pages.document import Facts
+    from vsacli.results.pages.facts import printable, source_text, tone_of
+
+    report = printable(found.as_text())
+    provenance = [
+        ("vsacli version", __version__),
+        *([] if columns is None else [("columns", one_line(columns))]),
+    ]
+    facts = Facts(
+        title=report.headline.rpartition(":")[0],
+        label=found.robot,
+        verdict=found.verdict,
+        tone=tone_of(found.verdict),
+        report=report,
+        provenance=provenance,
+        inputs=[source_text(source) for source in found.sources],
+        table=found.residual_rows(),
+    )
+    return measured_page(facts, _curves(found), "predicted")
+
+
+def _curves(found: Identification) -> dict[str, list[MeasuredCurve]]:
+    """The torques of each record, by its path."""
+    from vsacli.results.measured_curves import MeasuredCurve
+
+    curves: dict[str, list[MeasuredCurve]] = {}
+    for each in found.torques:
+        curve = MeasuredCurve(each.group, each.unit, each.residual, each.time, each.predicted, each.measured)
+        curves.setdefault(each.record, []).append(curve)
+    return curves
