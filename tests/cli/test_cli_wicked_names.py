@@ -26,8 +26,8 @@ def renamed(path: Path, folder: Path, name: str) -> Path:
 
 
 def bare(code: str) -> str:
-    """C without comments, and without the digest of all of it."""
-    return re.sub(r"0x[0-9a-f]{8}u", "", re.sub(r"/\*.*?\*/", "", code, flags=re.S))
+    """C without comments, and without the digests of all of it and of the robot file, which has the name."""
+    return re.sub(r'0x[0-9a-f]{8}u|"[0-9a-f]{64}"', "", re.sub(r"/\*.*?\*/", "", code, flags=re.S))
 
 
 @needs_compiler

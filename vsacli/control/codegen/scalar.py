@@ -129,9 +129,10 @@ class Scalar(Dialect):
 def _in_range(number: float) -> float:
     """What stands for a number among those of single precision: no number but zero becomes zero."""
     limits = np.finfo(np.float32)
-    if number and abs(number) < limits.tiny:
-        return math.copysign(float(limits.tiny), number)
-    return math.copysign(math.inf, number) if abs(number) > limits.max else number
+    smallest, largest = float(limits.tiny), float(limits.max)
+    if number and abs(number) < smallest:
+        return math.copysign(smallest, number)
+    return math.copysign(math.inf, number) if abs(number) > largest else number
 
 
 def source_text(prefix: str, functions: Sequence[Function], precision: str, head: str) -> str:
