@@ -35,11 +35,10 @@ README = REPOSITORY / "README.md"
 PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 
 LONG = (
-    *("cli.md", "energy.md", "gallery.md", "identification.md", "mending-a-motion.md", "optimisation.md"),
-    *("index.md", "pages.md", "python.md", "quickstart.md", "reading-a-verdict.md"),
-    *("recorded.md", "robots.md", "ros-bags.md", "sensitivity.md", "simulation.md", "studies.md"),
-    *("sizing.md", "suggestions.md", "urdf.md"),
-    "models.md",
+    *("cli.md", "damping.md", "energy.md", "figures.md", "gallery.md", "identification.md", "index.md"),
+    *("measured.md", "mending-a-motion.md", "models.md", "optimisation.md", "pages.md", "python.md"),
+    *("quickstart.md", "reading-a-verdict.md", "recorded.md", "robots.md", "ros-bags.md", "sensitivity.md"),
+    *("serial.md", "simulation.md", "sizing.md", "studies.md", "suggestions.md", "urdf.md"),
 )
 """Pages whose examples take more than a second."""
 

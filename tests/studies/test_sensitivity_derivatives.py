@@ -195,7 +195,7 @@ def test_elastic_springs_by_every_number(law):
     check_actuator(actuator, command(actuator))
 
 
-@pytest.mark.parametrize("name", slow_but(["awas", "maccepa"], DEVICES))
+@pytest.mark.parametrize("name", slow_but(["awas"], DEVICES))
 def test_mechanisms_by_every_number(name):
     device = DEVICES[name]
     check_actuator(

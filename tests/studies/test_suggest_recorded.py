@@ -77,6 +77,7 @@ def test_what_a_run_calls_ok_needs_no_remedy_and_remedies_are_ok_in_a_run(tmp_pa
             assert inverse_dynamics(beyond, faster).report.verdict == "over_limit"
 
 
+@pytest.mark.slow
 def test_a_limit_within_the_noise_keeps_nothing_else_from_being_mended(tmp_path: Path) -> None:
     trajectory = recorded_swing(1)
     robot = limited(limited(pendulum(), trajectory, "position", 1.5), trajectory, "max_torque", 100.0)
