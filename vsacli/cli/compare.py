@@ -69,16 +69,14 @@ def compare(
     """
     check_plotted(folder)
     from vsacli.base.outputs import Outputs
-    from vsacli.cli.plot_page import staged_page
+    from vsacli.cli.plot_page import page_asked_for
     from vsacli.results.pages.facts import input_text
     from vsacli.results.store.simulation import open_stored
     from vsacli.studies.measured import compare as compared
 
     with Outputs(overwrite=overwrite, inputs=[result, recording, *filter(None, [columns])]) as outputs:
         stem = f"{Path(result).stem}-{Path(recording).stem}"
-        page = None
-        if folder is not None and file_format == "html":
-            page = staged_page(folder, f"{stem}-comparison", outputs)
+        page = page_asked_for(folder, file_format, f"{stem}-comparison", outputs)
         with open_stored(result) as stored:
             talk.detail(result_line(stored))
             comparison = compared(stored, recording, begins_at, columns)

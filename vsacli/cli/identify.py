@@ -128,7 +128,7 @@ def identify(
         raise click.UsageError("Missing argument 'RECORDING...'; to plan a motion to record, give --plan")
     from vsacli.base.outputs import Outputs
     from vsacli.cli.identify_plots import draw_figures, identification_page
-    from vsacli.cli.plot_page import staged_page
+    from vsacli.cli.plot_page import page_asked_for
     from vsacli.robot.file import load_robot
     from vsacli.studies.identification import WORDS, fitted_text
     from vsacli.studies.identification import identify as identified
@@ -137,9 +137,7 @@ def identify(
     inputs = [*(source.path for source in loaded.sources), *recordings, *filter(None, [columns])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         file = None if output is None else outputs.file(Path(output))
-        page = None
-        if folder is not None and file_format == "html":
-            page = staged_page(folder, f"{Path(robot).stem}-identification", outputs)
+        page = page_asked_for(folder, file_format, f"{Path(robot).stem}-identification", outputs)
         found = identified(loaded, recordings, fit or WORDS, bandwidth, columns)
         if file is not None:
             file.write_text(fitted_text(loaded, found, Path(output or "").parent))

@@ -52,6 +52,17 @@ def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
     return outputs.file(Path(folder) / f"{stem}.html")
 
 
+def page_asked_for(folder: str | None, file_format: str, stem: str, outputs: Outputs) -> Staged | None:
+    """The file of the page that `--plot` and `--format` ask for; None if they ask for none.
+
+    Raises:
+        InputError, StorageError: as `staged_page`.
+    """
+    if folder is None or file_format != "html":
+        return None
+    return staged_page(folder, stem, outputs)
+
+
 def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
     from vsacli.files.stored_reports import stored_report
     from vsacli.results.pages import result_page

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from vsacli.compute.tracing import Program, Symbol
 from vsacli.compute.tracing.c_code import table_names
@@ -14,7 +14,8 @@ BYTES = {"double": 8, "float": 4}
 """Of a number."""
 
 
-class Cost(NamedTuple):
+@dataclass(frozen=True)
+class Cost:
     """Operations of one call if every branch is entered and every loop runs to its bound.
 
     Attributes:
@@ -27,8 +28,10 @@ class Cost(NamedTuple):
     functions: int
     loops: int
 
-    def __add__(self, other: Cost) -> Cost:  # type: ignore[override]
-        return Cost(*(mine + others for mine, others in zip(self, other, strict=True)))
+    def __add__(self, other: Cost) -> Cost:
+        return Cost(
+            self.operations + other.operations, self.functions + other.functions, self.loops + other.loops
+        )
 
 
 def worst_cost(program: Program) -> Cost:

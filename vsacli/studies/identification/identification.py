@@ -71,13 +71,8 @@ def identify(
         InputError: a record cannot be used, or `fit` names nothing.
     """
     check_robot(robot)
-    paths = [recordings] if isinstance(recordings, str | Path) else list(recordings)
-    if not paths:
-        raise InputError.one("identification needs a record at least")
     check_fit(robot, fit, WORDS)
-    mapping = load_columns(columns)
-    records = [read_record(robot, path, mapping) for path in paths]
-    check_distinct(records)
+    records = _read(robot, recordings, columns)
     complete = {joint for record in records for joint in complete_joints(robot, record)}
     joints = [joint for joint in sorted(complete) if not robot.joints[joint].damper_at("transmission")]
     signals = [_conditioned(record, bandwidth) for record in records]
@@ -112,6 +107,23 @@ def identify(
         torques=tuple(torques(robot, found, records, signals)),
         sources=(*robot.sources, *(each.source for each in records)),
     )
+
+
+def _read(
+    robot: Robot, recordings: str | Path | Sequence[str | Path], columns: str | Path | None
+) -> list[Record]:
+    """The records.
+
+    Raises:
+        InputError: there is none, one cannot be used, or two are the same.
+    """
+    paths = [recordings] if isinstance(recordings, str | Path) else list(recordings)
+    if not paths:
+        raise InputError.one("identification needs a record at least")
+    mapping = load_columns(columns)
+    records = [read_record(robot, path, mapping) for path in paths]
+    check_distinct(records)
+    return records
 
 
 def _conditioned(record: Record, bandwidth: float | None) -> Signals:

@@ -101,11 +101,7 @@ class CatalogueMotor:
 
     def _stuck(self) -> Iterator[FieldProblem]:
         """Friction that the motor cannot overcome, by its torque or by its voltage."""
-        if (
-            self.coulomb
-            and not any(True for _ in self._missing())
-            and self.coulomb >= self.shaft.stall_torque
-        ):
+        if self.coulomb and not list(self._missing()) and self.coulomb >= self.shaft.stall_torque:
             reason = f"must be below the {self.shaft.stall_torque:.4g} N m that the motor can give at all"
             yield FieldProblem(("coulomb",), reason)
 

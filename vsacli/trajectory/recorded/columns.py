@@ -60,8 +60,15 @@ class ColumnLayout:
 
 def known_columns(joints: CommandedJoints) -> set[str]:
     """Every name that a column of a recorded trajectory of these joints may have."""
-    of_every_joint = CommandedJoints(joints.types, exempt={})
-    ways = [_columns(pattern, of_every_joint) for pattern in _PATTERNS]
+    return _known(_of_every_joint(joints))
+
+
+def _of_every_joint(joints: CommandedJoints) -> list[Way]:
+    """Both ways to name columns, as if each joint took every signal."""
+    return [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in _PATTERNS]
+
+
+def _known(ways: Sequence[Way]) -> set[str]:
     return {TIME, *_all(_WRENCH_WAY), *(column for way in ways for column in _all(way))}
 
 
@@ -90,13 +97,13 @@ def column_layout(
     """
     headings = [split_heading(text) for text in header]
     names = [name for name, _ in headings]
-    of_every_joint = [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in _PATTERNS]
+    of_every_joint = _of_every_joint(joints)
     ways = [_columns(pattern, joints) for pattern in _PATTERNS]
     used = [way for way in ways if any(column in names for column in _all(way))]
     way = used[0] if used else ways[0]
     expected = [TIME, *_all(way), *(_all(_WRENCH_WAY) if WRENCH in wanted else ())]
 
-    known = known_columns(joints)
+    known = _known(of_every_joint)
     if _is_foreign(names, known):
         examples = f"{', '.join(expected[:2])}, ..."
         message = f"has no column of a trajectory ({examples}); {_remedy(file)}"
@@ -115,6 +122,13 @@ def column_layout(
         problems.append(_remedy(file))
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
+    return _layout(names, columns, way, _of_signals(of_every_joint))
+
+
+def _layout(
+    names: Sequence[str], columns: Mapping[str, Column], way: Way, of_signals: Mapping[str, Collection[str]]
+) -> ColumnLayout:
+    """Where quantities stand, once all columns of the joints that take a signal are found."""
     return ColumnLayout(
         time=columns[TIME],
         quantities={
@@ -123,8 +137,8 @@ def column_layout(
             if all(column in columns for column in of_joints.values())
         },
         unused={
-            key: [column for column in names if column in known and column not in columns]
-            for key, known in _of_signals(of_every_joint).items()
+            key: [column for column in names if column in of_signal and column not in columns]
+            for key, of_signal in of_signals.items()
         },
     )
 
