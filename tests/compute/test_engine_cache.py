@@ -23,7 +23,7 @@ from vsacli.compute.engine.cache import (
     CacheError,
     open_cache,
 )
-from vsacli.compute.engine.compiled_engine import _loaded
+from vsacli.compute.engine.libraries import _loaded
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 
 KERNEL = LinkTorques(vsa_3r())

@@ -15,10 +15,11 @@ from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 
 from vsacli.base.errors import InputError
-from vsacli.compute.engine import NUMPY, choice, choose, compiled_engine, compiler
+from vsacli.compute.engine import NUMPY, choice, choose, compiler, libraries
 from vsacli.compute.engine.cache import open_cache
 from vsacli.compute.engine.choice import LOOK_FROM
-from vsacli.compute.engine.compiled_engine import CompiledEngine, _loaded
+from vsacli.compute.engine.compiled_engine import CompiledEngine
+from vsacli.compute.engine.libraries import _loaded
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 
 KERNEL = LinkTorques(vsa_3r())
@@ -200,12 +201,12 @@ def test_a_cache_from_which_nothing_may_be_run(monkeypatch: pytest.MonkeyPatch, 
 
 @needs_compiler
 def test_what_takes_long_is_announced_and_what_takes_too_long_refused(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(compiled_engine, "LONG_SECONDS", 0.1)
+    monkeypatch.setattr(libraries, "LONG_SECONDS", 0.1)
     said: list[str] = []
     choose("c", KERNEL, 1, tell=said.append)
     assert re.fullmatch(r"compiling takes about \d+ s, this once \(at most 120 s\)", said[0])
     _loaded.clear()
-    monkeypatch.setattr(compiled_engine, "MOST_OPERATIONS", 10)
+    monkeypatch.setattr(libraries, "MOST_OPERATIONS", 10)
     monkeypatch.setenv("CC", "cc -DANOTHER")  # whose code is not in the cache
     assert "would not repay" in choose("auto", KERNEL, 10_000_000).reason
     with pytest.raises(InputError, match=r"a step takes \d+ operations, more than the 10 that are compiled"):

@@ -133,7 +133,7 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
 
 def _repays(operations: int, samples: int) -> bool:
     """Whether NumPy would be busy for longer than the compiler."""
-    from vsacli.compute.engine.compiled_engine import MOST_OPERATIONS, compiling_seconds
+    from vsacli.compute.engine.libraries import MOST_OPERATIONS, compiling_seconds
 
     repays = operations * samples * NUMPY_SECONDS > compiling_seconds(operations)
     return repays and operations <= MOST_OPERATIONS

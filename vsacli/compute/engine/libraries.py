@@ -1,0 +1,145 @@
+"""From C text to a loaded library: the one that is in the cache, or compiled now."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from vsacli.base.errors import StorageError
+from vsacli.base.storage import reporting_temporary_errors, temporary_folder
+from vsacli.compute.engine.cache import LIBRARY, Cache, CacheError, key_of, open_cache
+from vsacli.compute.engine.compiler import TIMEOUT, Compiler, CompilerError
+from vsacli.compute.engine.engines import Tell
+
+Worthwhile = Callable[[int], bool]
+"""Whether code of so many operations shall be compiled."""
+
+COMPILER_START_SECONDS = 0.25
+COMPILER_SECONDS_PER_SQUARE = 2.5e-8
+"""What the compiler takes to start, and for the square of the number of operations."""
+
+LONG_SECONDS = 5.0
+"""From which on the user is told before."""
+
+MOST_OPERATIONS = 40_000
+"""Of a program that is compiled, those of 50 joints with cubic springs: gcc takes 40 s for it and 0.6 GB."""
+
+_Opened = TypeVar("_Opened")
+
+
+class Code(NamedTuple):
+    """C text, and how many operations it has."""
+
+    text: str
+    operations: int
+
+
+class Loaded(NamedTuple, Generic[_Opened]):
+    """A library, and whether it had to be compiled for this process."""
+
+    library: _Opened
+    compiled: bool
+
+
+def load(
+    code: Code,
+    opened: Callable[[Path], _Opened],
+    compiler: Compiler,
+    tell: Tell,
+    worthwhile: Worthwhile = lambda _operations: True,
+) -> Loaded[_Opened] | None:
+    """The library of some code; None if it is not there and not worth compiling.
+
+    Args:
+        code: what to compile.
+        opened: loads a library, the same way wherever the text is the same; it may be removed once loaded.
+        compiler: what compiles it.
+        tell: learns what is wrong with the cache, which is no reason to fail, and what will take long.
+        worthwhile: whether to compile so many operations if they are not in the cache.
+
+    Raises:
+        CompilerError: it cannot be compiled or loaded.
+    """
+    key = key_of(code.text, compiler.identity)
+    if key not in _loaded:
+        cache = _open_cache(tell)
+        kept = None if cache is None else _found(cache, key, opened, tell)
+        if kept is not None:
+            _loaded[key] = Loaded(kept, compiled=False)
+        elif worthwhile(code.operations):
+            _announce(code.operations, tell)
+            _loaded[key] = Loaded(_built(code.text, key, opened, compiler, cache, tell), compiled=True)
+    return _loaded.get(key)
+
+
+def compiling_seconds(operations: int) -> float:
+    """What the compiler takes, about."""
+    return COMPILER_START_SECONDS + COMPILER_SECONDS_PER_SQUARE * operations**2
+
+
+def _announce(operations: int, tell: Tell) -> None:
+    """Say that it takes long, if it does.
+
+    Raises:
+        CompilerError: it takes too long.
+    """
+    if operations > MOST_OPERATIONS:
+        raise CompilerError(
+            f"a step takes {operations} operations, more than the {MOST_OPERATIONS} that are compiled"
+        )
+    seconds = compiling_seconds(operations)
+    if seconds > LONG_SECONDS:
+        tell(f"compiling takes about {seconds:.0f} s, this once (at most {TIMEOUT:g} s)")
+
+
+_loaded: dict[str, Loaded[Any]] = {}
+"""What this process has loaded, by its key."""
+
+
+def _open_cache(tell: Tell) -> Cache | None:
+    try:
+        return open_cache()
+    except CacheError as error:
+        tell(f"{error}; compiled code is not kept")
+        return None
+
+
+def _found(cache: Cache, key: str, opened: Callable[[Path], _Opened], tell: Tell) -> _Opened | None:
+    try:
+        path = cache.find(key)
+        return None if path is None else opened(path)
+    except CacheError as error:
+        tell(str(error))
+    except CompilerError as error:  # as in a folder from which nothing may be run
+        tell(f"{error}; it is compiled anew")
+    return None
+
+
+def _built(
+    source: str,
+    key: str,
+    opened: Callable[[Path], _Opened],
+    compiler: Compiler,
+    cache: Cache | None,
+    tell: Tell,
+) -> _Opened:
+    try:
+        with temporary_folder() as folder:
+            text, library = folder / "program.c", folder / LIBRARY
+            with reporting_temporary_errors():
+                text.write_text(source, encoding="utf-8")
+            compiler.build(text, library)
+            loaded = opened(library)
+            if cache is not None:
+                _keep(cache, key, library, tell)
+            return loaded
+    except StorageError as error:
+        raise CompilerError(str(error)) from None
+
+
+def _keep(cache: Cache, key: str, library: Path, tell: Tell) -> None:
+    try:
+        cache.store(key, library)
+    except CacheError as error:
+        tell(f"{error}; compiled code is not kept")
