@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 from vsacli import inverse_dynamics
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import margin
-from vsacli.analysis.between import SAMPLES_ONLY, SCANNED, times_between
+from vsacli.analysis.between import SAMPLES_ONLY, SCANNED
 from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
@@ -253,16 +253,6 @@ def test_a_spike_between_coarse_steps() -> None:
     assert report.joints[0].margin == pytest.approx(1 - everywhere / stiffness, rel=KNOWN)
 
 
-def test_times_for_whoever_judges_a_trajectory_by_its_steps() -> None:
-    robot, trajectory = three_joints()
-    times = times_between(robot, trajectory)
-    joints = inverse_dynamics(robot, trajectory).report.joints
-    found = [joint.between["margin"].time for joint in joints if joint.between]
-    assert found
-    assert set(found) <= set(times.tolist())
-    assert np.all(np.diff(times) >= 0)
-
-
 def test_where_derivatives_are_given_the_samples_are_all_there_is() -> None:
     robot, trajectory = three_joints()
     motion = trajectory.block(0, trajectory.samples)
@@ -273,7 +263,6 @@ def test_where_derivatives_are_given_the_samples_are_all_there_is() -> None:
     assert report.verdict == "ok"
     assert SAMPLES_ONLY in report.notes
     assert not any(joint.between for joint in report.joints)
-    assert times_between(robot, recorded).size == 0
     splined = inverse_dynamics(robot, Trajectory.from_samples(motion.time, motion.q, stiffness)).report
     assert splined.verdict == "infeasible"
     assert SAMPLES_ONLY not in splined.notes

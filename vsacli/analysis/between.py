@@ -18,9 +18,8 @@ from vsacli.analysis.clearances import bounded_quantities, clearances
 from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.minima import KNOWN, ROUNDING, Brackets, Known, brackets, narrowed
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.base.variables import Block
-from vsacli.dynamics.inverse import compute_block, usual_block
+from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -240,23 +239,3 @@ class Between:
             np.bitwise_or.at(block.flags, (found.step, found.joint), bits)
         self._found, self._passed = later, stop
         return block, own
-
-
-def times_between(
-    robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN
-) -> FloatArray:
-    """Times between the steps at which something comes nearer to its bound than at the steps around.
-
-    Whoever judges a trajectory by its steps judges it at these times, too; `trajectory.at` gives the motion.
-    None where derivatives are given at the samples, and nothing is known between them.
-    """
-
-    def compute(motion: Motion) -> Block:
-        return compute_block(robot, motion, near_singular)
-
-    between, count = Between(robot, trajectory, near_singular, compute), usual_block(len(robot.joints))
-    blocks = (
-        compute(trajectory.block(start, start + count)) for start in range(0, trajectory.samples, count)
-    )
-    times = [minima.block.time for _, found in between.marked(blocks) for minima in found]
-    return np.sort(np.concatenate([np.empty(0), *times]))
