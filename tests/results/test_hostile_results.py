@@ -140,7 +140,7 @@ def test_opening_reads_no_samples(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         assert sum(read) < 100_000  # bytes; heaps of texts have 4096 each
         read.clear()
         result.read("phi", 0, 1)
-        assert sum(read) >= result.read("phi").nbytes  # a chunk of 1 MB holds it whole
+        assert sum(read) >= result.read("phi").nbytes / 2  # two chunks hold it
 
 
 @pytest.mark.parametrize(
@@ -168,10 +168,10 @@ def with_damaged_flags(small_result: Path, path: Path) -> None:
     """Copy a result and change bytes of a variable that is compressed."""
     shutil.copy(small_result, path)
     with h5py.File(path, "r+") as file:
-        where = file["flags"].id.get_chunk_info(0).byte_offset
+        where = file["flags"].id.get_chunk_info(0)
     with path.open("r+b") as raw:
-        raw.seek(where)
-        raw.write(b"no deflate stream")
+        raw.seek(where.byte_offset)
+        raw.write(b"no deflate"[: where.size])
 
 
 def test_a_damaged_variable_is_no_missing_attribute(small_result: Path, tmp_path: Path) -> None:

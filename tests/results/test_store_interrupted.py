@@ -16,12 +16,16 @@ from vsacli.base.interrupts import interrupts_deferred
 from vsacli.results.store.reader import StoredResult
 
 ENDLESS = """
-import sys
+import threading
 from samples.results import PlannedTrajectory, random_block, robot, writing
 
+from vsacli.results.store import new_file
+
+new_file.BEHIND_FROM = 2**20
 block = random_block(2000, 2)
 with writing("r.h5", robot(), PlannedTrajectory(10**7), overwrite=True) as writer:
-    writer.write(block)
+    while threading.active_count() == 1:
+        writer.write(block)
     print("writing", flush=True)
     while True:
         writer.write(block)
@@ -33,8 +37,10 @@ from samples.results import random_block, write_result
 from vsacli.base.errors import StorageError
 from vsacli.base.interrupts import interrupts_deferred
 
+from vsacli.results.store import new_file
+
 block = random_block(20_000, 2)
-limit = int(sys.argv[1])
+limit, new_file.BEHIND_FROM = map(int, sys.argv[1:])
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 try:
     write_result("r.h5", block, step=5000, overwrite=True)
@@ -108,8 +114,9 @@ def test_a_writer_works_in_any_thread(tmp_path, block):
 
 # bytes: before the first write, in the layout, in the samples (4 MB), and in what closing the file adds
 @pytest.mark.parametrize("limit", [0, 3000, 2_000_000, 4_900_000])
-def test_disk_full(tmp_path, old, limit):
-    process = python(LIMITED, str(limit), folder=tmp_path)
+@pytest.mark.parametrize("behind_from", [2**30, 2**20])
+def test_disk_full(tmp_path, old, limit, behind_from):
+    process = python(LIMITED, str(limit), str(behind_from), folder=tmp_path)
     output, errors = process.communicate()
     assert (process.returncode, errors) == (0, "")
     assert output == (

@@ -20,7 +20,6 @@ import h5py
 
 from vsacli.base.errors import InputError, StorageError
 from vsacli.documents.source import HDF5_SIGNATURE
-from vsacli.results.store.schema import CHUNK_BYTES
 
 EXPECTED = "expected a result file, as invdyn or simulate writes it"
 
@@ -30,6 +29,8 @@ _REFERENCE = struct.Struct("<IQI")
 _HEAP = b"GCOL\x01\0\0\0"
 _SMALLEST_HEAP = 4096
 _LARGEST_HEAP = 2**26
+_LARGEST_CHUNK = 2**20
+"""Bytes that a chunk may have in memory, whatever it is compressed to in the file."""
 
 
 class CheckedFile(h5py.File):  # type: ignore[misc]  # h5py has no types
@@ -229,7 +230,7 @@ def _check_chunks(dataset: h5py.Dataset, size: int) -> None:
         claimed *= length
     if dataset.size:
         claimed = max(claimed, dataset.id.get_chunk_info_by_coord((0,) * dataset.ndim).size)
-    if claimed > max(size, CHUNK_BYTES):
+    if claimed > max(size, _LARGEST_CHUNK):
         raise ValueError(f"{dataset.name} claims chunks of {claimed:,} bytes in a file of {size:,}")
 
 

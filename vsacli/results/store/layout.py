@@ -22,11 +22,11 @@ from vsacli.base.version import __version__
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import declared
 from vsacli.documents.resolved_fields import ResolvedField
+from vsacli.results.store.chunks import chunk_rows
 from vsacli.results.store.inputs import write_sources
 from vsacli.results.store.schema import (
     EXISTING,
     TEXT,
-    chunk_rows,
     row_shape,
     storable,
     storage_type,

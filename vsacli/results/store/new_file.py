@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 import h5py
 
@@ -14,8 +14,17 @@ from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
 from vsacli.base.storage import reporting_storage_errors, storage_error
 
+if TYPE_CHECKING:
+    from vsacli.results.store.write_behind import WriteBehind
+
 CHUNK_CACHE_SLOTS = 11
-"""Chunks of a variable that HDF5 finds in its cache: few, since samples are written in order."""
+"""Chunks of a dataset that HDF5 finds in its cache: few, since rows are written in order."""
+
+BEHIND_FROM = 2**24
+"""Bytes that are written at once, in some 10 ms, before a thread is worth its start."""
+
+BEHIND = 2**25
+"""Bytes that may wait to be written: some more than a block of seven joints with all variables."""
 
 
 class NewFile:
@@ -33,6 +42,8 @@ class NewFile:
         self._cleanup = contextlib.ExitStack()
         self._file: Any = None  # h5py has no types
         self._sink: Sink | None = None
+        self._behind: WriteBehind | None = None
+        self._bytes = 0
 
     @property
     def is_open(self) -> bool:
@@ -74,6 +85,26 @@ class NewFile:
             if self._sink is not None and self._sink.error is not None:
                 raise storage_error(self._staged.path, self._sink.error) from self._sink.error
 
+    def do(self, task: Callable[[], None], size: int) -> None:
+        """Use the file in a task that holds so many bytes: now, or of a long file behind the caller's back.
+
+        Within `used`, as what the task does is; tasks are done in their order.
+        """
+        self._bytes += size
+        if self._bytes <= BEHIND_FROM:
+            task()
+            return
+        if self._behind is None:
+            from vsacli.results.store.write_behind import WriteBehind
+
+            self._behind = WriteBehind(BEHIND)
+        self._behind.put(task, size)
+
+    def wait(self) -> None:
+        """Wait until all tasks are done; within `used`."""
+        if self._behind is not None:
+            self._behind.wait()
+
     def close(self) -> None:
         """Write what is left; within `used`."""
         assert self._sink is not None, "it is open"
@@ -81,8 +112,10 @@ class NewFile:
         self._sink.close()
 
     def discard(self) -> None:
-        """Close what is open."""
+        """Close what is open; what is not written is lost."""
         with interrupts_deferred():
+            if self._behind is not None:
+                self._behind.discard()
             self._cleanup.close()
 
 

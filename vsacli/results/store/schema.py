@@ -13,7 +13,6 @@ from vsacli.base.variables import MOTORS, Variable
 from vsacli.base.wrench import WRENCH_AXES
 
 FORMAT = "vsacli-result/1"
-CHUNK_BYTES = 2**20
 EXISTING = "existing"
 """Attribute of a variable that depends on devices of the joints: 1 at each column that a joint has."""
 
@@ -59,12 +58,6 @@ def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
     """Lengths of the axes after time."""
     lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
     return tuple(lengths[dim] for dim in variable.dims)
-
-
-def chunk_rows(samples: int, row_bytes: int) -> int:
-    """Samples in a chunk: the largest power of two within CHUNK_BYTES, or all samples if they are fewer."""
-    rows = max(1, CHUNK_BYTES // row_bytes)
-    return min(samples, 1 << (rows.bit_length() - 1))
 
 
 def storable(text: str) -> str:

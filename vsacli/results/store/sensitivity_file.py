@@ -8,10 +8,11 @@ from typing import Any, NamedTuple, Protocol
 import h5py
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.base.outputs import Staged
 from vsacli.base.variables import MOTORS, Block
-from vsacli.results.store.schema import TEXT, chunk_rows
+from vsacli.results.store.chunks import ChunkFiller, chunk_rows
+from vsacli.results.store.schema import TEXT
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -75,9 +76,9 @@ class SensitivityWriter(ResultWriter):
             units = self._labels("parameter_unit", unit_names, "SI unit of the number")
             for dataset in (values, units):
                 dataset.dims[0].attach_scale(scale)
-            self._slopes = {
-                name: self._slope(name, of_motors, scale) for name, of_motors in self._wanted.items()
-            }
+            for name, of_motors in self._wanted.items():
+                slope = self._slope(name, of_motors, scale)
+                self._fillers[f"{name}{_SLOPE}"] = ChunkFiller(slope, self._hdf5.do)
 
     def _labels(self, name: str, texts: Iterable[str], words: str) -> h5py.Dataset:
         dataset = self._file.create_dataset(name, data=np.array(list(texts), dtype=TEXT), dtype=TEXT)
@@ -88,7 +89,7 @@ class SensitivityWriter(ResultWriter):
         row = (len(self._numbers), len(self._robot.joints), *((len(MOTORS),) if of_motors else ()))
         samples = self._trajectory.samples
         dataset = self._file.create_dataset(
-            f"{name}_slope",
+            f"{name}{_SLOPE}",
             shape=(samples, *row),
             maxshape=(samples, *row),
             dtype="<f8",
@@ -101,16 +102,10 @@ class SensitivityWriter(ResultWriter):
             dataset.dims[axis].attach_scale(each)
         return dataset
 
-    def _append(self, block: Any) -> None:
-        """The variables, and their derivatives.
-
-        Args:
-            block: as `Sloped`.
-        """
-        start = self._written
-        super()._append(block.block)
-        for name, dataset in self._slopes.items():
-            dataset[start : self._written] = block.over_time(name)
+    def _values(self, block: Any, name: str) -> AnyArray:
+        """Of a block as `Sloped`."""
+        variable = name.removesuffix(_SLOPE)
+        return super()._values(block.block, name) if variable == name else block.over_time(variable)
 
     def _size(self) -> int:
         columns = sum(len(MOTORS) if of_motors else 1 for of_motors in self._wanted.values())
@@ -120,3 +115,6 @@ class SensitivityWriter(ResultWriter):
 
 _COMPUTED = ("q", "dq", "ddq", "tau_e", "theta", "tau_motor", "motor_power", "flags")
 """Variables beside their derivatives."""
+
+_SLOPE = "_slope"
+"""What the name of a derivative ends with."""

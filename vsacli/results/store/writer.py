@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType, TracebackType
 from typing import Any, Protocol, Self
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
@@ -15,6 +15,7 @@ from vsacli.base.signals import COMMANDED
 from vsacli.base.storage import check_free_space
 from vsacli.base.variables import MOTOR_CONSTANTS, UNCERTAIN, VARIABLES, Variable, deviation, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
+from vsacli.results.store.chunks import ChunkFiller
 from vsacli.results.store.layout import create_layout, row_bytes
 from vsacli.results.store.new_file import NewFile
 from vsacli.results.store.schema import FORMAT, TEXT, storable
@@ -63,7 +64,7 @@ class ResultWriter:
         self._trajectory = trajectory
         self._variables = self._selected(variables, robot, trajectory)
         self._provenance = {"command_line": "", **provenance}
-        self._written = 0
+        self._fillers: dict[str, ChunkFiller] = {}
 
     def __enter__(self) -> Self:
         """Create the file, with everything but samples and report.
@@ -80,13 +81,14 @@ class ResultWriter:
         return self
 
     def write(self, block: Samples) -> None:
-        """Append a block of steps.
+        """Append a copy of a block of steps, which of a long file is written later, in a thread.
 
         Raises:
-            StorageError: the disk is full or fails.
+            StorageError: the disk is full or fails, perhaps over an earlier block.
         """
         with self._hdf5.used():
-            self._append(block)
+            for name, filler in self._fillers.items():
+                filler.append(self._values(block, name))
 
     def finish(self, report: Mapping[str, Any]) -> None:
         """Store the report; the file holds the steps written so far.
@@ -98,6 +100,9 @@ class ResultWriter:
             StorageError: the disk is full or fails.
         """
         with self._hdf5.used():
+            for filler in self._fillers.values():
+                filler.finish()
+            self._hdf5.wait()
             self._complete(report)
             self._hdf5.close()
 
@@ -113,19 +118,17 @@ class ResultWriter:
         check_free_space(self._staged.path, self._size())
         with self._hdf5.used():
             file = self._file = self._hdf5.open()
-            self._stored = create_layout(
+            stored = create_layout(
                 file, self._format, self._robot, self._trajectory, self._variables, self._provenance
             )
+        self._fillers = {name: ChunkFiller(dataset, self._hdf5.do) for name, dataset in stored.items()}
 
-    def _append(self, block: Samples) -> None:
-        for name, dataset in self._stored.items():
-            dataset[self._written : self._written + len(block.time)] = getattr(block, name)
-        self._written += len(block.time)
+    def _values(self, block: Any, name: str) -> AnyArray:
+        """What a block has for a dataset."""
+        values: AnyArray = getattr(block, name)
+        return values
 
     def _complete(self, report: Mapping[str, Any]) -> None:
-        if self._written < self._trajectory.samples:
-            for dataset in self._stored.values():
-                dataset.resize(self._written, axis=0)
         text = storable(json.dumps(report, ensure_ascii=False, allow_nan=False))
         self._file.create_group("report").create_dataset("json", data=text, dtype=TEXT)
         self._file.attrs["verdict"] = report["verdict"]

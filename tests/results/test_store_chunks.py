@@ -1,0 +1,180 @@
+"""Samples in chunks: whatever the blocks, the file holds what assigning them to its datasets would give."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+from samples.marks import slow
+from samples.results import (
+    REPORT,
+    STORED,
+    PlannedTrajectory,
+    random_block,
+    robot,
+    write_result,
+    writing,
+)
+
+from vsacli.base.variables import Block
+from vsacli.results.store import chunks, new_file
+from vsacli.results.store.chunks import ChunkFiller
+from vsacli.results.store.reader import StoredResult
+from vsacli.results.store.write_behind import WriteBehind
+
+ROWS = 32
+"""Samples in a chunk of what two joints with two motors each have, in these tests."""
+
+
+@pytest.fixture
+def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Several chunks in a few samples."""
+    monkeypatch.setattr(chunks, "CHUNK_BYTES", ROWS * 2 * 2 * 8)
+
+
+@pytest.fixture
+def in_a_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short files, too, are written in a thread."""
+    monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
+    monkeypatch.setattr(new_file, "BEHIND", 5000)
+
+
+def threads() -> list[str]:
+    return [each.name for each in threading.enumerate() if each.name.startswith("vsacli-writing")]
+
+
+NAMES = ["q", "theta", "flags"]
+
+
+@pytest.mark.usefixtures("small_chunks")
+@pytest.mark.parametrize("samples", [1, 2, ROWS - 1, ROWS, ROWS + 1, 3 * ROWS + 1])
+@pytest.mark.parametrize("step", [7, slow(1), slow(ROWS), slow(10**6)])
+def test_any_blocks(tmp_path: Path, samples: int, step: int) -> None:
+    block = random_block(samples, 2)
+    check(write_result(tmp_path / "r.h5", block, step=step, variables=NAMES), block, NAMES)
+
+
+@pytest.mark.usefixtures("small_chunks", "in_a_thread")
+@pytest.mark.parametrize("step", [7, 10**6])
+def test_blocks_that_a_thread_writes(tmp_path: Path, step: int) -> None:
+    block = random_block(10 * ROWS + 1, 2)
+    check(write_result(tmp_path / "r.h5", block, step=step), block, STORED)
+    assert not threads()
+
+
+def check(path: Path, block: Block, names: Iterable[str]) -> None:
+    """The chunks hold the block."""
+    with h5py.File(path) as file:
+        for name in names:
+            np.testing.assert_array_equal(file[name][...], getattr(block, name), strict=True)
+            assert file[name].chunks[0] <= 8 * ROWS  # two bytes a joint
+
+
+@pytest.mark.usefixtures("small_chunks")
+@pytest.mark.parametrize("written", [1, ROWS - 1, ROWS, slow(ROWS + 1), 2 * ROWS + 5])
+@pytest.mark.parametrize("behind", [False, slow(True)])
+def test_a_run_that_ends_early(
+    tmp_path: Path, request: pytest.FixtureRequest, written: int, behind: bool
+) -> None:
+    if behind:
+        request.getfixturevalue("in_a_thread")
+    block = random_block(written, 2)
+    path = write_result(tmp_path / "r.h5", block, step=20, planned=10 * ROWS, variables=NAMES)
+    with StoredResult.open(path) as result:
+        assert result.samples == written
+        for name in result.variables:
+            np.testing.assert_array_equal(result.read(name), getattr(block, name), strict=True)
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        assert data.sizes["time"] == written
+        np.testing.assert_array_equal(data.theta, block.theta)
+
+
+@pytest.mark.parametrize("samples", [slow(33), slow(704)])
+def test_a_thousand_joints(tmp_path: Path, samples: int) -> None:
+    block = random_block(samples, 1000)
+    names = ["q", "tau_motor", "flags"]
+    path = write_result(tmp_path / "r.h5", block, "R" * 1000, step=327, variables=names)
+    with h5py.File(path) as file:
+        for name in names:
+            np.testing.assert_array_equal(file[name][...], getattr(block, name), strict=True)
+        assert file["tau_motor"].chunks == (17 if samples == 33 else 32, 1000, 2)  # 16 kB a row
+
+
+def test_all_chunks_are_about_equally_full(tmp_path: Path) -> None:
+    rows = chunks.CHUNK_BYTES // (2 * 2 * 8)
+    one_more = write_result(tmp_path / "r.h5", random_block(rows + 1, 2), variables=["phi"], step=rows)
+    assert one_more.stat().st_size < 1.3 * (rows + 1) * (8 + 2 * 2 * 8)  # 2 if the second chunk were as large
+
+
+@pytest.mark.parametrize("flags", [np.zeros((100, 3), "<u2"), np.arange(300, dtype="<u2").reshape(100, 3)])
+def test_compressed_chunks_are_those_of_the_library(tmp_path: Path, flags: np.ndarray) -> None:
+    kind = {"shape": flags.shape, "dtype": flags.dtype, "chunks": (40, 3), "compression": 4}
+    with h5py.File(tmp_path / "r.h5", "w") as file:
+        file.create_dataset("theirs", **kind)[...] = flags
+        filler = ChunkFiller(file.create_dataset("ours", **kind), lambda task, _: task())
+        filler.append(flags)
+        filler.finish()
+        np.testing.assert_array_equal(file["ours"][...], flags)
+        for start in (0, 40, 80):
+            ours, theirs = (file[name].id.read_direct_chunk((start, 0)) for name in ("ours", "theirs"))
+            assert ours == theirs
+
+
+@pytest.mark.usefixtures("small_chunks", "in_a_thread")
+def test_a_block_may_change_once_it_is_written(tmp_path: Path) -> None:
+    block = random_block(3 * ROWS, 2)
+    theta = block.theta.copy()
+    with writing(tmp_path / "r.h5", robot(), PlannedTrajectory(3 * ROWS)) as writer:
+        writer.write(block)
+        block.theta[...] = 0
+        writer.finish(REPORT)
+    with StoredResult.open(tmp_path / "r.h5") as result:
+        np.testing.assert_array_equal(result.read("theta"), theta)
+
+
+@pytest.mark.usefixtures("small_chunks", "in_a_thread")
+def test_an_exception_of_the_caller_ends_the_thread(tmp_path: Path) -> None:
+    def run() -> None:
+        with writing(tmp_path / "r.h5", robot(), PlannedTrajectory(10**5)) as writer:
+            writer.write(random_block(3 * ROWS, 2))
+            assert threads()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        run()
+    assert not threads()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_waits_is_bounded() -> None:
+    """Nothing is done before `go`, and the caller waits once more than 10 bytes wait."""
+    go, done, behind = threading.Event(), [], WriteBehind(10)
+
+    def task(number: int):
+        return lambda: (go.wait(), done.append(number))
+
+    for number in range(5):
+        behind.put(task(number), 2)
+    timer = threading.Timer(0.05, lambda: (done.append("go"), go.set()))
+    timer.start()
+    behind.put(task(5), 2)
+    assert done[:2] == ["go", 0]
+    behind.wait()
+    assert done == ["go", 0, 1, 2, 3, 4, 5]
+    behind.discard()
+    assert not threads()
+
+
+def test_what_goes_wrong_in_the_thread_is_raised_once_by_the_caller() -> None:
+    behind, done = WriteBehind(10), []
+    behind.put(lambda: 1 / 0, 5)
+    behind.put(lambda: done.append(1), 5)
+    with pytest.raises(ZeroDivisionError):
+        behind.wait()
+    behind.discard()
+    assert not threads()
