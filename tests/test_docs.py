@@ -24,7 +24,8 @@ from samples.command_line import installed
 from samples.marks import slow
 
 import vsacli
-from vsacli.analysis.self_check import LADDER_BOUND, SPRING_BOUND
+from vsacli.analysis.ladder import LADDER_BOUND
+from vsacli.analysis.self_check import SPRING_BOUND
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN
 from vsacli.cli.main import vsacli as group
 from vsacli.documents.source import MAX_DOCUMENT_BYTES

@@ -13,8 +13,8 @@ from samples.drives import motion
 from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
+from vsacli.analysis.ladder import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.analysis.report import Report
-from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.drive import Drive, drive
@@ -150,6 +150,13 @@ def fast_recording(**options: Any) -> Trajectory:
     time = np.arange(100001) / 10000
     q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])
     return Trajectory.from_samples(time, q, np.full_like(q, 1000.0), fit="interpolate", **options)
+
+
+def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
+    """Those of long chains are computed some after the others."""
+    whole = ladder(*load("7R"))
+    monkeypatch.setattr("vsacli.analysis.ladder.usual_block", lambda _joints: 200)
+    assert ladder(*load("7R")) == whole
 
 
 def test_bound_follows_rounding_where_sampling_is_fast():

@@ -11,8 +11,9 @@ import numpy as np
 from vsacli.analysis.between import Between, Minima
 from vsacli.analysis.friction_passages import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
+from vsacli.analysis.ladder import ladder
 from vsacli.analysis.report import Report
-from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, ladder, spring_residual
+from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, spring_residual
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
