@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from samples.shipped import shipped_robot
 
+from vsacli.compute.aligned_rows import LINE, address, aligned_rows
 from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.choice import TRACE_FROM
 from vsacli.compute.engine.engines import TracedEngine, kernel_program
@@ -51,6 +52,19 @@ def test_rows_are_used_again():
     function = RowFunction(program)
     # The forward pass leaves some thirty numbers a joint for the backward pass, and the rest is short-lived.
     assert sum(function.rows.values()) < len(program.operations) / 10
+
+
+@pytest.mark.parametrize("samples", [1, 7, 64, 12288, 20000])
+@pytest.mark.parametrize("dtype", [np.float64, np.uint16, np.bool_])
+def test_rows_of_the_workspace_begin_at_whole_vectors_in_different_sets_of_a_cache(samples, dtype):
+    rows = aligned_rows(5, samples, dtype)
+    assert rows.shape == (5, samples)
+    assert rows.dtype == dtype
+    assert {address(row) % LINE for row in rows} == {0}
+    assert rows.strides[0] // LINE % 2 == 1
+    for number, row in enumerate(rows):
+        row[:] = number % 2
+    assert [row.mean() for row in rows] == [0, 1, 0, 1, 0]  # none lies in another
 
 
 def test_a_kernel_with_loops_runs_as_it_is():

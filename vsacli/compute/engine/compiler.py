@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import VsacliError
+from vsacli.compute.aligned_rows import LINE, address, aligned_rows
 
 NATIVE = "-march=native"
 
@@ -36,8 +35,8 @@ LIES = ("__FINITE_MATH_ONLY__ 1", "__FAST_MATH__ 1", "__ASSOCIATIVE_MATH__ 1", "
 SAMPLES_PER_THREAD = 2048
 """Fewer are not worth a thread."""
 
-DOUBLES_PER_VECTOR = 8
-"""Doubles in the longest vector, and in a line of the processor's cache."""
+DOUBLES_PER_VECTOR = LINE // np.dtype(np.float64).itemsize
+"""Samples in the longest vector."""
 
 
 class CompilerError(VsacliError):
@@ -137,10 +136,10 @@ class Library:
     def __call__(self, rows: Sequence[FloatArray], threads: int) -> FloatArray:
         """Run on rows (samples,) of doubles, contiguous; the outputs, (rows, samples)."""
         samples = len(rows[0])
-        outputs = _aligned(self._outputs, samples)
-        sources = np.array([_address(row) for row in rows], dtype=np.uintp)
-        targets = _address(outputs) + np.arange(self._outputs, dtype=np.uintp) * np.uintp(outputs.strides[0])
-        given = _address(sources), _address(targets)
+        outputs = aligned_rows(self._outputs, samples)
+        sources = np.array([address(row) for row in rows], dtype=np.uintp)
+        targets = address(outputs) + np.arange(self._outputs, dtype=np.uintp) * np.uintp(outputs.strides[0])
+        given = address(sources), address(targets)
         count = min(threads, max(1, samples // SAMPLES_PER_THREAD))
         own, *others = _parts(samples, count)
         running = [_pool(count - 1).submit(self._run, *part, *given) for part in others]
@@ -158,23 +157,6 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)  # a child process has none of the threads
-
-
-def _aligned(rows: int, samples: int) -> FloatArray:
-    """Space for rows that each begin at a whole vector.
-
-    They are an odd number of vectors apart: at a power of two, all would fall into the same sets of a cache.
-    """
-    distance = DOUBLES_PER_VECTOR * (samples // DOUBLES_PER_VECTOR // 2 * 2 + 3)
-    space = np.empty(rows * distance + DOUBLES_PER_VECTOR)
-    first = -(_address(space) // space.itemsize) % DOUBLES_PER_VECTOR
-    return space[first : first + rows * distance].reshape(rows, distance)[:, :samples]
-
-
-def _address(array: npt.NDArray[Any]) -> int:
-    """Of its first entry."""
-    address: int = array.__array_interface__["data"][0]
-    return address
 
 
 def _parts(samples: int, count: int) -> list[tuple[int, int]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.compute.aligned_rows import aligned_rows
 
 if TYPE_CHECKING:
     from vsacli.compute.tracing import Program
@@ -114,7 +115,7 @@ class TracedEngine:
             return NumPyEngine().run(kernel, rows)
         if function not in self._workspaces:
             self._workspaces[function] = function.workspace(samples_per_pass(len(rows)))
-        outputs = np.empty((kernel.outputs, len(rows[0])))
+        outputs = aligned_rows(kernel.outputs, len(rows[0]))
         for part in passes(rows):
             function([row[part] for row in rows], outputs[:, part], self._workspaces[function])
         return outputs

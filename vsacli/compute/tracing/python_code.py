@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from vsacli.base.arrays import FloatArray, by_joint, over_time
+from vsacli.compute.aligned_rows import aligned_rows
 from vsacli.compute.tracing.array import TracedArray, cells_of
-from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol
+from vsacli.compute.tracing.program import CHOOSING, Kind, Operand, Program, Symbol, kind_of
 
 _EXPRESSIONS = {
     "add": "{} + {}",
@@ -103,12 +104,12 @@ class RowFunction:
         allocation = _RowAllocation(program)
         head = "def program(inputs, workspace, outputs):"
         code = _compiled("\n".join([head, *allocation.heading(), *allocation.statements()]))
-        self._run: Callable[..., None] = FunctionType(code, {**vars(np), "nan": np.nan, "inf": np.inf})
+        self._run: Callable[..., None] = FunctionType(code, {**vars(np), **allocation.constants})
         self.rows = allocation.counts
 
     def workspace(self, samples: int) -> Workspace:
         """Rows for the intermediate values of at most so many samples."""
-        return tuple(np.empty((self.rows[kind], samples), dtype) for kind, dtype in _DTYPES.items())
+        return tuple(aligned_rows(self.rows[kind], samples, dtype) for kind, dtype in _DTYPES.items())
 
     def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, workspace: Workspace) -> None:
         """Compute outputs, (outputs, samples), in place from rows of inputs, (samples,)."""
@@ -118,11 +119,18 @@ class RowFunction:
 
 
 class _RowAllocation:
-    """Which row each value of a program lies in while it is live, as a compiler allocates registers."""
+    """Which row each value of a program lies in while it is live, as a compiler allocates registers.
+
+    Attributes:
+        counts: how many rows there are of each kind.
+        constants: by their names, as arrays (): NumPy would make one of each number, at every call.
+    """
 
     def __init__(self, program: Program) -> None:
         self._program = program
         self.counts: dict[Kind, int] = defaultdict(int)
+        self.constants: dict[str, npt.NDArray[Any]] = {}
+        self._constant_names: dict[tuple[Kind, str], str] = {}
         self._free: dict[Kind, list[str]] = defaultdict(list)
         self._row = {symbol.index: f"x{number}" for number, symbol in enumerate(program.inputs)}
         self._last_use = {
@@ -166,13 +174,17 @@ class _RowAllocation:
             self._free_dead_operands(symbol, number)
         else:
             self._free_dead_operands(symbol, number)
-            yield f" {symbol.operation}({', '.join(operands)}, out={self._allocated(symbol)})"
+            out = "out=" if symbol.operation in CHOOSING else ""  # a keyword takes longer; these ask for it
+            yield f" {symbol.operation}({', '.join(operands)}, {out}{self._allocated(symbol)})"
 
     def _operand(self, operand: Operand, kind: Kind = Kind.REAL) -> str:
         """A row, or a constant as values of a kind have it."""
         if isinstance(operand, Symbol):
             return self._row[operand.index]
-        return repr(int(operand) if kind is Kind.BITS else operand)
+        kind = _kind_of_constant(operand, kind)
+        name = self._constant_names.setdefault((kind, repr(operand)), f"c{len(self._constant_names)}")
+        self.constants[name] = np.array(operand, dtype=_DTYPES[kind])
+        return name
 
     def _allocated(self, symbol: Symbol) -> str:
         """A row for a value: that of an output, one that is free, or a new one."""
@@ -192,6 +204,11 @@ class _RowAllocation:
             dead = self._last_use[operand.index] == number and operand.index not in kept
             if dead and operand.operation != "input":
                 self._free[operand.kind].append(self._row[operand.index])
+
+
+def _kind_of_constant(constant: float | int | bool, wanted: Kind) -> Kind:
+    """That of the operation, but for comparisons: they find truth values for numbers."""
+    return wanted if wanted is Kind.BITS else kind_of(constant)
 
 
 def _unpacking(letter: str, count: int, whole: str) -> str:

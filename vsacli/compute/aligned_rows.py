@@ -1,0 +1,28 @@
+"""Rows of samples that lie well in memory for vector registers and caches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vsacli.base.arrays import AnyArray
+
+LINE = 64
+"""Bytes of the longest vector, and of a line of the processor's cache."""
+
+
+def aligned_rows(rows: int, samples: int, dtype: type[np.generic] = np.float64) -> AnyArray:
+    """Space for rows (rows, samples), not set, that each begin at a whole vector.
+
+    They are an odd number of lines apart: at a power of two, all would fall into the same sets of a cache.
+    """
+    size = np.dtype(dtype).itemsize
+    distance = LINE * (samples * size // LINE // 2 * 2 + 3)
+    space = np.empty(rows * distance + LINE, dtype=np.uint8)
+    first = -address(space) % LINE
+    return space[first : first + rows * distance].view(dtype).reshape(rows, distance // size)[:, :samples]
+
+
+def address(array: AnyArray) -> int:
+    """Of its first entry."""
+    found: int = array.__array_interface__["data"][0]
+    return found
