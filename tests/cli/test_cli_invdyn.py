@@ -113,10 +113,10 @@ def test_json_is_all_there_is_on_stdout(vsacli, tmp_path, too_soft):
 def no_computing(monkeypatch):
     """Fail the test if anything is computed."""
 
-    def compute(*_arguments):
+    def compute(*_arguments, **_options):
         pytest.fail("computed before the output was checked")
 
-    monkeypatch.setattr(pipeline, "compute_block", compute)
+    monkeypatch.setattr(pipeline, "block_of", compute)
 
 
 @pytest.mark.usefixtures("no_computing")
@@ -209,10 +209,10 @@ def test_derivative_wrong_by_one_percent_fails_the_self_check(vsacli, tmp_path, 
 
 
 def test_bug_leaves_a_traceback_a_sentence_and_no_file(vsacli, tmp_path, motion, monkeypatch):
-    def compute(*_arguments):
+    def compute(*_arguments, **_options):
         raise RuntimeError("boom")
 
-    monkeypatch.setattr(pipeline, "compute_block", compute)
+    monkeypatch.setattr(pipeline, "block_of", compute)
     done = vsacli("invdyn", ROBOT, motion)
     assert (done.code, done.out) == (1, "")
     assert done.err.startswith("Traceback (most recent call last)")

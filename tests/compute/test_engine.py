@@ -27,7 +27,7 @@ from vsacli.base.flags import Flag
 from vsacli.compute.engine import choose, compiler
 from vsacli.compute.engine.engines import Engine
 from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.inverse import InverseDynamics, compute_block
+from vsacli.dynamics.inverse import InverseDynamics, block_of, compute_block
 from vsacli.robot.model import Robot
 
 pytestmark = needs_compiler
@@ -128,8 +128,8 @@ def test_other_preload_and_followed_deflections_agree():
     integrated = np.moveaxis(expected.phi, 0, -1) * 1.001
     kernel = InverseDynamics(turned, integrated=True)
     engine = choose("c", kernel, 1, 1).engine
-    found = compute_block(turned, motion, integrated=integrated, engine=engine)
-    assert_agree(found, compute_block(turned, motion, integrated=integrated))
+    found = block_of(kernel, motion, engine, integrated=integrated)
+    assert_agree(found, block_of(kernel, motion, integrated=integrated))
 
 
 @pytest.mark.usefixtures("quickly")

@@ -58,9 +58,8 @@ class Minima(NamedTuple):
 
     def where(self, chosen: BoolArray) -> Minima:
         """Some of them."""
-        rows = {name: array[chosen] for name, array in self.block.arrays().items()}
         return Minima(
-            Block(**rows),
+            self.block.taken(chosen),
             self.quantity[chosen],
             self.joint[chosen],
             self.clearance[chosen],
@@ -205,7 +204,7 @@ class Between:
     def _keep(self, found: Brackets, steps: IndexArray, crossed: BoolArray) -> None:
         """Everything at minima, with the flags of what is least there, for the block of the nearest step."""
         block = self._judged(self._compute(self._trajectory.at(found.time[:, 1])))
-        own = Block(**{**block.arrays(), "flags": block.flags & self._bits[found.function, None]})
+        own = block.replaced(flags=block.flags & self._bits[found.function, None])
         joint = self._joint[found.function]
         self._found.append(Minima(own, found.function, joint, found.value[:, 1], steps, crossed))
 

@@ -14,7 +14,8 @@ from vsacli.base.flags import Flag, has
 from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine
-from vsacli.dynamics.inverse import compute_block, usual_block
+from vsacli.dynamics.balances import BalancedDynamics
+from vsacli.dynamics.inverse import block_of, usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -59,7 +60,7 @@ RUNGS = (
 stiffness where it is not commanded."""
 
 PROBES = 200
-"""About how many times are probed."""
+"""About how many times are probed, and steps at which the laws of springs are evaluated apart."""
 
 STEP_SCALES = np.array([8.0**-power for power in range(5)])
 """Difference steps tried at each time; the best counts, since a wrong derivative is wrong at every step.
@@ -104,9 +105,13 @@ def ladder(
     times, reach = trajectory.check_points(PROBES)
     steps = np.minimum(reach / 3, trajectory.duration / 500)
 
+    frame = None if trajectory.wrench is None else trajectory.wrench.frame
+    damped = () if internal is None else internal.joints
+    kernel = BalancedDynamics(robot, frame, internal=damped)  # as that of the run, which is compiled
+
     def compute(time: FloatArray) -> Block:
         inside = {} if internal is None else internal.at(time)
-        return compute_block(robot, trajectory.at(time), engine=engine, internal=inside)
+        return block_of(kernel, trajectory.at(time), engine, internal=inside)
 
     errors, everywhere = _ladder(robot, trajectory, compute, times, FIRST_SCALES[:, None] * steps)
     if not (everywhere and errors.max() <= CLEAR):

@@ -13,7 +13,7 @@ from vsacli.analysis.friction_passages import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.ladder import ladder
 from vsacli.analysis.report import Report
-from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, spring_residual
+from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, SpringCheck
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
@@ -22,8 +22,9 @@ from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, h
 from vsacli.base.units import time_text
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, Tell, choose, unheard
-from vsacli.dynamics.energy import RunEnergy
-from vsacli.dynamics.inverse import InverseDynamics, compute_block, fitted, usual_block
+from vsacli.dynamics.balances import BALANCES, BalancedDynamics
+from vsacli.dynamics.inverse import block_of, fitted, usual_block
+from vsacli.dynamics.run_energy import RunEnergy
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -90,15 +91,16 @@ class Run:
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
         self._internal = _internal_motions(robot, trajectory)
         inside = () if self._internal is None else self._internal.joints
-        kernel = InverseDynamics(robot, frame, near_singular, self._deflections is not None, inside)
-        self.choice = choose(engine, kernel, trajectory.samples, threads, tell)
+        integrated = self._deflections is not None
+        self._kernel = BalancedDynamics(robot, frame, near_singular, integrated, inside)
+        self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
-        self._energy = RunEnergy(robot)
+        self._energy = RunEnergy(robot, self.choice.engine)
         self._passages = FrictionPassages(robot)
         self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
         self._between = Between(robot, trajectory, near_singular, self._compute, self._judged)
-        self._spring_residual = 0.0
+        self._springs = SpringCheck(robot, trajectory.samples)
         self._samples = 0
 
     def __iter__(self) -> Iterator[Block]:
@@ -107,7 +109,7 @@ class Run:
             if self._stop_on_infeasible and infeasible.any():
                 last = int(infeasible.argmax())
                 yield self._added(
-                    _shortened(block, last + 1), [each.where(each.step <= last) for each in minima]
+                    block.taken(slice(last + 1)), [each.where(each.step <= last) for each in minima]
                 )
                 return
             yield self._added(block, minima)
@@ -120,9 +122,8 @@ class Run:
     def _compute(self, motion: Motion) -> Block:
         integrated = None if self._deflections is None else self._deflections.at(motion.time)
         internal = {} if self._internal is None else self._internal.at(motion.time - self.trajectory.start)
-        return compute_block(
-            self.robot, motion, self._near_singular, integrated, self.choice.engine, internal
-        )
+        engine = self.choice.engine
+        return block_of(self._kernel, motion, engine, integrated=integrated, internal=internal)
 
     def _judged(self, block: Block) -> Block:
         """With the limits that are exceeded beyond what recorded signals leave uncertain."""
@@ -143,12 +144,13 @@ class Run:
             for index, summary in enumerate(self._summaries):
                 summary.add_between(minima.of_joint(index))
         self._passages.add(block)
-        self._spring_residual = float(np.maximum(self._spring_residual, spring_residual(self.robot, block)))
+        self._springs.add(block)
         for summary in self._summaries:
             summary.add(block)
         for drift in self._drifts:
             drift.add(block)
-        return Block(**block.arrays(), motor_energy=self._energy.add(block))
+        stored = {name: array for name, array in block.arrays().items() if name not in BALANCES}
+        return Block(**stored, motor_energy=self._energy.add(block))
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -200,7 +202,7 @@ class Run:
         """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
         bound = SPRING_BOUND if self._deflections is None else DRIFT_BOUND
         error, error_bound = ladder(self.robot, self.trajectory, self.choice.engine, self._internal)
-        return SelfCheck(self._spring_residual, error, bound, error_bound)
+        return SelfCheck(self._springs.residual, error, bound, error_bound)
 
 
 def inverse_dynamics(
@@ -281,10 +283,6 @@ def _drift_summaries(robot: Robot, deflections: IntegratedDeflections) -> list[D
         for index, (joint, stop) in enumerate(pairs)
         if joint.actuator.integrable and joint.damper_at("transmission") is None
     ]
-
-
-def _shortened(block: Block, samples: int) -> Block:
-    return Block(**{name: array[:samples] for name, array in block.arrays().items()})
 
 
 def _joined(blocks: list[Block]) -> dict[str, AnyArray]:

@@ -99,7 +99,7 @@ class RunUncertainty:
         for name, array in deviations.items():
             array[:, self._deviations.unstated[name]] = np.nan
         stored = {deviation(name): array for name, array in deviations.items()}
-        block = Block(**{**block.arrays(), **stored, "flags": block.flags.copy()})
+        block = block.replaced(**stored, flags=block.flags.copy())
         for index in range(len(self._robot.joints)):
             self._judge_limits(block, index)
         return block

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from vsacli.analysis.ladder import LADDER_BOUND
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.analysis.ladder import LADDER_BOUND, PROBES
+from vsacli.base.arrays import AnyArray, evenly, of_joint
 from vsacli.base.json_records import Stored, named
 from vsacli.base.variables import Block
+from vsacli.dynamics.balances import BALANCED, damped_joints, spring_balances
 from vsacli.robot.model import Robot
 
 SPRING_BOUND = 1e-11
@@ -46,31 +45,44 @@ class SelfCheck(Stored):
         return self.spring_residual <= self.spring_bound and self.ladder <= self.ladder_bound
 
 
-def spring_residual(robot: Robot, block: Block) -> float:
-    """Largest scaled residual of (14) on the regular steps, from the laws evaluated at phi.
+class SpringCheck:
+    """The residual of (14) over a run; `add` its blocks in order.
 
-    Scaled as |sum tau_k - tau_e| / sum |tau_k| and |sum sigma_k - sigma| / sigma. An elastic joint has one
-    law; a rigid one has none, and so no residual.
+    The program that computes a step also computes its residual, which covers all steps, but would be wrong
+    with the program. So at `PROBES` steps the laws are evaluated apart from it, by NumPy, at the deflections
+    that it found. A program has no path that depends on values, but for its branches, loops and tables. If
+    one of these, or all of it, is wrong, so is a stretch of the run, and one that takes more than a 199th of
+    the steps is met.
     """
-    errors = []
-    for index, joint in enumerate(robot.joints):
-        if not joint.actuator.sprung:
-            continue
-        regular = ~has(block.flags[:, index], Flag.INFEASIBLE | Flag.SINGULAR)
-        of_joint = {name: values[..., regular] for name, values in block.of_joint(index).items()}
-        tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
-        carried = joint.actuator.carried(of_joint)
-        size = np.maximum(carried.size, np.finfo(float).tiny)
-        missing = np.abs(carried.tau_e - tau_e)
-        if joint.damper_at("transmission"):  # whose torque may be zero where nothing else is small
-            size = np.maximum(size, np.maximum(size, np.abs(tau_e)).max(initial=0.0))
-            missing = np.abs(carried.tau_e + of_joint["tau_damper"] - tau_e)
-            missing = np.maximum(missing - _rounding_of_damper(of_joint), 0.0)
-        errors += [missing / size, np.abs(carried.stiffness - stiffness) / stiffness]
-    return float(np.max(np.concatenate([np.zeros(1), *errors])))
 
+    def __init__(self, robot: Robot, samples: int) -> None:
+        self._joints = robot.joints
+        self._probed = evenly(samples, PROBES)
+        self._excerpts: list[dict[str, AnyArray]] = []
+        self._samples = 0
+        self._error = 0.0
+        self._damped_error, self._damped_size = np.zeros((2, len(damped_joints(robot.joints))))
 
-def _rounding_of_damper(of_joint: Mapping[str, FloatArray]) -> FloatArray:
-    """What rounding leaves of the torque of a damper, whose velocity is the difference theta' - q'."""
-    rounding: FloatArray = 4 * np.finfo(float).eps * of_joint["damping"] * np.abs(of_joint["dq"])
-    return rounding
+    def add(self, block: Block) -> None:
+        """Merge a block of `BalancedDynamics`."""
+        first, last = np.searchsorted(self._probed, (self._samples, self._samples + len(block.time)))
+        probed = self._probed[first:last] - self._samples
+        self._excerpts.append(
+            {name: array[probed] for name, array in block.arrays().items() if name in BALANCED}
+        )
+        self._samples += len(block.time)
+        self._error = np.maximum(self._error, block.spring_error.max())
+        self._damped_error = np.maximum(self._damped_error, block.damped_error.max(axis=0))
+        self._damped_size = np.maximum(self._damped_size, block.damped_size.max(axis=0))
+
+    @property
+    def residual(self) -> float:
+        """The largest so far, scaled; NaN if a number is missing at a regular step."""
+        error, damped_error = self._error, self._damped_error
+        for excerpt in self._excerpts:
+            of_joints = [of_joint(excerpt, index) for index in range(len(self._joints))]
+            apart = spring_balances(self._joints, of_joints)
+            error = np.max(apart["spring_error"], initial=error)
+            damped_error = np.max([damped_error, *np.transpose(apart["damped_error"])], axis=0)
+        size = np.maximum(self._damped_size, np.finfo(float).tiny)
+        return float(np.max(damped_error / size, initial=error))

@@ -36,6 +36,7 @@ class JointSummary:
         self._peaks = np.full(5, np.nan)
         self._start: FloatArray | None = None
         self._end = np.full((2, len(MOTORS)), np.nan)
+        self._limits = limit_checks(joint)
         self._other_preload = "stiffness" in joint.actuator.commanded
         self._dry_friction = dry_frictions(joint.actuator.motors)
 
@@ -198,7 +199,7 @@ class JointSummary:
 
     def _record_limits(self, flags: FlagArray, block: Block) -> None:
         values = block.of_joint(self._index)
-        for check in limit_checks(self._joint):
+        for check in self._limits:
             excess, label = check.worst(values, flags), check.flag.label
             if excess is not None:
                 first, time = float(block.time[excess.first]), float(block.time[excess.step])

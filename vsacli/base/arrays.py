@@ -27,12 +27,18 @@ AnyArray = np.ndarray[_AnyShape, np.dtype[Any]]
 
 def over_time(rows: FloatArray) -> FloatArray:
     """View (joints, samples) as (samples, joints), or (joints, 2, samples) as (samples, joints, 2)."""
-    return np.moveaxis(rows, -1, 0)
+    return rows.transpose(rows.ndim - 1, *range(rows.ndim - 1))
 
 
 def by_joint(array: ArrayLike) -> FloatArray:
     """The inverse of `over_time`, with contiguous samples; copies only an array laid out otherwise."""
     return np.ascontiguousarray(np.moveaxis(np.asarray(array, dtype=np.float64), 0, -1))
+
+
+def contiguous_rows(array: FloatArray) -> list[FloatArray]:
+    """The rows (samples,) of an array over time, each contiguous; copies only what is laid out otherwise."""
+    rows = np.moveaxis(array, 0, -1).reshape(-1, len(array))
+    return list(map(np.ascontiguousarray, rows))
 
 
 def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:

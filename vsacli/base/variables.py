@@ -6,7 +6,7 @@ The declaration feeds the pipeline, the HDF5 attributes, the CSV headers, the pl
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 from vsacli.base import units
 from vsacli.base.arrays import AnyArray, of_joint
@@ -232,13 +232,20 @@ class Block:
 
     def of_joint(self, index: int) -> dict[str, AnyArray]:
         """The variables of one joint by name, (samples,), those of its motors (2, samples)."""
-        joints = (name for name, variable in self.declared.items() if "joint" in variable.dims)
-        of_joints = {name: vars(self)[name] for name in joints if name in vars(self)}
-        return of_joint(of_joints, index)
+        joints = {name: array for name, array in vars(self).items() if "joint" in self.declared[name].dims}
+        return of_joint(joints, index)
 
     def arrays(self) -> dict[str, AnyArray]:
         """The variables there are, by name."""
         return {name: vars(self)[name] for name in self.declared if name in vars(self)}
+
+    def taken(self, steps: slice | AnyArray) -> Self:
+        """Some of its steps."""
+        return type(self)(**{name: array[steps] for name, array in self.arrays().items()})
+
+    def replaced(self, **arrays: AnyArray) -> Self:
+        """The same with some variables that are other or further ones."""
+        return type(self)(**{**self.arrays(), **arrays})
 
 
 def select_variables(

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.base.arrays import FloatArray, by_joint
+from vsacli.actuators.limit_check import OfJoint
+from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import DAMPING
-from vsacli.base.variables import VARIABLES, Block
+from vsacli.base.variables import VARIABLES
 from vsacli.compute.vector import Scalar, add, mul
 from vsacli.dynamics.chain import TorqueDerivatives
 from vsacli.robot.joint import Joint
@@ -45,21 +46,16 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
     return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
 
 
-def motor_torques(robot: Robot, block: Block) -> tuple[FloatArray, FloatArray] | None:
-    """What dampers exert against the motors, and its rate, each (joints, 2, samples); None if none does."""
-    damped = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
-    if not damped:
-        return None
-    torque, rate = np.zeros((2, *by_joint(block.theta).shape))
-    for index in damped:
-        of_joint = block.of_joint(index)
-        damping, d_damping, dphi, ddtheta = (
-            of_joint[name] for name in ("damping", "ddamping", "dphi", "ddtheta")
-        )
-        for motor, there in enumerate(robot.joints[index].actuator.has(VARIABLES["phi"])):
-            if there:
-                torque[index, motor] = damping * dphi[motor]
-                rate[index, motor] = d_damping * dphi[motor] + damping * (ddtheta[motor] - of_joint["ddq"])
+def motor_torques(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray]:
+    """What the damper beside a joint's springs exerts against its motors, and its rate, each (2, samples)."""
+    damping, d_damping, dphi, ddtheta = (
+        of_joint[name] for name in ("damping", "ddamping", "dphi", "ddtheta")
+    )
+    torque, rate = np.zeros_like(dphi), np.zeros_like(dphi)
+    for motor, there in enumerate(joint.actuator.has(VARIABLES["phi"])):
+        if there:
+            torque[motor] = damping * dphi[motor]
+            rate[motor] = d_damping * dphi[motor] + damping * (ddtheta[motor] - of_joint["ddq"])
     return torque, rate
 
 

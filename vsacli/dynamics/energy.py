@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.base.arrays import FloatArray, by_joint, over_time
+from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Stored, named
-from vsacli.base.variables import VARIABLES, Block
-from vsacli.dynamics.dampers import motor_torques
-from vsacli.dynamics.losses import LossMeter
-from vsacli.dynamics.quadrature import integrals, positive_part, work_on_each_other
+from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
 
 
@@ -62,32 +59,55 @@ class JointEnergy(Stored):
 
 
 class Flow(NamedTuple):
-    """Energy that flows over consecutive steps; of the motors (joints, 2, ...), NaN where there is none.
+    """Energy that flows in consecutive intervals; of the motors (joints, 2, intervals), NaN where none is.
 
     Attributes:
-        intervals: lengths of time between the steps, (samples - 1,), s.
-        work: of each motor in each interval, (joints, 2, samples - 1), J.
-        motor_power: (joints, 2, samples), W.
-        tau_spring: (joints, 2, samples), N m (N).
-        elastic_energy: (joints, samples), J.
-        dissipated: taken by friction and damping in each interval, (joints, samples - 1), J; None if there is
-            no dry friction.
-        copper: heat in the windings in each interval, (joints, 2, samples - 1), J; None if it is not known.
+        intervals: their lengths, (intervals,), s.
+        work: of each motor, J.
+        spent: the positive part of that, J.
+        load: integral of (tau_1 + tau_2)^2/4, (joints, intervals).
+        co_contraction: integral of (tau_1 - tau_2)^2/4, likewise.
+        dissipated: taken by friction and damping, (joints, intervals), J; None if there is no dry friction.
+        copper: heat in the windings, of the motors, J; None if it is not known.
     """
 
     intervals: FloatArray
     work: FloatArray
-    motor_power: FloatArray
-    tau_spring: FloatArray
-    elastic_energy: FloatArray
+    spent: FloatArray
+    load: FloatArray
+    co_contraction: FloatArray
     dissipated: FloatArray | None = None
     copper: FloatArray | None = None
 
 
-class EnergyMeter:
-    """Sums up energy; `add` what flows, each time from the last step of the time before, then `report`.
+class Efforts(NamedTuple):
+    """(tau_1 + tau_2)^2/4 and (tau_1 - tau_2)^2/4, each integrated over an interval."""
 
-    Sums run from step to step, so that they do not depend on how the steps are divided.
+    load: FloatArray
+    co_contraction: FloatArray
+
+
+def efforts(interval: FloatArray, before: Iterable[FloatArray], after: Iterable[FloatArray]) -> Efforts:
+    """What two springs exert together and against each other over intervals, by trapezoids.
+
+    Args:
+        interval: length, s.
+        before: torques of both springs.
+        after: the same at the end of the interval.
+    """
+    (tau_1, tau_2), (next_1, next_2) = before, after
+    return Efforts(
+        *(
+            interval / 8 * (at_end * at_end + at_begin * at_begin)
+            for at_begin, at_end in ((tau_1 + tau_2, next_1 + next_2), (tau_1 - tau_2, next_1 - next_2))
+        )
+    )
+
+
+class EnergyMeter:
+    """Sums up energy; `add` what flows and the energy in springs at the steps, then `report`.
+
+    Sums run from interval to interval, so that they do not depend on how these are divided.
     """
 
     def __init__(self) -> None:
@@ -97,20 +117,20 @@ class EnergyMeter:
         self._dissipated, self._copper = _Sum(), _Sum()
 
     def add(self, flow: Flow) -> FloatArray:
-        """Merge a flow; returns the work of each motor up to the end of each interval, in its place."""
-        intervals = flow.intervals
-        self._duration.add(intervals.copy())
-        self._peak = np.fmax(self._peak, np.fmax.reduce(flow.elastic_energy, axis=-1))
-        tau_1, tau_2 = flow.tau_spring[:, 0], flow.tau_spring[:, 1]
-        for total, effort in ((self._load, tau_1 + tau_2), (self._co_contraction, tau_1 - tau_2)):
-            effort *= effort
-            total.add(intervals / 8 * (effort[:, 1:] + effort[:, :-1]))
-        self._spent.add(positive_part(intervals, flow.motor_power, flow.work))
+        """Merge a flow, whose arrays become sums; returns the work up to the end of each interval."""
+        self._duration.add(flow.intervals.copy())
+        self._load.add(flow.load)
+        self._co_contraction.add(flow.co_contraction)
+        self._spent.add(flow.spent)
         if flow.dissipated is not None:
             self._dissipated.add(flow.dissipated)
         if flow.copper is not None:
             self._copper.add(flow.copper)
         return self._work.add(flow.work)
+
+    def add_stored(self, elastic_energy: FloatArray) -> None:
+        """Merge the energy in the springs at steps, (joints, samples), J."""
+        self._peak = np.fmax(self._peak, np.fmax.reduce(elastic_energy, axis=-1))
 
     def report(self, robot: Robot) -> list[JointEnergy]:
         """What was found of each joint of a robot; something must have been added."""
@@ -140,97 +160,6 @@ class EnergyMeter:
             yield float(np.sum(np.asarray(self._copper.value)[index, heated])) if any(heated) else None
 
 
-class RunEnergy:
-    """The energy of a run of the inverse dynamics; `add` its blocks in order, then ask for the `report`."""
-
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        self._inertia, self._damping = _motor_constants(robot)
-        self._coupling = np.array([joint.actuator.coupled_rotors for joint in robot.joints])
-        self._meter = EnergyMeter()
-        lossy = any(robot.has(VARIABLES[name]) for name in ("dissipated_power", "copper_loss"))
-        self._losses = LossMeter(robot) if lossy else None
-        self._last: _Rows | None = None
-
-    def add(self, block: Block) -> FloatArray:
-        """Merge a block; returns the variable `motor_energy` at its steps, (samples, joints, 2)."""
-        rows = self._rows(block)
-        joined = rows.after(rows.at(0) if self._last is None else self._last)
-        self._last = rows.at(-1)
-        intervals = np.diff(joined.time)
-        work = integrals(intervals, joined.passed_on, joined.rate)
-        work += np.diff(joined.kinetic)
-        coupled = np.flatnonzero(self._coupling)
-        if coupled.size:
-            motion = joined.dtheta[coupled], joined.ddtheta[coupled]
-            work[coupled] += self._coupling[coupled, None, None] * work_on_each_other(intervals, *motion)
-        flow = Flow(intervals, work, joined.motor_power, joined.tau_spring, joined.elastic_energy)
-        if self._losses is not None:
-            lost = self._losses.add(block)
-            work += lost.motor_friction
-            flow = flow._replace(dissipated=lost.dissipated, copper=lost.copper)
-        return over_time(self._meter.add(flow))
-
-    def _rows(self, block: Block) -> _Rows:
-        dtheta, ddtheta, tau_spring = map(by_joint, (block.dtheta, block.ddtheta, block.tau_spring))
-        torque = self._damping * dtheta
-        torque += tau_spring
-        rate = self._damping * ddtheta
-        rate += spring_rates(self._robot, block)
-        if dampers := motor_torques(self._robot, block):
-            torque += dampers[0]
-            rate += dampers[1]
-        rate *= dtheta
-        rate += torque * ddtheta
-        torque *= dtheta
-        return _Rows(
-            time=block.time,
-            dtheta=dtheta,
-            ddtheta=ddtheta,
-            kinetic=self._inertia / 2 * dtheta**2,
-            passed_on=torque,
-            rate=rate,
-            motor_power=by_joint(block.motor_power),
-            tau_spring=tau_spring,
-            elastic_energy=by_joint(block.elastic_energy),
-        )
-
-    def report(self) -> list[JointEnergy]:
-        """What was found of each joint; at least one block must have been added."""
-        return self._meter.report(self._robot)
-
-
-class _Rows(NamedTuple):
-    """What the work of motors follows from: B theta'^2/2, and the power passed on or lost, with its rate."""
-
-    time: FloatArray
-    dtheta: FloatArray
-    ddtheta: FloatArray
-    kinetic: FloatArray
-    passed_on: FloatArray
-    rate: FloatArray
-    motor_power: FloatArray
-    tau_spring: FloatArray
-    elastic_energy: FloatArray
-
-    def at(self, step: int) -> _Rows:
-        """One step, the last if -1."""
-        return _Rows(*(values[..., [step]] for values in self))
-
-    def after(self, step: _Rows) -> _Rows:
-        """The same with a step before."""
-        pairs = zip(step, self, strict=True)
-        return _Rows(*(np.concatenate((one, rest), axis=-1) for one, rest in pairs))
-
-
-def spring_rates(robot: Robot, block: Block) -> FloatArray:
-    """Rates of tau_spring, (joints, 2, samples), NaN where there is no motor."""
-    rates = np.full((len(robot.joints), SIDES, len(block.time)), np.nan)
-    for index, joint in enumerate(robot.joints):
-        rates[index, : joint.actuator.motor_count] = joint.actuator.spring_rates(block.of_joint(index))
-    return rates
-
-
 class _Sum:
     """A running sum along the last axis."""
 
@@ -243,15 +172,6 @@ class _Sum:
         np.add.accumulate(pieces, axis=-1, out=pieces)
         self.value = pieces[..., -1].copy()
         return pieces
-
-
-def _motor_constants(robot: Robot) -> FloatArray:
-    """Inertia and damping of the motors, (2, joints, 2, 1), NaN where there is none."""
-    constants = np.full((2, len(robot.joints), SIDES, 1), np.nan)
-    for index, joint in enumerate(robot.joints):
-        for side, motor in enumerate(joint.actuator.motors):
-            constants[:, index, side, 0] = motor.inertia, motor.damping
-    return constants
 
 
 def _mean_root(integral: FloatArray | float, duration: float) -> FloatArray:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.limit_check import LimitCheck
+from vsacli.actuators.limit_check import LimitCheck, OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import AnyArray, FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type
@@ -71,7 +72,10 @@ class InverseDynamics(RowKernel):
         internal: the joints whose transmission is damped, by index: what moves inside them is given.
         driven: whether of that the deflections alone are given, and their rates follow from the damping.
         limits: those of each joint, since springs compare equal whatever their limits.
+        block: what holds its results.
     """
+
+    block: ClassVar[type[Block]] = Block
 
     robot: Robot
     frame: str | None = None
@@ -105,44 +109,52 @@ class InverseDynamics(RowKernel):
     @cached_property
     def results(self) -> RowLayout:
         """Rows that inverse dynamics gives."""
+        return RowLayout(self.shapes())
+
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Of the variables it gives, at one instant, by name."""
         joints, declared = len(self.robot.joints), [VARIABLES[name] for name in COMPUTED]
-        shapes = {
+        return {
             variable.name: (joints, SIDES) if "motor" in variable.dims else (joints,)
             for variable in declared
             if self.robot.has(variable)
         }
-        return RowLayout(shapes)
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74)."""
+        return self.results.pack(self.rows_of(rows, self.at_joints(rows)))
+
+    def at_joints(self, rows: Sequence[Scalar]) -> Sequence[OfJoint]:
+        """The variables of each joint by name, None for what it does not have."""
         links, given = self.links, self.arguments.unpack(rows)
         demanded = links(rows[: links.inputs])
         torques = links.results.unpack([_as_row(torque, rows[0]) for torque in demanded])
-        of_joints = {**given, **torques}
+        of_all = {**given, **torques}
         names = Command.names(signal.key for signal in self.robot.signals)
-        drives = [
-            drive(
-                joint,
-                Command.of({name: of_joints[name][index] for name in names}),
-                self.near_singular,
-                np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None,
-                self._internal(index, given),
+        found = []
+        for index, joint in enumerate(self.robot.joints):
+            command = Command.of({name: of_all[name][index] for name in names})
+            phi = np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None
+            driven = drive(joint, command, self.near_singular, phi, self._internal(index, given))
+            found.append({**command.arrays(), **driven._asdict()})
+        if self.robot.has(VARIABLES["dissipated_power"]):
+            for joint, of_joint in zip(self.robot.joints, found, strict=True):
+                of_joint["dissipated_power"] = dissipated_power(joint, of_joint)
+        return found
+
+    def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
+        """The rows of each result by name, from the kernel's arguments and the variables of the joints."""
+        absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0]["dtheta"], np.nan)}
+        return {
+            name: rows_of_joints(
+                [
+                    absent[len(VARIABLES[name].dims)] if of_joint[name] is None else of_joint[name]
+                    for of_joint in of_joints
+                ]
             )
-            for index, joint in enumerate(self.robot.joints)
-        ]
-        driven = {name: [getattr(each, name) for each in drives] for name in Drive._fields}
-        if "dissipated_power" in self.results.shapes:
-            names = ("dq", "dtheta", "dphi", "damping")
-            of_all = {**given, **driven}
-            moved = zip(*(of_all.get(name, [None] * len(drives)) for name in names), strict=True)
-            motions = [dict(zip(names, each, strict=True)) for each in moved]
-            driven["dissipated_power"] = list(map(dissipated_power, self.robot.joints, motions))
-        absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(drives[0].dtheta, np.nan)}
-        computed: dict[str, Iterable[Scalar]] = {
-            name: _rows([absent[len(VARIABLES[name].dims)] if array is None else array for array in of_all])
-            for name, of_all in driven.items()
+            for name in COMPUTED
+            if name in of_joints[0]
         }
-        return self.results.pack({**torques, **computed})
 
     def _internal(self, index: int, given: Mapping[str, Sequence[Scalar]]) -> InternalMotion | None:
         """What moves inside a joint, if its transmission is damped."""
@@ -165,7 +177,6 @@ def compute_block(
     robot: Robot,
     motion: Motion,
     near_singular: float = NEAR_SINGULAR_MARGIN,
-    integrated: FloatArray | None = None,
     engine: Engine = NUMPY,
     internal: Mapping[int, InternalMotion] | None = None,
 ) -> Block:
@@ -176,15 +187,35 @@ def compute_block(
         motion: commanded motion and stiffness, (samples, joints); the actuators that take no stiffness
             have a stiffness of their own, or none.
         near_singular: margin below which a step is near-singular.
-        integrated: deflections of the joints to use instead of the root of (14), (joints, 2, samples);
-            a step where they are NaN is infeasible.
         engine: what computes.
         internal: what moves inside the transmissions that are damped, by index of the joint; if None, all of
             them are where their springs carry the joint alone, or where their damper is said to start.
     """
     frame = None if motion.wrench is None else motion.wrench.frame
     internal = internal_equilibrium(robot, motion) if internal is None else internal
-    kernel = InverseDynamics(robot, frame, near_singular, integrated is not None, tuple(internal))
+    kernel = InverseDynamics(robot, frame, near_singular, internal=tuple(internal))
+    return block_of(kernel, motion, engine, internal=internal)
+
+
+def block_of(
+    kernel: InverseDynamics,
+    motion: Motion,
+    engine: Engine = NUMPY,
+    *,
+    integrated: FloatArray | None = None,
+    internal: Mapping[int, InternalMotion] = MappingProxyType({}),
+) -> Block:
+    """What a kernel of inverse dynamics finds for a block of steps.
+
+    Args:
+        kernel: what is computed, and in which block it comes.
+        motion: as of `compute_block`.
+        engine: what computes.
+        integrated: deflections of the joints, if the kernel takes them, (joints, 2, samples); a step where
+            they are NaN is infeasible.
+        internal: what moves inside the joints that the kernel names.
+    """
+    robot = kernel.robot
     given = {name: array for name, array in motion.variables().items() if robot.has(VARIABLES[name])}
     rows = {name: by_joint(given[name]) for name in kernel.arguments.shapes if name in given}
     if integrated is not None:
@@ -195,7 +226,7 @@ def compute_block(
     found = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack(rows)))
     computed = {name: over_time(array) for name, array in found.items()}
     arrays: dict[str, AnyArray] = {**given, **computed, "flags": computed["flags"].astype(np.uint16)}
-    return Block(**arrays)
+    return kernel.block(**arrays)
 
 
 def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMotion]:
@@ -218,7 +249,7 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
     return found
 
 
-def _rows(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
+def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
     """The rows (samples,) of arrays of the joints, each (samples,) or (2, samples)."""
     for array in of_joints:
         yield from array if array.ndim > 1 else [array]

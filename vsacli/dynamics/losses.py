@@ -63,6 +63,11 @@ class Lost(NamedTuple):
     dissipated: FloatArray
     copper: FloatArray | None
 
+    def taken(self, intervals: slice) -> Lost:
+        """The same of some of the intervals."""
+        copper = None if self.copper is None else self.copper[..., intervals]
+        return Lost(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
+
 
 class LossMeter:
     """Finds what is lost between steps; `add` blocks in order."""

@@ -20,7 +20,8 @@ from vsacli.base.signals import COMMANDED, Signal, orders_of_derivation
 from vsacli.base.variables import UNCERTAIN, Block
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
-from vsacli.dynamics.inverse import COMPUTED, compute_block, usual_block
+from vsacli.dynamics.balances import BalancedDynamics
+from vsacli.dynamics.inverse import COMPUTED, block_of, usual_block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
@@ -189,7 +190,9 @@ def _values_and_gradients(
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Variables by name, (times, joints[, 2]), and their changes by the shifts, (shifts, times, ...)."""
     undamped = replace(robot, joints=tuple(map(_without_inner_damper, robot.joints)))
-    shifted = compute_block(undamped, _shifted(motion, shifts), engine=engine)
+    frame = None if motion.wrench is None else motion.wrench.frame
+    kernel = BalancedDynamics(undamped, frame)  # as that of the run, which is compiled
+    shifted = block_of(kernel, _shifted(motion, shifts), engine)
     values, gradients = {}, {}
     for name, array in _uncertain(shifted).items():
         every = array.reshape(1 + 2 * len(shifts), len(motion.time), *array.shape[1:])

@@ -17,9 +17,9 @@ from vsacli.base.simulation_variables import actual
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, Quantity
 from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.history import History
-from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy
+from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy, efforts
 from vsacli.dynamics.limits import limit_checks
-from vsacli.dynamics.quadrature import trapezoids
+from vsacli.dynamics.quadrature import positive_part, trapezoids
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
@@ -99,13 +99,14 @@ def _energies(robot: Robot, history: History) -> list[JointEnergy]:
         _led(getattr(history, name))
         for name in ("time", *map(actual, ("motor_energy", "motor_power", "tau_spring", "elastic_energy")))
     )
-    lost = {"dissipated": history.dissipated_power_actual, "copper": history.copper_loss_actual}
-    intervals = np.diff(time)
-    losses = {
-        name: None if taken is None else trapezoids(intervals, _led(taken)) for name, taken in lost.items()
-    }
+    lost = history.dissipated_power_actual, history.copper_loss_actual
+    intervals, done = np.diff(time), np.diff(work)
+    losses = (None if taken is None else trapezoids(intervals, _led(taken)) for taken in lost)
+    torques = np.moveaxis(tau_spring, 1, 0)
+    exerted = efforts(intervals, torques[..., :-1], torques[..., 1:])
     meter = EnergyMeter()
-    meter.add(Flow(intervals, np.diff(work), power, tau_spring, elastic_energy, **losses))
+    meter.add_stored(elastic_energy)
+    meter.add(Flow(intervals, done, positive_part(intervals, power, done), *exerted, *losses))
     return meter.report(robot)
 
 

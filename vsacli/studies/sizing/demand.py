@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import BoolArray, FloatArray, over_time
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.json_records import Published
 from vsacli.base.variables import Block
@@ -94,10 +94,9 @@ def _told_apart(names: Sequence[str]) -> Iterator[str]:
 def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
     """Motion of the motors and their loads at the steps of a block, (samples, joints, 2)."""
     load = block.tau_spring.copy()
-    dampers = motor_torques(robot, block)
-    if dampers is not None:
-        load += over_time(dampers[0])
     for index, joint in enumerate(robot.joints):
+        if joint.damper_at("transmission"):
+            load[:, index] += motor_torques(joint, block.of_joint(index))[0].T
         if joint.actuator.coupled_rotors:
             load[:, index] += joint.actuator.coupled_rotors * block.ddtheta[:, index, ::-1]
     load[has(block.flags, UNDONE)] = np.nan
