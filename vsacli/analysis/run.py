@@ -115,9 +115,14 @@ class Run:
             yield self._added(block, minima)
 
     def _steps(self) -> Iterator[Block]:
-        """All steps, in blocks, with what holds at them."""
-        for start in range(0, self.trajectory.samples, self._block_samples):
-            yield self._compute(self.trajectory.block(start, start + self._block_samples))
+        """All steps, in blocks, with what holds at them; with several threads one block is computed ahead."""
+        starts = range(0, self.trajectory.samples, self._block_samples)
+        blocks = (self._compute(self.trajectory.block(start, start + self._block_samples)) for start in starts)
+        if self.choice.threads == 1 or len(starts) == 1:
+            return blocks
+        from vsacli.base.ahead import ahead
+
+        return ahead(blocks)
 
     def _compute(self, motion: Motion) -> Block:
         integrated = None if self._deflections is None else self._deflections.at(motion.time)
