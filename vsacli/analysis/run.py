@@ -117,7 +117,9 @@ class Run:
     def _steps(self) -> Iterator[Block]:
         """All steps, in blocks, with what holds at them; with several threads one block is computed ahead."""
         starts = range(0, self.trajectory.samples, self._block_samples)
-        blocks = (self._compute(self.trajectory.block(start, start + self._block_samples)) for start in starts)
+        blocks = (
+            self._compute(self.trajectory.block(start, start + self._block_samples)) for start in starts
+        )
         if self.choice.threads == 1 or len(starts) == 1:
             return blocks
         from vsacli.base.ahead import ahead

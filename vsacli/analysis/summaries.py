@@ -49,9 +49,10 @@ class JointSummary:
         if self._start is None:
             self._start = np.stack((*_motors_at(block, 0, index), self._torque_step(block)))
         self._end = np.stack(_motors_at(block, -1, index))
-        self._count(flags, block.time)
-        self._record_not_finite(flags, block.time)
-        self._record_instability(flags, block)
+        if flags.any():
+            self._count(flags, block.time)
+            self._record_not_finite(flags, block.time)
+            self._record_instability(flags, block)
         self._add_bounded(block)
         least, most = self._stiffness
         self._stiffness = (
@@ -71,13 +72,15 @@ class JointSummary:
     def _add_bounded(self, block: Block) -> None:
         """Merge what is worst."""
         flags = block.flags[:, self._index]
+        flagged = bool(flags.any())
         if "stiffness" in self._joint.actuator.commanded:
-            self._add_reach(flags, block)
-        else:
+            self._add_reach(flags, block, flagged=flagged)
+        elif flagged:
             self._record_without_stiffness(flags, block.time)
-        self._record_limits(flags, block)
+        if flagged:
+            self._record_limits(flags, block)
 
-    def _add_reach(self, flags: FlagArray, block: Block) -> None:
+    def _add_reach(self, flags: FlagArray, block: Block, *, flagged: bool) -> None:
         """Merge what there is to say about the corridor."""
         index = self._index
         stiffness = block.stiffness[:, index]
@@ -85,7 +88,8 @@ class JointSummary:
         # A step whose torque cannot be carried at all is worse than any margin.
         gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
         self._record_margin(gap, block.time, corridor)
-        self._record_reach(flags, gap, block)
+        if flagged:
+            self._record_reach(flags, gap, block)
         outside = gap < -SINGULAR_MARGIN
         if self._other_preload and outside.any():
             demand = block.tau_e[outside, index], stiffness[outside], block.q[outside, index]

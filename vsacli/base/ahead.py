@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from typing import TypeVar
 
 _Item = TypeVar("_Item")
@@ -15,9 +16,12 @@ def ahead(items: Iterator[_Item]) -> Iterator[_Item]:
     So there is one more of them at a time. What the iterator raises comes here, in its place. Signals never
     reach the thread: whoever is ended while it computes waits for the item that it is at.
     """
-    end = object()
+
+    def following() -> list[_Item]:
+        return list(islice(items, 1))
+
     with ThreadPoolExecutor(1, "vsacli-ahead") as thread:
-        coming = thread.submit(next, items, end)
-        while (item := coming.result()) is not end:
-            coming = thread.submit(next, items, end)
-            yield item
+        coming = thread.submit(following)
+        while found := coming.result():
+            coming = thread.submit(following)
+            yield from found

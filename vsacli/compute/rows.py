@@ -34,7 +34,7 @@ class RowLayout:
     def arrays(self, rows: AnyArray) -> dict[str, AnyArray]:
         """Each array in its shape, followed by what axes a row has."""
         return {
-            name: rows[place].reshape(*self.shapes[name], *rows.shape[1:])
+            name: rows[place].reshape((*self.shapes[name], *rows.shape[1:]))
             for name, place in self._places.items()
         }
 

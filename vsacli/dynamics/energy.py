@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, NamedTuple
 
@@ -13,6 +13,7 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Stored, named
 from vsacli.base.variables import VARIABLES
+from vsacli.compute.rows import RowLayout
 from vsacli.robot.model import Robot
 
 
@@ -111,22 +112,24 @@ class EnergyMeter:
     """
 
     def __init__(self) -> None:
-        self._work, self._spent = _Sum(), _Sum()
-        self._duration, self._load, self._co_contraction = _Sum(), _Sum(), _Sum()
+        self._work: FloatArray | float = 0.0
+        self._totals: FloatArray | float = 0.0
+        self._layout = RowLayout({})
         self._peak: FloatArray | float = math.nan
-        self._dissipated, self._copper = _Sum(), _Sum()
 
     def add(self, flow: Flow) -> FloatArray:
-        """Merge a flow, whose arrays become sums; returns the work up to the end of each interval."""
-        self._duration.add(flow.intervals.copy())
-        self._load.add(flow.load)
-        self._co_contraction.add(flow.co_contraction)
-        self._spent.add(flow.spent)
-        if flow.dissipated is not None:
-            self._dissipated.add(flow.dissipated)
-        if flow.copper is not None:
-            self._copper.add(flow.copper)
-        return self._work.add(flow.work)
+        """Merge a flow; returns the work up to the end of each interval, in the place of `flow.work`."""
+        totals = {name: part for name, part in flow._asdict().items() if name != "work" and part is not None}
+        self._layout = RowLayout({name: part.shape[:-1] for name, part in totals.items()})
+        rows = np.concatenate([part.reshape(-1, len(flow.intervals)) for part in totals.values()])
+        columns = np.ascontiguousarray(rows.T)  # summed side by side, each from step to step
+        columns[0] += self._totals
+        self._totals = np.add.reduce(columns, axis=0)
+        work = flow.work
+        work[..., 0] += self._work
+        np.add.accumulate(work, axis=-1, out=work)
+        self._work = work[..., -1].copy()
+        return work
 
     def add_stored(self, elastic_energy: FloatArray) -> None:
         """Merge the energy in the springs at steps, (joints, samples), J."""
@@ -135,45 +138,34 @@ class EnergyMeter:
     def report(self, robot: Robot) -> list[JointEnergy]:
         """What was found of each joint of a robot; something must have been added."""
         there = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
-        work, spent = (np.sum(total.value, axis=1, where=there) for total in (self._work, self._spent))
-        duration = float(self._duration.value)
+        totals = self._layout.arrays(np.asarray(self._totals))
+        work, spent = (np.sum(total, axis=1, where=there) for total in (self._work, totals["spent"]))
+        duration = float(totals["intervals"])
         shared = [joint.actuator.co_contracts for joint in robot.joints]
         efforts = [
-            np.where(shared, _mean_root(total.value, duration), np.nan)
-            for total in (self._co_contraction, self._load)
+            np.where(shared, _mean_root(totals[name], duration), np.nan)
+            for name in ("co_contraction", "load")
         ]
         found = np.array((self._peak, spent, spent - work, *efforts))
-        lost = zip(self._dissipated_of(robot), self._copper_of(robot), strict=True)
+        lost = zip(_dissipated(robot, totals), _copper(robot, totals), strict=True)
         return [
             replace(JointEnergy(*each), dissipated=dissipated, copper_loss=copper_loss)
             for each, (dissipated, copper_loss) in zip(found.T.tolist(), lost, strict=True)
         ]
 
-    def _dissipated_of(self, robot: Robot) -> list[float | None]:
-        if not robot.has(VARIABLES["dissipated_power"]):
-            return [None] * len(robot.joints)
-        return list(map(float, np.asarray(self._dissipated.value)))
 
-    def _copper_of(self, robot: Robot) -> Iterator[float | None]:
-        for index, joint in enumerate(robot.joints):
-            heated = joint.has(VARIABLES["copper_loss"])
-            yield float(np.sum(np.asarray(self._copper.value)[index, heated])) if any(heated) else None
+def _dissipated(robot: Robot, totals: Mapping[str, FloatArray]) -> list[float | None]:
+    if not robot.has(VARIABLES["dissipated_power"]):
+        return [None] * len(robot.joints)
+    return list(map(float, totals["dissipated"]))
 
 
-class _Sum:
-    """A running sum along the last axis."""
-
-    def __init__(self) -> None:
-        self.value: FloatArray | float = 0.0
-
-    def add(self, pieces: FloatArray) -> FloatArray:
-        """The sum up to each of the pieces, in their place."""
-        pieces[..., 0] += self.value
-        np.add.accumulate(pieces, axis=-1, out=pieces)
-        self.value = pieces[..., -1].copy()
-        return pieces
+def _copper(robot: Robot, totals: Mapping[str, FloatArray]) -> Iterator[float | None]:
+    for index, joint in enumerate(robot.joints):
+        heated = joint.has(VARIABLES["copper_loss"])
+        yield float(np.sum(totals["copper"][index, heated])) if any(heated) else None
 
 
-def _mean_root(integral: FloatArray | float, duration: float) -> FloatArray:
+def _mean_root(integral: FloatArray, duration: float) -> FloatArray:
     """Root of the mean over time; NaN if no time has passed."""
-    return np.sqrt(np.asarray(integral) / duration) if duration else np.full_like(integral, np.nan)
+    return np.sqrt(integral / duration) if duration else np.full_like(integral, np.nan)
