@@ -54,23 +54,29 @@ class Result(Shown, Block):
         """Names of the joints, base to tip."""
         return self.robot.joint_names
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    def save(
+        self, path: str | os.PathLike[str], *, overwrite: bool = False, precision: str = "double"
+    ) -> None:
         """Write the result file that `vsacli invdyn` writes: the whole of it, or nothing.
 
         Args:
             path: the HDF5 file.
             overwrite: whether a file that exists may be replaced.
+            precision: in which values are stored, "double" or "single"; times are always double.
 
         Raises:
             StorageError: the file exists and must not be replaced, cannot be written, or its disk is
-                full.
+                full; a value is too large for single precision.
+            InputError: there is no such precision.
         """
         from vsacli.base.outputs import Outputs
         from vsacli.results.store.writer import ResultWriter
 
         with (
             Outputs(overwrite=overwrite) as outputs,
-            ResultWriter(outputs.file(Path(path)), self.robot, self.trajectory) as writer,
+            ResultWriter(
+                outputs.file(Path(path)), self.robot, self.trajectory, precision=precision
+            ) as writer,
         ):
             writer.write(self)
             writer.finish(self.report.as_json())

@@ -53,6 +53,14 @@ if TYPE_CHECKING:
 )
 @variables_option("all")
 @click.option(
+    "--store-precision",
+    "precision",
+    type=click.Choice(["double", "single"]),
+    default="double",
+    show_default=True,
+    help="In which values are stored: single makes half the file, with 7 digits. All is computed in double.",
+)
+@click.option(
     "--plot", "plot_folder", type=FOLDER, help="Also draw the figures of `vsacli plot` there, as png."
 )
 @deflections_option
@@ -67,6 +75,7 @@ def invdyn(
     changes: tuple[str, ...],
     output: str | None,
     variables: tuple[str, ...] | None,
+    precision: str,
     plot_folder: str | None,
     deflections: str,
     as_json: bool,
@@ -105,7 +114,8 @@ def invdyn(
             tell=talk.note,
         )
         provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]]), **run.provenance}
-        report = compute(run, talk, ResultWriter(file, *inputs, variables, provenance=provenance))
+        writer = ResultWriter(file, *inputs, variables, provenance=provenance, precision=precision)
+        report = compute(run, talk, writer)
         if figures is not None:
             draw_staged(file, figures, talk)
     code = show_report(report, as_json)

@@ -61,9 +61,10 @@ def _recomputed(path: str, talk: Talk) -> bool:
     """Compute a result again and say how it compares."""
     from vsacli.files.repetition import repeat
 
-    differences = repeat(path, talk.note)
+    differences, precision = repeat(path, talk.note)
     if not differences:
-        click.echo(f"{path}: computed again, equal bit for bit")
+        rounded = "" if precision == "double" else f", rounded to {precision} precision"
+        click.echo(f"{path}: computed again, equal bit for bit{rounded}")
     for difference in differences:
         click.echo(f"{path}: computed again, {difference}")
     return not differences

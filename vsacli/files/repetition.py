@@ -49,15 +49,24 @@ class Difference:
         return f"{self.variable} differs in {self.values} values, {share}"
 
 
-def repeat(path: str | Path, tell: Tell = unheard) -> list[Difference]:
+class Repetition(NamedTuple):
+    """A result beside what is computed now.
+
+    Attributes:
+        differences: the variables that are not equal bit for bit, once rounded to the precision of the file.
+        precision: of the file, "double" or "single".
+    """
+
+    differences: list[Difference]
+    precision: str
+
+
+def repeat(path: str | Path, tell: Tell = unheard) -> Repetition:
     """Compute a result again, with its own inputs and options, and compare all its variables.
 
     Args:
         path: the result.
         tell: as of `Run`.
-
-    Returns:
-        The variables that are not equal bit for bit.
 
     Raises:
         InputError: the result does not hold its inputs, they cannot be used, or its engine is not to be had.
@@ -71,7 +80,8 @@ def repeat(path: str | Path, tell: Tell = unheard) -> list[Difference]:
         for block in run:
             for comparison in comparisons:
                 comparison.add(block)
-        return [comparison.difference for comparison in comparisons if comparison.values]
+        differences = [comparison.difference for comparison in comparisons if comparison.values]
+        return Repetition(differences, result.precision)
 
 
 def rebuilt(result: StoredResult) -> tuple[Robot, Trajectory]:
@@ -116,7 +126,7 @@ class _Comparison:
 
     def add(self, block: Block) -> None:
         """Compare the next steps."""
-        computed = np.asarray(getattr(block, self._variable))
+        computed = self._result.rounded(self._variable, getattr(block, self._variable))
         stored = self._result.read(self._variable, self._at, self._at + len(computed))
         self._at += len(computed)
         if stored.shape != computed.shape:

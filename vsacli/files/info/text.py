@@ -141,6 +141,8 @@ def _result(result: Description) -> Iterator[str]:
     if "engine" in source:
         compiled = f", compiled by {source['compiler']}, threads: {source['threads']}"
         yield f"engine: {source['engine']}{compiled if source['compiler'] else ''}"
+    if "precision" in source:
+        yield f"values stored in {source['precision']} precision"
     for each in source["inputs"]:
         yield f"input {each['path']}, SHA-256 {each['sha256']}"
         yield from (f"  with --set {change}" for change in written(each.get("changes", {})))

@@ -46,13 +46,18 @@ class ChunkFiller:
         self._values: AnyArray = np.empty(0)
 
     def append(self, values: AnyArray) -> None:
-        """Copy samples, (samples, ...), whatever their order in memory."""
+        """Copy samples, (samples, ...), whatever their order in memory.
+
+        Raises:
+            FloatingPointError: a finite value is infinite in the type of the dataset.
+        """
         rows = self._shape[0]
         while len(values):
             if not self._filled:
                 self._values = np.empty(self._shape, self._dtype)
             taken = values[: rows - self._filled]
-            self._values[self._filled : self._filled + len(taken)] = taken
+            with np.errstate(over="raise"):
+                self._values[self._filled : self._filled + len(taken)] = taken
             self._filled += len(taken)
             values = values[len(taken) :]
             if self._filled == rows:

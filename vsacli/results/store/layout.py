@@ -25,6 +25,7 @@ from vsacli.documents.resolved_fields import ResolvedField
 from vsacli.results.store.chunks import chunk_rows
 from vsacli.results.store.inputs import write_sources
 from vsacli.results.store.schema import (
+    DOUBLE,
     EXISTING,
     TEXT,
     row_shape,
@@ -42,9 +43,9 @@ LABELS = {"axis": ("x", "y", "z"), "bound": ("lower", "upper"), "direction": ("n
 GZIP_LEVEL = 4
 
 
-def row_bytes(variable: Variable, joints: int) -> int:
+def row_bytes(variable: Variable, joints: int, precision: str) -> int:
     """Size of one sample."""
-    return math.prod(row_shape(variable, joints)) * storage_type(variable).itemsize
+    return math.prod(row_shape(variable, joints)) * storage_type(variable, precision).itemsize
 
 
 def create_layout(
@@ -54,6 +55,7 @@ def create_layout(
     trajectory: Trajectory,
     variables: tuple[Variable, ...],
     provenance: Mapping[str, str],
+    precision: str,
 ) -> dict[str, h5py.Dataset]:
     """Write everything that is known before the first sample; the time axis has its planned length.
 
@@ -64,6 +66,7 @@ def create_layout(
         trajectory: the trajectory.
         variables: those that are stored.
         provenance: what else is known of how they are computed; root attributes.
+        precision: of the values, one of `FLOATS`.
 
     Returns:
         The datasets that take samples, by the names of their variables, `time` first.
@@ -74,7 +77,8 @@ def create_layout(
         scales["wrench_axis"] = _create_wrench_axis(file, trajectory.wrench.frame)
     stored = {"time": scales["time"]}
     for variable in variables:
-        dataset = stored[variable.name] = _create_variable(file, variable, robot, trajectory.samples)
+        dataset = _create_variable(file, variable, robot, trajectory.samples, precision)
+        stored[variable.name] = dataset
         _attach_scales(dataset, [scales[dim] for dim in ("time", *variable.dims)])
     inputs = file.create_group("inputs", track_order=True)
     write_sources(inputs, {"robot": robot.sources, "trajectory": trajectory.sources})
@@ -111,7 +115,7 @@ def _scipy_version() -> str:
 
 def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str, h5py.Dataset]:
     """The dimension scales by name."""
-    time = _create_variable(file, VARIABLES["time"], robot, samples)
+    time = _create_variable(file, VARIABLES["time"], robot, samples, DOUBLE)
     joint = _create_labels(file, "joint", robot.joint_names, "joint name")
     joint_type = _create_labels(file, "joint_type", robot.joint_types, "revolute or prismatic")
     motor = _add_array(file, "motor", np.array(MOTORS, dtype="<i8"))
@@ -136,15 +140,17 @@ def _create_labels(file: h5py.File, name: str, labels: tuple[str, ...], long_nam
     return dataset
 
 
-def _create_variable(file: h5py.File, variable: Variable, robot: Robot, samples: int) -> h5py.Dataset:
+def _create_variable(
+    file: h5py.File, variable: Variable, robot: Robot, samples: int, precision: str
+) -> h5py.Dataset:
     joints = len(robot.joints)
     row = row_shape(variable, joints)
     dataset = file.create_dataset(
         variable.name,
         shape=(samples, *row),
         maxshape=(samples, *row),
-        dtype=storage_type(variable),
-        chunks=(chunk_rows(samples, row_bytes(variable, joints)), *row),
+        dtype=storage_type(variable, precision),
+        chunks=(chunk_rows(samples, row_bytes(variable, joints, precision)), *row),
         compression=GZIP_LEVEL if variable.name == "flags" else None,
         track_order=True,
     )

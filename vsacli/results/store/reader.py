@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from vsacli.actuators.kinds import existing
-from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line, shown
 from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
@@ -24,7 +24,7 @@ from vsacli.results.store.damage import (
     reporting_damage,
 )
 from vsacli.results.store.inputs import StoredInput
-from vsacli.results.store.schema import EXISTING, FORMAT, row_shape, storage_type
+from vsacli.results.store.schema import DOUBLE, EXISTING, FORMAT, PRECISION, row_shape, storage_type
 from vsacli.results.store.stored_file import StoredFile
 from vsacli.results.store.stored_geometry import DH, StoredGeometry
 from vsacli.results.store.stored_limits import ACHIEVED, RANGES, SIZES
@@ -35,8 +35,8 @@ OF_JOINTS = "inputs/robot/joints/{}"
 BLOCK_SAMPLES = 8192
 """Samples that are read at a time to see whether they can be."""
 
-COMPUTED_BY = ("engine", "compiler", "threads")
-"""Attributes that older files have not."""
+COMPUTED_BY = ("engine", "compiler", "threads", PRECISION)
+"""Attributes that not every file has."""
 
 
 class StoredResult(StoredFile):
@@ -55,6 +55,7 @@ class StoredResult(StoredFile):
         variables: names of the variables the file holds, in declared order, without `time`.
         samples: number of steps stored.
         report_json: the report of the run, as in `--json`.
+        precision: in which values are stored, "double" or "single"; they are read as double.
     """
 
     format = FORMAT
@@ -81,6 +82,7 @@ class StoredResult(StoredFile):
                 one_line(str(file.attrs[name])) for name in ("robot_name", "trajectory_name", "verdict")
             )
             self.complete = bool(file.attrs["complete"])
+            self.precision = str(file.attrs.get(PRECISION, DOUBLE))
             self.joint_names = self._labels("joint")
             self.joint_types = self._labels("joint_type")
             self.actuators = self._labels("inputs/robot/joints/actuator_type")
@@ -190,14 +192,23 @@ class StoredResult(StoredFile):
             raise InputError.one(f"holds no {name}; {self._to_get.format(name)}", self.path)
         with reporting_damage(self.path, name):
             self._check_layout(name)
-            values: FloatArray | FlagArray = self._file[name][start:stop]
+            stored = self._file[name][start:stop]
+        values: FloatArray | FlagArray = stored.astype(storage_type(self.declared[name]), copy=False)
         return values
+
+    def rounded(self, name: str, values: AnyArray) -> FloatArray | FlagArray:
+        """Values of a variable as a file of this one's precision gives them back."""
+        variable = self.declared[name]
+        with np.errstate(over="ignore"):
+            stored = values.astype(storage_type(variable, self.precision))
+        read: FloatArray | FlagArray = stored.astype(storage_type(variable))
+        return read
 
     def _check_layout(self, name: str) -> None:
         """Refuse a variable that does not fit the others, so that it can be read piece by piece."""
         if name in self._whole:
             return
-        dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name])
+        dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name], self.precision)
         shape = (self.samples, *row_shape(self.declared[name], len(self.joint_names)))
         if dataset.shape != shape or dataset.dtype != expected:
             raise ValueError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")

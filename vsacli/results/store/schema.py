@@ -18,6 +18,13 @@ EXISTING = "existing"
 
 TEXT = h5py.string_dtype("utf-8")
 
+DOUBLE = "double"
+FLOATS: dict[str, np.dtype[Any]] = {DOUBLE: np.dtype("<f8"), "single": np.dtype("<f4")}
+"""Types of values by the precision in which a file stores them."""
+
+PRECISION = "precision"
+"""Root attribute of files that do not store values in double precision."""
+
 
 def unit_attributes(quantity: Quantity, joint_types: tuple[str, ...]) -> dict[str, str]:
     """`units`; if the robot's joints differ in it, or forces and moments do, one more attribute for each."""
@@ -49,9 +56,11 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
     return attributes
 
 
-def storage_type(variable: Variable) -> np.dtype[Any]:
-    """Little-endian type of a variable in the file."""
-    return np.dtype("<u2") if variable.name == "flags" else np.dtype("<f8")
+def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
+    """Little-endian type of a variable in a file of some precision; times are always double."""
+    if variable.name == "flags":
+        return np.dtype("<u2")
+    return FLOATS[precision if variable.dims else DOUBLE]
 
 
 def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:

@@ -7,18 +7,22 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType, TracebackType
 from typing import Any, Protocol, Self
 
+import numpy as np
+
 from vsacli.base.arrays import AnyArray, FloatArray
-from vsacli.base.errors import InputError
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
 from vsacli.base.signals import COMMANDED
 from vsacli.base.storage import check_free_space
+from vsacli.base.units import time_text
 from vsacli.base.variables import MOTOR_CONSTANTS, UNCERTAIN, VARIABLES, Variable, deviation, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.chunks import ChunkFiller
 from vsacli.results.store.layout import create_layout, row_bytes
 from vsacli.results.store.new_file import NewFile
-from vsacli.results.store.schema import FORMAT, TEXT, storable
+from vsacli.results.store.schema import DOUBLE, FLOATS, FORMAT, PRECISION, TEXT, storable
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -42,9 +46,11 @@ class ResultWriter:
         trajectory: gives the name, the number of samples, and the files that were read.
         variables: names of the variables to store, all there are by default; the coordinates always are.
         provenance: how it is computed, for the record: attributes of the file, such as `command_line`.
+        precision: in which values are stored, "double" or "single"; times are always double.
 
     Raises:
-        InputError: a name in `variables` is none, or of what the trajectory or the robot does not have.
+        InputError: a name in `variables` is none, or of what the trajectory or the robot does not have; there
+            is no such precision.
     """
 
     _format = FORMAT
@@ -58,12 +64,17 @@ class ResultWriter:
         variables: Iterable[str] | None = None,
         *,
         provenance: Mapping[str, str] = MappingProxyType({}),
+        precision: str = DOUBLE,
     ) -> None:
+        if precision not in FLOATS:
+            raise InputError.one(f"unknown precision {precision!r}{did_you_mean(precision, FLOATS)}")
         self._staged, self._hdf5 = file, NewFile(file)
         self._robot = robot
         self._trajectory = trajectory
         self._variables = self._selected(variables, robot, trajectory)
-        self._provenance = {"command_line": "", **provenance}
+        self._precision = precision
+        rounded = {} if precision == DOUBLE else {PRECISION: precision}
+        self._provenance = {"command_line": "", **provenance, **rounded}
         self._fillers: dict[str, ChunkFiller] = {}
 
     def __enter__(self) -> Self:
@@ -84,11 +95,16 @@ class ResultWriter:
         """Append a copy of a block of steps, which of a long file is written later, in a thread.
 
         Raises:
-            StorageError: the disk is full or fails, perhaps over an earlier block.
+            StorageError: the disk is full or fails, perhaps over an earlier block; a value is too large for
+                single precision.
         """
         with self._hdf5.used():
             for name, filler in self._fillers.items():
-                filler.append(self._values(block, name))
+                values = self._values(block, name)
+                try:
+                    filler.append(values)
+                except FloatingPointError:
+                    raise self._too_large(name, values, block.time) from None
 
     def finish(self, report: Mapping[str, Any]) -> None:
         """Store the report; the file holds the steps written so far.
@@ -119,7 +135,13 @@ class ResultWriter:
         with self._hdf5.used():
             file = self._file = self._hdf5.open()
             stored = create_layout(
-                file, self._format, self._robot, self._trajectory, self._variables, self._provenance
+                file,
+                self._format,
+                self._robot,
+                self._trajectory,
+                self._variables,
+                self._provenance,
+                self._precision,
             )
         self._fillers = {name: ChunkFiller(dataset, self._hdf5.do) for name, dataset in stored.items()}
 
@@ -127,6 +149,18 @@ class ResultWriter:
         """What a block has for a dataset."""
         values: AnyArray = getattr(block, name)
         return values
+
+    def _too_large(self, name: str, values: AnyArray, time: FloatArray) -> StorageError:
+        """What to say of values that single precision does not hold."""
+        with np.errstate(over="ignore"):
+            lost = np.isfinite(values) & np.isinf(values.astype(np.float32))
+        at = tuple(np.argwhere(lost)[0])
+        joint = f" of {self._robot.joint_names[at[1]]}" if "joint" in self._declared[name].dims else ""
+        what = f"{name}{joint} is {values[at]:.3g} at t = {time_text(time[at[0]])}"
+        advice = f"beyond the {np.finfo(np.float32).max:.2g} of single precision; store in double precision"
+        return StorageError(
+            self._staged.path, f"cannot be written: {what}, {advice}; nothing was changed there"
+        )
 
     def _complete(self, report: Mapping[str, Any]) -> None:
         text = storable(json.dumps(report, ensure_ascii=False, allow_nan=False))
@@ -137,7 +171,8 @@ class ResultWriter:
     def _size(self) -> int:
         """Bytes of all samples, flags before compression."""
         stored = (VARIABLES["time"], *self._variables)
-        row = sum(row_bytes(variable, len(self._robot.joints)) for variable in stored)
+        joints = len(self._robot.joints)
+        row = sum(row_bytes(variable, joints, self._precision) for variable in stored)
         return self._trajectory.samples * row
 
     def _selected(
