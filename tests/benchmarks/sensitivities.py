@@ -14,7 +14,7 @@ from subjects import chain, seven_joints
 from timing import Seconds, cpu_seconds, medians
 
 from vsacli import inverse_dynamics, sensitivity
-from vsacli.studies.sensitivities.parameters import parameters
+from vsacli.robot.parameters import parameters
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.trajectory import Trajectory
 

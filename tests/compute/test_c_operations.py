@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from samples.generated_code import Compiled, compile_c
+from samples.generated_code import compile_c, compiled
 from samples.marks import COMPILERS, needs_compiler, slow
 from samples.traced_functions import CONTROL_FLOW, ELEMENTWISE, operands
 
@@ -19,7 +19,7 @@ from vsacli.compute.engine.compiler import Library
 from vsacli.compute.engine.engines import kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.control.codegen.interface import Array, Function, Structure
-from vsacli.control.codegen.scalar import DIGEST, source_text
+from vsacli.control.codegen.scalar import DIGEST
 
 pytestmark = needs_compiler
 
@@ -76,15 +76,16 @@ def test_of_single_samples(tmp_path: Path) -> None:
     values = Structure("values", "", (Array("x", (2,), ""),))
     results = Structure("results", "", (Array("y", (Everything.outputs,), ""),))
     function = Function("all", "", (("values", values),), results, Everything())
-    (tmp_path / "each.h").write_text(
+    header = (
         f"#define EACH_DIGEST {DIGEST}\n"
         "typedef struct { double x[2]; } each_values;\n"
         f"typedef struct {{ double y[{Everything.outputs}]; }} each_results;\n"
         "unsigned each_all(const each_values *values, each_results *results);\n"
     )
-    (tmp_path / "each.c").write_text(source_text("each", [function], "double", "/* all */"))
     x, y = operands()
-    found, _ = Compiled(tmp_path, "each")(function, {"x": np.column_stack([x, y])})
+    found, _ = compiled(tmp_path, "each", header, [function], "double")(
+        function, {"x": np.column_stack([x, y])}
+    )
     assert wrong(found["y"].T, x, y) == []
 
 

@@ -32,4 +32,6 @@ def _skipped_unless(there: bool, package: str) -> Any:
     return pytest.mark.skipif(not there, reason=f"needs the Debian package {package}")
 
 
-needs_compiler = _skipped_unless(bool(COMPILERS and shutil.which("cc")), "gcc")
+needs_compiler = _skipped_unless(
+    bool(COMPILERS and shutil.which("cc") and shutil.which("make")), "build-essential"
+)

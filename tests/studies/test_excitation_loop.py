@@ -13,12 +13,12 @@ from samples.robot_files import write_robot
 from samples.shipped import shipped_robot
 
 from vsacli import identify
+from vsacli.robot.parameters import parameters
 from vsacli.studies.identification.excitation import Noise, plan_excitation, predicted_errors, search
 from vsacli.studies.identification.excitation.predicted_errors import executed, noisy_record
 from vsacli.studies.identification.identification import WORDS, solutions
 from vsacli.studies.identification.motors.unknowns import with_friction
 from vsacli.studies.identification.system_reports import numbers_of
-from vsacli.studies.sensitivities.parameters import parameters
 
 POSITION_NOISE, TORQUE_SHARE = 2e-5, 0.003
 """Rad (m), and over the largest torque of a case, below."""

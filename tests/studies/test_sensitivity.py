@@ -13,8 +13,8 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, rest_to_rest
 from vsacli import load_robot, load_trajectory, sensitivity
 from vsacli.actuators.reach import margin
 from vsacli.dynamics.inverse import compute_block
+from vsacli.robot.parameters import parameters
 from vsacli.studies.sensitivities import SensitivityRun
-from vsacli.studies.sensitivities.parameters import parameters
 
 
 @pytest.fixture(scope="module")

@@ -22,9 +22,9 @@ from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.elastic_torques import joint_state, link_constants, link_torques
 from vsacli.dynamics.recursion import recursion
 from vsacli.robot.kinematics import base_gravity
+from vsacli.robot.parameters import parameters
 from vsacli.studies.sensitivities.drive_derivatives import drive_derivatives
 from vsacli.studies.sensitivities.link_derivatives import torque_slopes
-from vsacli.studies.sensitivities.parameters import parameters
 from vsacli.studies.sensitivities.sensitivity_run import SensitivityRun
 
 WEIGHTS = {-3: -1 / 60, -2: 3 / 20, -1: -3 / 4, 1: 3 / 4, 2: -3 / 20, 3: 1 / 60}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -81,8 +82,8 @@ class Elastic(Actuator):
 
     @property
     def max_deflections(self) -> tuple[float, ...]:
-        """That of the spring."""
-        return (self.law.max_deflection,)
+        """That of the spring; none of a linear one."""
+        return (math.inf if self.spring is None else self.spring.max_deflection,)
 
     @property
     def phi_ranges(self) -> tuple[tuple[float, float], ...]:
@@ -111,13 +112,15 @@ class Elastic(Actuator):
 
     @property
     def _carriable(self) -> LimitCheck:
-        return LimitCheck(Flag.INFEASIBLE, "tau_e", None, self.law.torque_range)
+        endless = (-math.inf, math.inf)
+        torques = endless if self.spring is None else self.spring.torque_range
+        return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
 
     def transmit(
         self, command: Command, _near_singular: float, _integrated: FloatArray | None
     ) -> Transmission:
         """The deflection at which the spring carries tau_e, and its derivatives."""
-        return self._linear(command, self.stiffness) if self.stiffness else self._nonlinear(command)
+        return self._nonlinear(command) if self.stiffness is None else self._linear(command, self.stiffness)
 
     def _linear(self, command: Command, stiffness: float) -> Transmission:
         """Deflection tau_e/K: nothing is to be solved, and the stiffness is constant."""
@@ -187,7 +190,7 @@ class Elastic(Actuator):
         """The springs of several joints."""
         from vsacli.actuators.single_springs import LinearRows, SingleSprings
 
-        linear = [actuator.stiffness for actuator in actuators if actuator.stiffness]
+        linear = [actuator.stiffness for actuator in actuators if actuator.stiffness is not None]
         if len(linear) == len(actuators):
             return SingleSprings(LinearRows(linear))
         return SingleSprings(SpringRows([(actuator.law,) for actuator in actuators]))

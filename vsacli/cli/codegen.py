@@ -29,23 +29,38 @@ from vsacli.cli.file_names import FOLDER
     type=click.Choice(["end_effector", "base"]),
     help="Take a wrench at the end effector as input, along the axes of this frame.",
 )
+@click.option(
+    "--parameters",
+    "patterns",
+    metavar="GLOB",
+    multiple=True,
+    help="Take the numbers whose paths fit as inputs, e.g. 'joints.*.link.mass'; may be given several times.",
+)
 @click.option("--no-loops", is_flag=True, help="Refuse joints whose springs are solved by iteration.")
 @overwrite_option
 @talk_options
 def codegen(
-    robot: str, output: str, precision: str, wrench: str | None, no_loops: bool, overwrite: bool, talk: Talk
+    robot: str,
+    output: str,
+    precision: str,
+    wrench: str | None,
+    patterns: tuple[str, ...],
+    no_loops: bool,
+    overwrite: bool,
+    talk: Talk,
 ) -> int:
     """Write C code for link torques, inverse dynamics and feedback linearization of ROBOT.
 
     C99 that needs nothing but math.h: no allocation, nothing kept between calls, a bounded number of
-    operations. A test program with reference values, a Makefile, CMake's file and a README come along.
+    operations. A test program with reference values, a Makefile, CMake's file, a Python module that calls
+    the code, and a README come along.
     """
     from vsacli.base.outputs import Outputs
     from vsacli.control.codegen.project import generate, write
     from vsacli.robot.file import load_robot
 
     arm = load_robot(robot)
-    project = generate(arm, precision, wrench, loops=not no_loops)
+    project = generate(arm, precision, wrench, patterns, loops=not no_loops)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in arm.sources]) as outputs:
         write(project, output, outputs)
     talk.wrote(outputs)

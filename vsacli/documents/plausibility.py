@@ -45,11 +45,19 @@ NumberPath: TypeAlias = tuple[str | Entry, ...]
 
 
 class Number(NamedTuple):
-    """A number of a record: the path to it, what it measures, and its value in SI units."""
+    """A number of a record.
+
+    Attributes:
+        path: to it.
+        quantity: what it measures.
+        value: in SI units.
+        requirement: what it must be, as in "must be positive"; "" if it may be any number.
+    """
 
     path: NumberPath
     quantity: Quantity
     value: float
+    requirement: str
 
 
 def numbers(
@@ -63,22 +71,25 @@ def numbers(
         path: to the record.
     """
     for name, (field, _) in declared(type(record)).items():
-        yield from _numbers(field.kind, getattr(record, name), members, (*path, name))
+        requirement = "" if field.check is None else field.check.requirement
+        yield from _numbers(field.kind, getattr(record, name), requirement, members, (*path, name))
 
 
-def _numbers(kind: Kind, content: Any, members: Mapping[str, str], path: NumberPath) -> Iterator[Number]:
+def _numbers(
+    kind: Kind, content: Any, requirement: str, members: Mapping[str, str], path: NumberPath
+) -> Iterator[Number]:
     quantity = getattr(kind, "unit", None)
     if content is None:
         return
     if isinstance(kind, Pair) and content[0] is content[1]:
-        yield from _numbers(kind.item, content[0], members, path)
+        yield from _numbers(kind.item, content[0], requirement, members, path)
     elif kind.each is not None:
         for number, (name, entry) in enumerate(zip(kind.names(content, members), content, strict=True)):
-            yield from _numbers(kind.each, entry, members, (*path, Entry(number, name)))
+            yield from _numbers(kind.each, entry, requirement, members, (*path, Entry(number, name)))
     elif kind.records:
         yield from numbers(content, members, path)
     elif quantity is not None and math.isfinite(content):
-        yield Number(path, quantity, float(content))
+        yield Number(path, quantity, float(content), requirement)
 
 
 class Slip(NamedTuple):

@@ -170,7 +170,7 @@ class InverseDynamics(RowKernel):
 
 def _as_row(torque: Scalar, row: Scalar) -> Scalar:
     """Of a joint that moves nothing, the recursion finds a plain zero; the actuator takes rows of samples."""
-    return np.full_like(row, torque) if isinstance(torque, int | float) else torque
+    return np.full_like(row, torque) if np.ndim(torque) == 0 else torque
 
 
 def compute_block(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,8 +52,9 @@ class Cubic(SpringLaw):
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """The real root of the cubic, by its hyperbolic form (no cancellation at any size of torque)."""
-        scale = math.sqrt(self.k / (3 * self.k_c))
-        return 2 * scale * np.sinh(np.arcsinh(1.5 * torque / (self.k * scale)) / 3)
+        scale = np.sqrt(self.k / (3 * self.k_c))
+        deflection: FloatArray = 2 * scale * np.sinh(np.arcsinh(1.5 * torque / (self.k * scale)) / 3)
+        return deflection
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class CubicTwins(Pair):
         k, k_c = self.spring.k, self.spring.k_c
         lower = self._lowest_stiffness(np.abs(tau_e))
         demand = np.maximum(stiffness, lower)
-        load = np.clip(3 * math.sqrt(3 * k_c) * tau_e / (demand * np.sqrt(demand)), -1, 1)
+        load = np.clip(3 * np.sqrt(3 * k_c) * tau_e / (demand * np.sqrt(demand)), -1, 1)
         u = 2 * np.sqrt(demand / (3 * k_c)) * np.sin(np.arcsin(load) / 3)
         spread_squared = 2 * (demand - 2 * k) / (3 * k_c) - u * u
         spread = np.sqrt(np.maximum(spread_squared, 0))
@@ -78,5 +78,5 @@ class CubicTwins(Pair):
         """Outermost critical point: phi_1 = phi_2, or phi_1 phi_2 = K/(3 Kc) beyond its load."""
         k, k_c = self.spring.k, self.spring.k_c
         alike = 2 * self.spring.stiffness(self.spring.deflection(load / 2))
-        unlike = np.cbrt((3 * math.sqrt(3 * k_c) * load) ** 2)
-        return np.where(load <= 8 / 3 * k * math.sqrt(k / (3 * k_c)), alike, unlike)
+        unlike = np.cbrt((3 * np.sqrt(3 * k_c) * load) ** 2)
+        return np.where(load <= 8 / 3 * k * np.sqrt(k / (3 * k_c)), alike, unlike)

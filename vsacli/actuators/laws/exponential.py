@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.law import SpringLaw, alike
 from vsacli.actuators.laws.pair import Pair, PairSolution, tendon_solution
 from vsacli.actuators.laws.tendon import Mirrored, Tendon
 from vsacli.base import units
@@ -23,8 +23,9 @@ class Exponential(Tendon):
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """The closed pair with a tendon of the same a on side 2."""
-        if isinstance(other, Mirrored) and isinstance(other.law, Exponential) and other.law.a == self.a:
-            return ExponentialPair(self, other.law)
+        second = other.law if isinstance(other, Mirrored) else None
+        if isinstance(second, Exponential) and alike(second.a, self.a):
+            return ExponentialPair(self, second)
         return None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:

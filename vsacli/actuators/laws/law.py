@@ -14,6 +14,11 @@ from vsacli.documents.fields import POSITIVE_OR_INFINITE, check_fields, number
 from vsacli.documents.source import Source
 
 
+def alike(number: float, other: float) -> bool:
+    """Whether two numbers of springs are one, also where it is a symbol, known when a program runs."""
+    return number is other or number == other
+
+
 @dataclass(frozen=True)
 class SpringLaw(ABC):
     """Torque tau(phi) of a transmission: zero at zero, strictly increasing, hardening away from zero.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.law import SpringLaw, alike
 from vsacli.actuators.laws.pair import Pair, PairSolution
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
@@ -23,7 +22,7 @@ class Sinh(SpringLaw):
 
     def closed_pair(self, other: SpringLaw) -> Pair | None:
         """The closed pair of two springs of the same a."""
-        return SinhPair(self, other) if isinstance(other, Sinh) and other.a == self.a else None
+        return SinhPair(self, other) if isinstance(other, Sinh) and alike(other.a, self.a) else None
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Torque and stiffness from one exponential function, and a^2 times either."""
@@ -77,7 +76,7 @@ class SinhPair(Pair):
         lower = a * np.hypot(tau_e, k_1 + k_2)
         demand = np.maximum(stiffness, lower)
         sinh = np.sqrt((demand - lower) / (2 * a * k_1)) * np.sqrt((demand + lower) / (2 * a * k_2))
-        radius = np.hypot(k_1 + k_2, 2 * math.sqrt(k_1) * math.sqrt(k_2) * sinh)
+        radius = np.hypot(k_1 + k_2, 2 * np.sqrt(k_1) * np.sqrt(k_2) * sinh)
         mean = np.arcsinh(tau_e / radius) - np.arcsinh((k_1 - k_2) / radius * sinh)
         half_spread = np.arcsinh(sinh)
         phi_1, phi_2 = (mean + half_spread) / a, (mean - half_spread) / a

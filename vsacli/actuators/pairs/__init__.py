@@ -10,15 +10,14 @@ from vsacli.actuators.laws.pair import Pair
 __all__ = ["make_pair"]
 
 
-@lru_cache(maxsize=1024)
 def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:
-    """The solver of (14) for two laws, side 1 preloaded upward: closed where one exists, else iterated.
+    """The solver of (14) for two laws, side 1 preloaded upward: closed where one exists, else iterated."""
+    return first.closed_pair(second) or _iterated(first, second)
 
-    Equal laws get the same pair, which keeps what it has found out about them.
-    """
-    closed = first.closed_pair(second)
-    if closed is not None:
-        return closed
+
+@lru_cache(maxsize=1024)
+def _iterated(first: SpringLaw, second: SpringLaw) -> Pair:
+    """Equal laws get the same pair, which keeps what it has found out about them."""
     from vsacli.actuators.pairs.solver import IteratedPair
 
     return IteratedPair(first, second)

@@ -52,10 +52,10 @@ class TracedArray(NDArrayOperatorsMixin):
         return TracedArray(self.tape, result) if isinstance(result, np.ndarray) else result
 
     def __getitem__(self, index: Any) -> TracedArray:
-        return TracedArray(self.tape, self.cells[_known(index)])
+        return TracedArray(self.tape, self.cells[_index(index)])
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        self.cells[_known(index)] = cells_of(value)
+        self.cells[_index(index)] = cells_of(value)
 
     def __iter__(self) -> Iterator[TracedArray]:
         return (self[index] for index in range(len(self)))
@@ -64,7 +64,21 @@ class TracedArray(NDArrayOperatorsMixin):
         return len(self.cells)
 
     def __bool__(self) -> bool:
-        return bool(_known(self))
+        return bool(self._known())
+
+    def __float__(self) -> float:
+        return float(self._known().item())
+
+    def __hash__(self) -> int:
+        return hash(float(self))
+
+    def _known(self) -> Cells:
+        """The entries, if all of them are constants."""
+        if any(isinstance(cell, Symbol) for cell in self.cells.flat):
+            raise NotImplementedError(
+                "what is known only when the program runs cannot decide what is recorded"
+            )
+        return self.cells
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -138,13 +152,9 @@ def _unpacked(argument: Any) -> Any:
     return argument
 
 
-def _known(index: Any) -> Any:
-    """An index or truth value; only one that does not depend on a sample."""
-    if not isinstance(index, TracedArray):
-        return index
-    if any(isinstance(cell, Symbol) for cell in index.cells.flat):
-        raise NotImplementedError("what is known only when the program runs cannot decide what is recorded")
-    return index.cells.astype(bool)
+def _index(index: Any) -> Any:
+    """An index; of traced arrays only truth values that do not depend on a sample."""
+    return index._known().astype(bool) if isinstance(index, TracedArray) else index
 
 
 def trace(

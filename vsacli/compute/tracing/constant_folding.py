@@ -18,8 +18,14 @@ def folded(operation: str, operands: Sequence[Operand]) -> Operand | None:
         return math.nan
     if operation in COMPARISONS and any(map(_is_nan, operands)):
         return operation == "not_equal"
+    if operation in _STRICT and operands[0] is operands[1]:
+        return False
     rule = _RULES.get(operation)
     return None if rule is None else rule(*operands)
+
+
+_STRICT = frozenset({"less", "greater"})
+"""Comparisons that hold between no value and itself."""
 
 
 def _is_nan(operand: Operand) -> bool:

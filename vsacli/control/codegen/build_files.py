@@ -11,6 +11,10 @@ SIZE ?= size
 {prefix}_test: {prefix}_test.c {prefix}.o
 	$(CC) $(CFLAGS) {prefix}_test.c {prefix}.o -o {prefix}_test -lm
 
+# Position-independent, for {prefix}.py.
+lib{prefix}.so: {prefix}.c {prefix}.h
+	$(CC) $(CFLAGS) -fPIC -shared {prefix}.c -o lib{prefix}.so -lm
+
 .PHONY: test size clean
 test: {prefix}_test
 	./{prefix}_test
@@ -22,7 +26,7 @@ size: {prefix}.c {prefix}.h
 	cut -f 1,2 {prefix}.su
 
 clean:
-	rm -f {prefix}.o {prefix}.su {prefix}_test
+	rm -rf {prefix}.o {prefix}.su {prefix}_test lib{prefix}.so __pycache__
 """
 
 _CMAKE = """cmake_minimum_required(VERSION 3.16)

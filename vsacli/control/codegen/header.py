@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from vsacli.base.flags import Flag
 from vsacli.base.texts import for_comment
 from vsacli.base.version import __version__
-from vsacli.control.codegen.interface import Array, Function, Structure
+from vsacli.control.codegen.interface import Array, Function, Structure, structures
 from vsacli.control.codegen.scalar import DIGEST, WIDTH, signature
 from vsacli.robot.model import Robot
 
@@ -29,16 +29,6 @@ def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precis
         "#endif",
     ]
     return "\n\n".join(parts) + "\n"
-
-
-def structures(functions: Sequence[Function]) -> list[Structure]:
-    """Each structure that the functions use, once."""
-    used = [
-        structure
-        for function in functions
-        for structure in (*(argument for _, argument in function.arguments), function.result)
-    ]
-    return list(dict.fromkeys(used))
 
 
 def _provenance(prefix: str, robot: Robot) -> Iterator[str]:
@@ -76,9 +66,12 @@ def _flags(prefix: str) -> Iterator[str]:
 
 def _structure(prefix: str, structure: Structure, precision: str) -> str:
     members = [_member(array, precision) for array in structure.arrays]
-    return "\n".join(
-        [comment(structure.meaning), "typedef struct {", *members, f"}} {prefix}_{structure.name};"]
-    )
+    name = f"{prefix}_{structure.name}"
+    lines = [comment(structure.meaning), "typedef struct {", *members, f"}} {name};"]
+    if structure.nominal:
+        constant = f"extern const {name} {prefix}_nominal_{structure.name};"
+        lines += ["", "/* Those of the robot file. */", constant]
+    return "\n".join(lines)
 
 
 def _member(array: Array, precision: str) -> str:

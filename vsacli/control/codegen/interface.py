@@ -46,11 +46,13 @@ class Structure:
         name: as in C, without the prefix of the robot.
         meaning: what it is.
         arrays: its members.
+        nominal: values of its entries, of which a constant is made; empty if there are none.
     """
 
     name: str
     meaning: str
     arrays: tuple[Array, ...]
+    nominal: tuple[float, ...] = ()
 
     @property
     def entries(self) -> Iterator[str]:
@@ -70,6 +72,12 @@ Arguments = tuple[tuple[str, Structure], ...]
 def unpacked(arguments: Arguments, rows: Rows) -> dict[str, Rows]:
     """Rows of all entries of the arguments by the names of their arrays, which differ."""
     return RowLayout({array.name: array.shape for _, each in arguments for array in each.arrays}).unpack(rows)
+
+
+def structures(functions: Sequence[Function]) -> list[Structure]:
+    """Each structure that functions use, once."""
+    used = (each for function in functions for each in (*dict(function.arguments).values(), function.result))
+    return list(dict.fromkeys(used))
 
 
 @dataclass(frozen=True)

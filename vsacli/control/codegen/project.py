@@ -13,16 +13,19 @@ from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.texts import sentence
 from vsacli.base.version import __version__
+from vsacli.control.codegen.binding import binding_text
 from vsacli.control.codegen.build_files import build_files
 from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.header import comment, header_text
 from vsacli.control.codegen.interface import Function
+from vsacli.control.codegen.parameters import check_parameters, with_parameters
 from vsacli.control.codegen.readme import readme_text
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.scalar import DIGEST, source_text
 from vsacli.control.codegen.self_test import Reference, self_test_text
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, parameters
 
 
 class Project(NamedTuple):
@@ -40,7 +43,12 @@ class Project(NamedTuple):
 
 
 def generate(
-    robot: Robot, precision: str = "double", wrench: str | None = None, *, loops: bool = True
+    robot: Robot,
+    precision: str = "double",
+    wrench: str | None = None,
+    patterns: Sequence[str] = (),
+    *,
+    loops: bool = True,
 ) -> Project:
     """C99 for a robot: link torques, inverse dynamics, feedback linearization.
 
@@ -49,23 +57,27 @@ def generate(
         precision: type of the numbers, one of `vsacli.control.codegen.scalar.PRECISIONS`.
         wrench: frame, one of `vsacli.base.wrench.WRENCH_FRAMES`, along whose axes the functions take a wrench
             at the end effector; None if they take none.
+        patterns: numbers of the robot whose paths fit one of these, as of `vsacli.robot.parameters`, are
+            arguments of the functions.
         loops: whether there may be some; without them a call takes the same operations whatever goes in.
 
     Raises:
         InputError: something of the robot has no evaluation in a bounded number of operations, or too many;
-            or none without loops.
+            or none without loops; a pattern fits no number, or one that cannot be an argument.
     """
     prefix = prefix_of(robot)
     title = f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
     head = comment(" ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)]))
+    chosen = parameters(robot, patterns) if patterns else ()
     try:
-        functions, omitted = _functions(robot, wrench)
+        functions, omitted = _functions(robot, wrench, chosen)
         if not loops:
             _check_loops(robot, functions)
         files = {
             f"{prefix}.h": header_text(prefix, robot, functions, precision, head),
             f"{prefix}.c": source_text(prefix, functions, precision, head),
-            f"{prefix}_test.c": self_test_text(prefix, functions, Reference(robot), precision, head),
+            f"{prefix}_test.c": self_test_text(prefix, functions, Reference(robot, chosen), precision, head),
+            f"{prefix}.py": binding_text(prefix, functions, precision),
             **build_files(prefix),
             "README.md": readme_text(prefix, robot, functions, precision, omitted),
         }
@@ -80,19 +92,29 @@ def _sealed(files: dict[str, str]) -> dict[str, str]:
     return {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
 
 
-def _functions(robot: Robot, wrench: str | None) -> tuple[list[Function], list[str]]:
+def _functions(
+    robot: Robot, wrench: str | None, chosen: Sequence[Parameter]
+) -> tuple[list[Function], list[str]]:
     """Those that there are, and why there are not more.
 
     The last one grows with the third power of the number of joints, so it is looked at if the others were not
     too long.
 
     Raises:
+        InputError: some of the chosen numbers cannot be arguments of these.
         NotImplementedError: not even the first two.
     """
     makers = (link_torques_function, inverse_dynamics_function)
-    functions, omitted = [_recorded(make(robot, wrench)) for make in makers], []
     try:
-        functions.append(_recorded(feedback_linearization_function(robot, wrench)))
+        functions = [_recorded(with_parameters(make, robot, wrench, chosen)) for make in makers]
+    except NotImplementedError:
+        if chosen:
+            check_parameters(robot, wrench, chosen)
+        raise
+    omitted = []
+    try:
+        make = feedback_linearization_function
+        functions.append(_recorded(with_parameters(make, robot, wrench, chosen)))
     except InputError as error:
         omitted.append(f"no feedback_linearization: {error}")
     except NotImplementedError as error:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from vsacli.base.texts import for_markdown, sentence
 from vsacli.control.codegen.cost import table_bytes, worst_cost
-from vsacli.control.codegen.interface import Function
+from vsacli.control.codegen.interface import Function, Structure, structures
 from vsacli.control.codegen.scalar import signature
 from vsacli.control.codegen.self_test import TOLERANCE
 from vsacli.robot.model import Robot
@@ -22,13 +22,14 @@ call them at once.
 compiles `{prefix}_test.c` and compares the functions with what vsacli computes by NumPy, within
 {tolerance:g} of the largest value of each array. `cmake -B build && cmake --build build && ctest
 --test-dir build` does the same; another CMake project takes in the library `{prefix}` by `add_subdirectory`.
+`{prefix}.py` calls the functions from Python; its first lines say how.
 
 ## Functions
 
 {functions}
 
 The structures are in `{prefix}.h`, each member with its unit. Joints are numbered from the base: {joints}.
-{omitted}
+{omitted}{numbers}
 ## What a call costs
 
 At the very most, with every branch entered and every loop run to its bound:
@@ -50,7 +51,7 @@ and what is too large in a command, from a sensor that failed for instance, coun
 ```c
 #include "{prefix}.h"
 
-void every_millisecond({parameters})
+void every_millisecond({arguments})
 {{
     {prefix}_drive drive;
     const unsigned flags = {prefix}_inverse_dynamics({call}, &drive);
@@ -69,6 +70,22 @@ NaN would go unnoticed, the code does not compile.
 """
 
 
+_PARAMETERS = """
+## Numbers of the robot
+
+Numbers that change from task to task, such as a payload, are an argument. A constant holds those of the robot
+file, from which others are made:
+
+    {prefix}_{structure} {structure} = {prefix}_nominal_{structure};
+    {structure}.{first} = ...;
+
+Results are those of code made of a robot file with these numbers. They are not checked: the header says of
+each number what the file demands of it, and no flag tells where one breaks that. `vsacli validate` checks a
+robot file with such numbers as a whole, e.g. that the inertia of a link is one that a body can have. While a
+number changes, its rate has no part in the derivatives of the torques.
+"""
+
+
 def readme_text(
     prefix: str, robot: Robot, functions: Sequence[Function], precision: str, omitted: Sequence[str]
 ) -> str:
@@ -80,7 +97,7 @@ def readme_text(
         prefix=prefix,
         upper=prefix.upper(),
         call=", ".join(name for name, _ in loop.arguments),
-        parameters=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
+        arguments=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
         tolerance=TOLERANCE[precision],
         functions="\n".join(
             f"- `{' '.join(signature(prefix, function).split())}`: {function.meaning}"
@@ -88,9 +105,16 @@ def readme_text(
         ),
         joints=for_markdown(", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names))),
         omitted="".join(f"There is {for_markdown(sentence(reason))}\n" for reason in omitted),
+        numbers="".join(_numbers(prefix, each) for each in structures(functions) if each.nominal),
         costs="\n".join(_costs(functions)),
         tables=table_bytes([function.program for function in functions], precision),
     )
+
+
+def _numbers(prefix: str, structure: Structure) -> str:
+    """What whoever calls has to know about numbers of the robot that are arguments."""
+    first = next(structure.entries)
+    return _PARAMETERS.format(prefix=prefix, structure=structure.name, first=first)
 
 
 def _costs(functions: Sequence[Function]) -> Iterator[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.compute.tracing import Kind, Program, Symbol
 from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations, table_names
-from vsacli.control.codegen.interface import Function
+from vsacli.control.codegen.interface import Function, Structure, structures
 
 PRECISIONS = ("double", "float")
 
@@ -153,10 +153,20 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
         for function, program in zip(functions, programs, strict=True)
     ]
     declarations = list(table_declarations(tables, dialect))
+    constants = [_constant(prefix, each, dialect) for each in structures(functions) if each.nominal]
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
     helpers = [_helper(name, precision) for name in HELPERS if name in used]
-    parts = [head, included(prefix), "#include <math.h>", _STRICT, "\n".join(declarations), *helpers, *bodies]
+    constants.append("\n".join(declarations))
+    parts = [head, included(prefix), "#include <math.h>", _STRICT, *constants, *helpers, *bodies]
     return "\n\n".join(filter(None, parts)) + "\n"
+
+
+def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
+    """The nominal values of a structure."""
+    values = zip(structure.entries, structure.nominal, strict=True)
+    members = (f"    .{entry} = {dialect.real(value)},\n" for entry, value in values)
+    name = f"{prefix}_{structure.name} {prefix}_nominal_{structure.name}"
+    return f"const {name} = {{\n{''.join(members)}}};"
 
 
 def _helper(name: str, precision: str) -> str:

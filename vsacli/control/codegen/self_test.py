@@ -11,11 +11,13 @@ from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.interface import Array, Function
+from vsacli.control.codegen.parameters import PARAMETERS, parameters_structure
 from vsacli.control.codegen.scalar import included
 from vsacli.control.gains import STIFFNESS_ORDER
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import compute_block, internal_equilibrium
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter
 from vsacli.trajectory.motion import Motion
 
 CASES = 6
@@ -29,6 +31,9 @@ MISSED = {"q": 0.01, "dq": 0.1, "theta": 0.01, "dtheta": 0.1}
 
 POLE = -20.0
 
+VARIED, UNLIKE_ZERO = 1.05, 0.01
+"""Factor of numbers that are parameters, and what stands for zero: small, so that stiffness is reachable."""
+
 Arrays = dict[str, FloatArray]
 """Arrays (cases, ...) by name."""
 
@@ -36,7 +41,8 @@ Arrays = dict[str, FloatArray]
 class Reference:
     """Inputs and results of the generated functions of a robot."""
 
-    def __init__(self, robot: Robot) -> None:
+    def __init__(self, robot: Robot, chosen: Sequence[Parameter] = ()) -> None:
+        """Of functions that take the chosen numbers as an argument, if they take any."""
         self._robot = robot
         self._rng = np.random.default_rng(1)
         command = self._command()
@@ -47,6 +53,7 @@ class Reference:
             "internal": self._internal(command),
             "integral": {name: self._drawn(scale) for name, scale in (("q", 1e-3), ("stiffness", 1.0))},
             "wrench": {name: self._rng.uniform(-1, 1, (CASES, len(WRENCH_AXES))) for name in WRENCH_NAMES},
+            PARAMETERS: _two_sets(chosen),
         }
 
     def inputs(self, function: Function) -> list[Arrays]:
@@ -115,6 +122,14 @@ class Reference:
             name: values + self._rng.uniform(-MISSED[name], MISSED[name], values.shape)
             for name, values in {**of_joint, **at_rest}.items()
         }
+
+
+def _two_sets(chosen: Sequence[Parameter]) -> Arrays:
+    """Nominal values, and in every other case others that are allowed as well."""
+    nominal = np.array([each.value for each in chosen])
+    other = np.where(nominal == 0, UNLIKE_ZERO, VARIED * nominal)
+    of_cases = np.where(np.arange(CASES) % 2, other[:, None], nominal[:, None])
+    return dict(zip(parameters_structure(chosen).entries, of_cases, strict=True))
 
 
 def _gains(shape: Sequence[int]) -> Arrays:

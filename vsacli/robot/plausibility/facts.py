@@ -47,7 +47,7 @@ class Facts:
 
     def of_unit(self, unit: str, *within: str) -> Iterator[Measured]:
         """The numbers in a unit, each with its magnitude as size; those whose path has these steps."""
-        for path, quantity, value in self.numbers:
+        for path, quantity, value, _ in self.numbers:
             if {*within} <= {*path} and quantity.unit(self._variant(path)) == unit:
                 yield Measured(path, value, unit, abs(value))
 

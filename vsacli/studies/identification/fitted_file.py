@@ -12,13 +12,13 @@ from vsacli.documents.remarks import with_errors
 from vsacli.documents.unaliased import unaliased
 from vsacli.robot.model import Robot
 from vsacli.robot.modified_dh import modified_link
+from vsacli.robot.parameters import JOINTS, parameters
 from vsacli.studies.identification.identification_report import (
     Identification,
     Number,
     SystemReport,
     significant,
 )
-from vsacli.studies.sensitivities.parameters import JOINTS, parameters
 
 NOTHING = 1e-9
 """Size of numbers of links, SI units, that are left by rounding."""

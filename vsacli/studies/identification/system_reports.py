@@ -10,6 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import JOINTS
 from vsacli.studies.identification.estimation.equations import Equations
 from vsacli.studies.identification.estimation.solution import Solution, held_out, rms
 from vsacli.studies.identification.identification_report import (
@@ -23,7 +24,6 @@ from vsacli.studies.identification.records.record_columns import TORQUE
 from vsacli.studies.identification.records.records import Record
 from vsacli.studies.identification.records.signals import Signals
 from vsacli.studies.identification.records.torque_noise import torque_noise
-from vsacli.studies.sensitivities.parameters import JOINTS
 
 SMOOTH_CURVES = 8
 """Rows of figures to one of the equations, whose curves have corners."""

@@ -15,11 +15,11 @@ from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import Drive, driven_by
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
+from vsacli.robot.parameters import apart
 from vsacli.studies.optimisation.criteria import Criterion, Scale
 from vsacli.studies.remedies.admissible_stiffness import Range
 from vsacli.studies.remedies.motions import Load
 from vsacli.studies.sensitivities.implicit import ImplicitSolution
-from vsacli.studies.sensitivities.parameters import apart
 
 CLEARANCE = 1e-6
 """Share of each bound by which a profile keeps clear of it, so that rounding crosses none."""

@@ -13,11 +13,11 @@ from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import Drive, driven_by
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
+from vsacli.robot.parameters import apart
 from vsacli.studies.optimisation.criteria import NO_COST, UNSCALED, Criterion, Scale
 from vsacli.studies.optimisation.fixed_motion import finite_ends
 from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, PacedMotion
 from vsacli.studies.sensitivities.implicit import ImplicitSolution
-from vsacli.studies.sensitivities.parameters import apart
 
 CLEARANCE = 1e-4
 """Share of each bound by which a motion keeps clear of it at the instants that are looked at, for what lies

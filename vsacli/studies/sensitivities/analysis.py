@@ -9,11 +9,11 @@ import numpy as np
 
 from vsacli.base.units import TORQUE
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter
 from vsacli.studies.sensitivities.band import Band
 from vsacli.studies.sensitivities.effects import Effects
 from vsacli.studies.sensitivities.monte_carlo import monte_carlo
 from vsacli.studies.sensitivities.parameter_steps import step_of, words_of
-from vsacli.studies.sensitivities.parameters import Parameter
 from vsacli.studies.sensitivities.sensitivity_report import JointEffect, ParameterEffect, Sensitivity
 from vsacli.studies.sensitivities.sensitivity_run import SensitivityRun
 from vsacli.studies.sensitivities.slopes import Derivatives

@@ -15,8 +15,8 @@ from vsacli.compute.duals import seeds, tangent_of
 from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.elastic_torques import TORQUES
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, apart, seeded
 from vsacli.studies.sensitivities.implicit import ImplicitSolution
-from vsacli.studies.sensitivities.parameters import Parameter, apart, seeded
 
 OF_MOTORS = ("tau_motor", "theta", "motor_power")
 """Variables of the motors that are differentiated."""

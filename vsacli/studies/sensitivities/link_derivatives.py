@@ -14,7 +14,7 @@ from vsacli.dynamics.chain import Chain
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.recursion import backward, base_frame, forward
 from vsacli.robot.model import Robot
-from vsacli.studies.sensitivities.parameters import Parameter, seeded
+from vsacli.robot.parameters import Parameter, seeded
 from vsacli.trajectory.motion import Motion
 
 

@@ -14,7 +14,7 @@ from vsacli.base.flags import Flag, has
 from vsacli.base.json_records import Published, named
 from vsacli.dynamics.inverse import compute_block, fitted, usual_block
 from vsacli.robot.model import Robot
-from vsacli.studies.sensitivities.parameters import Parameter
+from vsacli.robot.parameters import Parameter
 from vsacli.studies.sensitivities.tolerances import Tolerance
 from vsacli.trajectory.trajectory import Trajectory
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from vsacli.base import units
 from vsacli.base.units import Quantity
-from vsacli.studies.sensitivities.parameters import Parameter
+from vsacli.robot.parameters import Parameter
 
 RELATIVE = 0.01
 """Change of most numbers."""

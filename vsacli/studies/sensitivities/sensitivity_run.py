@@ -8,9 +8,9 @@ from typing import ClassVar
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import command_of, compute_block, fitted
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, parameters
 from vsacli.studies.sensitivities.drive_derivatives import MARGIN, OF_MOTORS, drive_derivatives
 from vsacli.studies.sensitivities.link_derivatives import torque_slopes
-from vsacli.studies.sensitivities.parameters import Parameter, parameters
 from vsacli.studies.sensitivities.slopes import Chained, Derivatives, Group, Known
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory

@@ -21,8 +21,8 @@ from vsacli.documents.kinds.shares import PER_CENT
 from vsacli.documents.number import evaluate
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.yaml_tree import parse_yaml
+from vsacli.robot.parameters import Parameter
 from vsacli.studies.sensitivities.parameter_steps import SMALL_CHANGES
-from vsacli.studies.sensitivities.parameters import Parameter
 
 FORM = "e.g. {normal: 5 %} or {uniform: 0.001}"
 _PLAIN = re.compile(r"[-+.\d]+(e[-+]?\d+)?|nan|inf", re.IGNORECASE)

@@ -37,7 +37,7 @@ def _wrenches(facts: Facts, *, forces: bool) -> Iterator[Measured]:
     """Components over the weight of the robot, moments over that at its reach."""
     scale = facts.sizes.weight * (1.0 if forces else facts.sizes.extent)
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
-    for path, quantity, value in facts.numbers if not facts.robot.placeholder else ():
+    for path, quantity, value, _ in facts.numbers if not facts.robot.placeholder else ():
         if quantity == units.WRENCH and isinstance(path[-1], Entry) and (path[-1].number < 3) == forces:
             size = ratio(abs(value), scale) if value else math.nan
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)

@@ -75,7 +75,7 @@ class Facts:
 
     def of_joints(self, quantity: Quantity) -> Iterator[tuple[Measured, int]]:
         """The numbers that measure this, each with its joint and with its magnitude as size."""
-        for path, measured, value in self.numbers:
+        for path, measured, value, _ in self.numbers:
             if measured == quantity and isinstance(path[-1], Entry):
                 joint = path[-1].number
                 unit = quantity.unit(self.robot.joint_types[joint])

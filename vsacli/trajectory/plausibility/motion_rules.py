@@ -77,7 +77,7 @@ def _accelerations(facts: Facts, quantity: Quantity) -> Iterator[Measured]:
 
 
 def _rates(facts: Facts) -> Iterator[Measured]:
-    for path, quantity, value in facts.numbers:
+    for path, quantity, value, _ in facts.numbers:
         if quantity == units.RATE and path == ("rate",):
             yield Measured(path, value, PER_SECOND, value)
 

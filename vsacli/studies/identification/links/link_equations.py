@@ -17,6 +17,7 @@ from vsacli.compute.duals import tangent_of, value_of
 from vsacli.dynamics.drive import motor_torques
 from vsacli.dynamics.joint_friction import joint_friction
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, apart, parameters, seeded
 from vsacli.studies.identification.estimation.equations import Equations
 from vsacli.studies.identification.links.base_parameters import BaseParameters, base_parameters
 from vsacli.studies.identification.links.inertial_parameters import all_parameters, names
@@ -24,7 +25,6 @@ from vsacli.studies.identification.links.regressor import regressor
 from vsacli.studies.identification.motors.motor_equations import joint_motion
 from vsacli.studies.identification.motors.unknowns import WIDTH, unknowns
 from vsacli.studies.identification.records.signals import Signals
-from vsacli.studies.sensitivities.parameters import Parameter, apart, parameters, seeded
 
 RESISTANCES = ("damping", "friction")
 """Parts of a joint against which its link moves."""

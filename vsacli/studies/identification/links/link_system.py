@@ -9,6 +9,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, parameters
 from vsacli.studies.identification.estimation.equations import Equations, with_noise
 from vsacli.studies.identification.estimation.solution import Solution
 from vsacli.studies.identification.links.base_parameters import BaseParameters
@@ -16,7 +17,6 @@ from vsacli.studies.identification.links.inertial_parameters import SYMBOLS, UNI
 from vsacli.studies.identification.links.link_equations import Given, LinkUnknowns, link_equations
 from vsacli.studies.identification.motors.unknowns import SPRINGS, admissible, group_of
 from vsacli.studies.identification.records.signals import Signals
-from vsacli.studies.sensitivities.parameters import Parameter, parameters
 
 LINKS = "links"
 """Title of the system of all of them, and the word by which users ask for it."""

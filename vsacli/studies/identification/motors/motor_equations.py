@@ -16,9 +16,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.compute.duals import Dual, tangent_of, value_of
 from vsacli.dynamics.drive import motor_torques
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, apart, seeded
 from vsacli.studies.identification.estimation.equations import Equations
 from vsacli.studies.identification.records.signals import Signals
-from vsacli.studies.sensitivities.parameters import Parameter, apart, seeded
 
 
 def motor_equations(

@@ -9,11 +9,11 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter
 from vsacli.studies.identification.estimation.equations import Equations, with_noise
 from vsacli.studies.identification.motors.motor_equations import motor_equations
 from vsacli.studies.identification.motors.unknowns import SPRINGS, admissible, group_of, unknowns
 from vsacli.studies.identification.records.signals import Signals
-from vsacli.studies.sensitivities.parameters import Parameter
 
 
 class MotorSystem:

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
-from vsacli.studies.sensitivities.parameters import Parameter, parameters
+from vsacli.robot.parameters import Parameter, parameters
 
 SPRINGS, MOTORS, FRICTION = "springs", "motors", "friction"
 GROUPS = (SPRINGS, MOTORS, FRICTION)

@@ -1,4 +1,4 @@
-"""The numbers of a robot by which all is differentiated, and robots that carry derivatives by them."""
+"""The numbers of a robot that results depend on, and robots with others in their place, of any kind."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ from typing import Any, NamedTuple, TypeVar
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
-from vsacli.compute.duals import Dual, seeds
-from vsacli.documents.plausibility import Entry, NumberPath, numbers
+from vsacli.compute.duals import seeds
+from vsacli.compute.vector import Scalar
+from vsacli.documents.plausibility import Entry, Number, NumberPath, numbers
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
-JOINTS, LIMITS, LARGEST = "joints", "limits", "max_"
-"""Words of paths: numbers under `limits`, and those that begin by `max_`, bound results and change none."""
+JOINTS = "joints"
+
+LIMITS, LARGEST, OF_DAMPER = "limits", "max_", ("damper", "range")
+"""Words of paths to numbers that bound results and change none: those under `limits`, the range of a damper,
+and those that begin by `max_`."""
 
 _Record = TypeVar("_Record")
 
@@ -28,6 +32,7 @@ class Parameter(NamedTuple):
         path: to it, from the robot.
         quantity: what it measures.
         value: in SI units.
+        requirement: what the robot file demands of it, e.g. "positive"; "" if it may be any number.
         joint: index of its joint; None if it is of the whole robot.
         joint_type: of that joint, "" if there is none.
     """
@@ -35,11 +40,17 @@ class Parameter(NamedTuple):
     path: NumberPath
     quantity: Quantity
     value: float
+    requirement: str
     joint: int | None
     joint_type: str
 
     def __str__(self) -> str:
         return ".".join(map(str, self.path))
+
+    @property
+    def by_index(self) -> tuple[str, ...]:
+        """The words of the path, with entries of lists by their index."""
+        return tuple(str(step.number) if isinstance(step, Entry) else step for step in self.path)
 
     @property
     def part(self) -> str:
@@ -58,15 +69,12 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
     Args:
         robot: the robot.
         patterns: only those whose path fits one of these, e.g. `joints.*.actuator.spring.*`; all if empty.
+            An entry of a list goes by its name or by its index.
 
     Raises:
         InputError: a pattern fits none.
     """
-    found = [
-        _parameter(robot, number.path, number.quantity, number.value)
-        for number in numbers(robot)
-        if _matters(number.path)
-    ]
+    found = [_parameter(robot, number) for number in numbers(robot) if _matters(number.path)]
     chosen = [each for each in found if not patterns or any(_fits(each, pattern) for pattern in patterns)]
     for pattern in patterns:
         if not any(_fits(each, pattern) for each in found):
@@ -76,39 +84,45 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
 
 
 def _matters(path: NumberPath) -> bool:
-    return LIMITS not in path and not str(path[-1]).startswith(LARGEST)
+    bounds = LIMITS in path or path[2:4] == OF_DAMPER
+    return not bounds and not str(path[-1]).startswith(LARGEST)
 
 
 def _fits(parameter: Parameter, pattern: str) -> bool:
-    return fnmatchcase(str(parameter), pattern)
+    words = (str(parameter), ".".join(parameter.by_index))
+    return any(fnmatchcase(path, pattern) for path in words)
 
 
-def _parameter(robot: Robot, path: NumberPath, quantity: Quantity, value: float) -> Parameter:
-    entry = path[1] if path[0] == JOINTS else None
+def _parameter(robot: Robot, number: Number) -> Parameter:
+    entry = number.path[1] if number.path[0] == JOINTS else None
     if not isinstance(entry, Entry):
-        return Parameter(path, quantity, value, None, "")
-    return Parameter(path, quantity, value, entry.number, robot.joints[entry.number].type)
+        return Parameter(*number, None, "")
+    return Parameter(*number, entry.number, robot.joints[entry.number].type)
 
 
 def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
-    """A robot that carries the derivatives by some of its numbers, a direction each.
+    """A robot that carries the derivatives by some of its numbers, a direction each; see `with_numbers`."""
+    return with_numbers(robot, chosen, seeds([parameter.value for parameter in chosen]))
+
+
+def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
+    """A robot with other values of some of its numbers, scalars of any kind.
 
     It is none to be checked or written: records on the way to those numbers are made without their checks.
     """
-    duals = seeds([parameter.value for parameter in chosen])
-    places = [(parameter.path, dual) for parameter, dual in zip(chosen, duals, strict=True)]
-    carrying: Robot = _with_numbers(robot, places)
-    return carrying
+    places = [(parameter.path, value) for parameter, value in zip(chosen, values, strict=True)]
+    other: Robot = _with_numbers(robot, places)
+    return other
 
 
-def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Dual]]) -> Any:
+def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Scalar]]) -> Any:
     """A record or list with other numbers at some paths."""
-    inside: dict[str | int, list[tuple[NumberPath, Dual]]] = {}
-    for path, dual in places:
+    inside: dict[str | int, list[tuple[NumberPath, Scalar]]] = {}
+    for path, scalar in places:
         if not path:  # of a pair of numbers that are one, both
-            return (dual,) * len(content) if isinstance(content, tuple) else dual
+            return (scalar,) * len(content) if isinstance(content, tuple) else scalar
         word = path[0].number if isinstance(path[0], Entry) else path[0]
-        inside.setdefault(word, []).append((path[1:], dual))
+        inside.setdefault(word, []).append((path[1:], scalar))
     if isinstance(content, tuple):
         return _in_list(content, inside)
     fields: dict[str, Any] = {
@@ -118,14 +132,14 @@ def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Dual]]) -> An
 
 
 def _in_list(
-    entries: tuple[Any, ...], inside: Mapping[str | int, list[tuple[NumberPath, Dual]]]
+    entries: tuple[Any, ...], inside: Mapping[str | int, list[tuple[NumberPath, Scalar]]]
 ) -> tuple[Any, ...]:
     """Of a pair whose sides are one, a path goes on without a number: it changes both."""
     both = [
-        ((word, *path), dual)
+        ((word, *path), scalar)
         for word, deeper in inside.items()
         if isinstance(word, str)
-        for path, dual in deeper
+        for path, scalar in deeper
     ]
     if both:
         return (_with_numbers(entries[0], both),) * len(entries)

@@ -1,0 +1,85 @@
+"""Numbers of the robot that generated functions take as an argument, where others have them in their code."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+from vsacli.base.errors import InputError, Problem
+from vsacli.compute.tracing import Program, Symbol
+from vsacli.control.codegen.interface import Array, Function, Rows, Structure
+from vsacli.control.codegen.robot_functions import inverse_dynamics_function
+from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, with_numbers
+
+Maker = Callable[[Robot, str | None], Function]
+"""Makes a function of a robot, and of the frame of a wrench."""
+
+PARAMETERS = "parameters"
+
+
+def parameters_structure(chosen: Sequence[Parameter]) -> Structure:
+    """The argument: a member for each number, by its path."""
+    meaning = "Numbers of the robot, by their paths in its file; the functions do not check them."
+    arrays = (Array("_".join(each.by_index), (), _meaning(each)) for each in chosen)
+    return Structure(PARAMETERS, meaning, tuple(arrays), tuple(each.value for each in chosen))
+
+
+def _meaning(parameter: Parameter) -> str:
+    """Path and unit, and what the robot file demands of the number."""
+    unit = parameter.unit if parameter.unit != "1" else "no unit"
+    return ", ".join(filter(None, (str(parameter), unit, parameter.requirement)))
+
+
+def with_parameters(make: Maker, robot: Robot, frame: str | None, chosen: Sequence[Parameter]) -> Function:
+    """A function that takes some numbers of the robot, unless it depends on none of them.
+
+    What makes it is called again where these are symbols, so that there is no second text of anything.
+
+    Raises:
+        NotImplementedError: what it does is decided by one of them.
+    """
+    plain = make(robot, frame)
+    if not chosen:
+        return plain
+
+    def compute(rows: Rows) -> Rows:
+        given, values = rows[: -len(chosen)], rows[-len(chosen) :]
+        other = with_numbers(robot, chosen, [row[0] for row in values])
+        return make(other, frame).compute(given)
+
+    taken = (*plain.arguments, (PARAMETERS, parameters_structure(chosen)))
+    function = dataclasses.replace(plain, arguments=taken, compute=compute)
+    return function if _reads(function.program, len(chosen)) else plain
+
+
+def _reads(program: Program, last: int) -> bool:
+    """Whether a program reads one of its last inputs."""
+    operands = {operand for each in program.operations for operand in each.operands} | {*program.outputs}
+    return any(isinstance(each, Symbol) and each in operands for each in program.inputs[-last:])
+
+
+def check_parameters(robot: Robot, frame: str | None, chosen: Sequence[Parameter]) -> None:
+    """Refuse numbers by whose values code is chosen, or tables are made.
+
+    Raises:
+        InputError: naming them.
+        NotImplementedError: there is no code of the robot, whatever its parameters.
+    """
+    _ = inverse_dynamics_function(robot, frame).program
+    refused = [each for each in chosen if not _may_vary(robot, frame, each)]
+    reason = (
+        "cannot be a parameter: its value decides which operations there are, or goes into tables that are "
+        "computed when the code is written; choose other --parameters, and generate the code anew when it "
+        "changes"
+    )
+    if refused:
+        raise InputError(Problem("", 0, f"{each} of {robot.name} {reason}") for each in refused)
+
+
+def _may_vary(robot: Robot, frame: str | None, parameter: Parameter) -> bool:
+    try:
+        with_parameters(inverse_dynamics_function, robot, frame, [parameter])
+    except NotImplementedError:
+        return False
+    return True
