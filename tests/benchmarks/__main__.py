@@ -21,6 +21,7 @@ import kernel
 import page
 import recorders
 import sensitivities
+import simulations
 import stages
 from machine import description
 from subjects import ROOT
@@ -49,6 +50,7 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     yield "stages", page.stage_table(*runs)
     yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats))
     yield "sensitivity", page.sensitivity_part(sensitivities.compare(3 * repeats))
+    yield "simulations", page.simulation_table(simulations.compare(repeats))
     yield "startup", page.startup_table(commands.startup(3 * repeats))
     memory = commands.peak_memory(LONG_RUN) / 1e6
     yield (

@@ -10,6 +10,7 @@ from growth import Growth
 from kernel import CASADI, Kernel
 from recorders import Recorder
 from sensitivities import INVERSE_DYNAMICS, SAMPLES, Sensitivities
+from simulations import COMPILED, RECORDED, TEXT, Simulated
 from stages import Stages
 from timing import Seconds
 
@@ -122,6 +123,31 @@ def actuation_table(found: Iterable[Actuation]) -> str:
     """The springs, against the recursion."""
     header = ("springs", "load", "µs a joint and sample", f"of the recursion ({JOINTS} joints)")
     return table(header, ([a.springs, a.load, micro(a.seconds), f"{a.ratio:.2g}"] for a in found))
+
+
+def simulation_table(found: Iterable[Simulated]) -> str:
+    """Simulations with each way to evaluate the equations of motion."""
+    header = (
+        "simulation",
+        "of",
+        "evaluations",
+        *(f"{way}, s" for way in (TEXT, RECORDED, COMPILED)),
+        "ratio",
+    )
+    return table(
+        (*header, "compiled, µs an evaluation"),
+        (
+            [
+                each.name,
+                f"{each.duration:g} s",
+                f"{each.evaluations:,}",
+                *(f"{each.seconds[way]:.2g}" for way in (TEXT, RECORDED, COMPILED)),
+                f"{each.seconds[TEXT] / each.seconds[COMPILED]:.2g}",
+                micro(each.seconds[COMPILED] / each.evaluations),
+            ]
+            for each in found
+        ),
+    )
 
 
 def startup_table(taken: Seconds) -> str:

@@ -25,6 +25,7 @@ from vsacli.control.linearization import FeedbackLinearization
 from vsacli.control.simulation import InitialError, Tolerances, perturbed, simulate
 from vsacli.control.simulation.budget import Budget
 from vsacli.control.simulation.closed_loop import ClosedLoop
+from vsacli.control.simulation.equations.equations import Equations
 from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.sliding import Sliding
@@ -69,8 +70,9 @@ def pushed(
     springs = loop.plant.drivetrain.sprung.sum()
     start = loop.packing.pack(np.array([q]), np.array([dq]), np.full(springs, q), np.full(springs, dq))
     start = slides.start(0.0, start)
-    integrator = Integrator([], Tolerances(), Budget(None, times), lambda _: None, slides)
-    reached, states, ending = integrator.over(loop.derivative, times, start)
+    equations = Equations(loop, [], Budget(None, times))
+    integrator = Integrator(equations, Tolerances(), lambda _: None, slides)
+    reached, states, ending = integrator.over(times, start)
     assert ending is None
     np.testing.assert_array_equal(reached, times)
     return states[:, 0], states[:, 1]

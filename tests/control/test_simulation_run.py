@@ -103,8 +103,8 @@ def test_a_boundary_lies_where_its_distance_is_no_number_any_more():
     loop = ClosedLoop(robot, Feedforward(robot, trajectory), reference)
     start = loop.packing.pack(*loop.plant.unpacked(start_state(robot, trajectory, InitialError())))
     boundary = Singularity(loop, start)
-    assert boundary(0.0, start) == pytest.approx(1 - 1e-4, rel=1e-12)
-    assert boundary(0.0, np.where(np.arange(len(start)) == 7, np.nan, start)) == -1
+    assert boundary.distance(start) == pytest.approx(1 - 1e-4, rel=1e-12)
+    assert boundary.distance(np.where(np.arange(len(start)) == 7, np.nan, start)) == -1
 
 
 def test_feedforward_ends_where_there_are_no_torques():

@@ -100,7 +100,7 @@ class Drivetrain:
 
     def direct(self, values: FloatArray) -> FloatArray:
         """The value of the motor that moves a joint directly, (..., joints) from (..., motors), else 0."""
-        result = np.zeros((*values.shape[:-1], len(self.rigid)))
+        result = np.zeros_like(values, shape=(*values.shape[:-1], len(self.rigid)))
         if self._direct.size:
             result[..., self._direct] = values[..., ~self.sprung]
         return result

@@ -123,22 +123,24 @@ def check_plotted(folder: str | None) -> None:
         raise click.UsageError("--format needs --plot")
 
 
+engine_option = click.option(
+    "--engine",
+    type=click.Choice(["numpy", "c", "auto"]),
+    default="auto",
+    show_default=True,
+    help="What computes: NumPy, or code from the system's C compiler; auto takes what is faster.",
+)
+
+
 def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """`--engine` and `--threads`."""
-    engine = click.option(
-        "--engine",
-        type=click.Choice(["numpy", "c", "auto"]),
-        default="auto",
-        show_default=True,
-        help="What computes: NumPy, or code from the system's C compiler; auto takes what is faster.",
-    )
     threads = click.option(
         "--threads",
         type=click.IntRange(min=1),
         metavar="COUNT",
         help="Threads of compiled code; by default one a processor.",
     )
-    return engine(threads(command))
+    return engine_option(threads(command))
 
 
 class Inputs(NamedTuple):

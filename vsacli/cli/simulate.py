@@ -15,6 +15,7 @@ import click
 from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import (
     Inputs,
+    engine_option,
     example,
     hdf5_name,
     json_option,
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from vsacli.control.simulation import Sensors, Simulation
     from vsacli.control.simulation.simulation_report import SimulationReport
     from vsacli.results.plots import FigureFiles
-    from vsacli.results.store.simulation import SimulationWriter
     from vsacli.robot.model import Robot
     from vsacli.trajectory.trajectory import Trajectory
 
@@ -137,6 +137,7 @@ FEEDBACK = "feedback-linearization"
 )
 @json_option
 @overwrite_option
+@engine_option
 @talk_options
 def simulate(
     robot: str,
@@ -146,6 +147,7 @@ def simulate(
     plot_folder: str | None,
     as_json: bool,
     overwrite: bool,
+    engine: str,
     talk: Talk,
     **choices: Any,
 ) -> int:
@@ -168,13 +170,15 @@ def simulate(
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
         figures = None if plot_folder is None else _figures(inputs.robot, plot_folder, path.stem, outputs)
-        provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]])}
+        found = _run(partial(simulation, engine=engine, tell=talk.note), inputs.trajectory, talk)
+        provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]]), **found.provenance}
         sensed = simulation.keywords["sensors"] is not None
-        writer = SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance)
-        report = _run(simulation, inputs.trajectory, writer, talk)
+        with SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance) as writer:
+            writer.write(found.history)
+            writer.finish(found.report.as_json())
         if figures is not None:
             draw_staged(file, figures, talk)
-    code = _show(report, as_json)
+    code = _show(found.report, as_json)
     talk.wrote(outputs)
     return code
 
@@ -260,20 +264,15 @@ def _gains(robot: Robot, poles: str | None, stiffness_poles: str | None, integra
     return gains_from_text(robot, poles or DEFAULT, stiffness_poles or DEFAULT, integral=integral)
 
 
-def _run(
-    simulate: Callable[..., Simulation], trajectory: Trajectory, writer: SimulationWriter, talk: Talk
-) -> SimulationReport:
-    """Simulate, and write what happened."""
+def _run(simulate: Callable[..., Simulation], trajectory: Trajectory, talk: Talk) -> Simulation:
+    """Simulate, with a bar of the time reached."""
     first, last = trajectory.times.span
-    with writer, talk.progress(PROGRESS_STEPS, shown_from=0) as bar:
+    with talk.progress(PROGRESS_STEPS, shown_from=0) as bar:
 
         def progress(time: float) -> None:
             bar.update(int(PROGRESS_STEPS * (time - first) / (last - first)) - bar.pos)
 
-        simulation = simulate(progress=progress)
-        writer.write(simulation.history)
-        writer.finish(simulation.report.as_json())
-    return simulation.report
+        return simulate(progress=progress)
 
 
 def _show(report: SimulationReport, as_json: bool) -> Exit:

@@ -25,9 +25,9 @@ class Response(NamedTuple):
     friction: FloatArray | None
 
 
-Balance = Callable[[FloatArray, BoolArray], tuple[FloatArray, FloatArray, FloatArray]]
-"""From the torques of all motors (..., motors), and which are held, to the accelerations of joints and of
-motors with springs, and what the held ones must be held with, (..., motors), 0 of others."""
+Balance = Callable[[FloatArray, BoolArray | None], tuple[FloatArray, FloatArray, FloatArray]]
+"""From the torques of all motors (..., motors), and which are held, None if none can be, to the accelerations
+of joints and of motors with springs, and what the held ones must be held with, (..., motors), 0 of others."""
 
 
 def response_with_friction(
@@ -53,6 +53,10 @@ def response_with_friction(
         ddq, ddtheta, holding = balance(torque - friction, laws.sharp & (direction == 0))
         return Response(ddq, ddtheta, friction + holding), laws.beyond(friction + holding)
 
+    if not laws.sharp.any():
+        friction = laws.torque(velocity)
+        ddq, ddtheta, _ = balance(torque - friction, None)
+        return Response(ddq, ddtheta, friction)
     if slip is not None:
         return under(np.broadcast_to(slip, velocity.shape))[0]
     direction = direction_of(velocity)

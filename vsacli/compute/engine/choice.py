@@ -62,8 +62,7 @@ def choose(
         InputError: there is no engine of that name, or it is "c" and there is no C compiler that works, or
             nothing that it could compile.
     """
-    if name not in NAMES:
-        raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
+    check_engine(name)
     if name == "numpy":
         return Choice(_numpy(samples), "NumPy computes, as asked for")
     if name == "auto" and samples < LOOK_FROM:
@@ -111,8 +110,7 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
     Raises:
         InputError: there is no engine of that name, or it is "c" and there is no C compiler that works.
     """
-    if name not in NAMES:
-        raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
+    check_engine(name)
     if name == "numpy" or (name == "auto" and samples < LOOK_FROM):
         return Settled("numpy")
     from vsacli.compute.engine.compiled_engine import MOST_RECORDED, operation_count
@@ -129,6 +127,16 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
     except NotImplementedError:
         return Settled("numpy")
     return Settled("c", compiler.name) if repays else Settled("numpy")
+
+
+def check_engine(name: str) -> None:
+    """Refuse the name of no engine.
+
+    Raises:
+        InputError: naming the nearest one that there is.
+    """
+    if name not in NAMES:
+        raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
 
 
 def _repays(operations: int, samples: int) -> bool:

@@ -155,7 +155,7 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
     declarations = list(table_declarations(tables, dialect))
     constants = [_constant(prefix, each, dialect) for each in structures(functions) if each.nominal]
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
-    helpers = [_helper(name, precision) for name in HELPERS if name in used]
+    helpers = [helper_text(name, precision) for name in HELPERS if name in used]
     constants.append("\n".join(declarations))
     parts = [head, included(prefix), "#include <math.h>", _STRICT, *constants, *helpers, *bodies]
     return "\n\n".join(filter(None, parts)) + "\n"
@@ -169,7 +169,8 @@ def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
     return f"const {name} = {{\n{''.join(members)}}};"
 
 
-def _helper(name: str, precision: str) -> str:
+def helper_text(name: str, precision: str) -> str:
+    """A function of `HELPERS`."""
     text = HELPERS[name].format(type=precision)
     return text if text.startswith("/*") else f"static inline {text}"
 

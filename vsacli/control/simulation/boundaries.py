@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
+from functools import reduce
 
 import numpy as np
 
@@ -35,9 +36,11 @@ class Boundary(ABC):
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """What must stay positive, one number for each of `joints`, at positions of joints and motors."""
 
-    def __call__(self, _time: float, vector: FloatArray) -> float:
-        """The smallest distance; one that is not defined any more lies beyond."""
-        return float(np.min(np.nan_to_num(self._distances(vector), nan=-1.0), initial=1.0))
+    def distance(self, vector: FloatArray) -> FloatArray:
+        """The smallest distance, at most 1; one that is not defined any more lies beyond."""
+        distances = self._distances(vector)
+        known = np.where(np.isnan(distances), -1.0, np.minimum(distances, 1.0))
+        return reduce(np.minimum, np.moveaxis(known, -1, 0))
 
     def ending(self, time: float, vector: FloatArray) -> Ending:
         """The end of a run here."""
@@ -83,7 +86,7 @@ class SpringRange(Boundary):
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Deflection to the nearer end of the law."""
         phi = self._plant.drivetrain.ranged(q, theta)
-        distances: FloatArray = np.fmin(phi - self._lowest, self._highest - phi)
+        distances: FloatArray = np.minimum(phi - self._lowest, self._highest - phi)
         return distances
 
 

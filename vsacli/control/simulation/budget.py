@@ -52,15 +52,6 @@ class Budget:
         self.used = 0
         self._first, self._last = float(times[0]), float(times[-1])
 
-    def counting(self, derivative: Derivative) -> Derivative:
-        """The same, with each state counted."""
-
-        def counted(time: float, vectors: FloatArray) -> FloatArray:
-            self.used += vectors.size // vectors.shape[-1]
-            return derivative(time, vectors)
-
-        return counted
-
     def spent(self, _time: float) -> bool:
         """Whether nothing is left."""
         return self.used >= self.limit

@@ -8,6 +8,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.control.simulation.controllers import Controller
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.state_vector import Packing, Phase
+from vsacli.control.simulation.table import Constant
 from vsacli.dynamics.forward import Plant
 from vsacli.dynamics.stiction import Response
 from vsacli.robot.model import Robot
@@ -36,13 +37,19 @@ class ClosedLoop:
         self.controller = controller
         self.reference = reference
         self.slip: FloatArray | None = None
-        self.held: FloatArray | None = None
+        self.held: Constant | None = None
 
     def demand(self, time: float, vector: FloatArray) -> FloatArray:
         """Torques that the controller asks of the motors in a state."""
         if self.held is not None:
-            return self.held
+            return self.held(time)
         return self.controller.torque(time, self.packing.unpack(vector), self.slip)
+
+    def hold(self, torques: FloatArray) -> None:
+        """Let the motors be asked for these torques until others are held."""
+        if self.held is None:
+            self.held = Constant(torques)
+        self.held.set(torques)
 
     def applied(self, demand: FloatArray) -> FloatArray:
         """What the motors give of the torques asked of them."""

@@ -14,7 +14,8 @@ from vsacli.control.linearization import FeedbackLinearization
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.reference import Reference
 from vsacli.control.simulation.state_vector import Phase
-from vsacli.control.simulation.tabulated import first_undefined, tabulate
+from vsacli.control.simulation.table import Table
+from vsacli.control.simulation.tabulated import first_undefined
 from vsacli.dynamics.internal_motion import internal_motions
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
@@ -63,9 +64,9 @@ class Feedforward:
             return np.concatenate((torque - self._friction.torque(velocity), velocity), axis=-1)
 
         ends = np.union1d(trajectory.breakpoints, trajectory.start + internal.breakpoints)
-        self._table = tabulate(columns, ends if internal.joints else trajectory.breakpoints)
+        self._table = Table.of(columns, ends if internal.joints else trajectory.breakpoints)
         self.ending: Ending | None = None
-        if (found := first_undefined(self._table)) is not None:
+        if (found := first_undefined(self._table.polynomial)) is not None:
             time, column = found
             motor = column % len(drivetrain.joint)
             self.ending = Ending(time, _NO_TORQUES, Flag.INFEASIBLE, int(drivetrain.joint[motor]))
@@ -75,7 +76,8 @@ class Feedforward:
         values: FloatArray = self._table(time)
         if self._friction is None:
             return values
-        smooth, velocity = np.split(values, 2, axis=-1)
+        motors = values.shape[-1] // 2
+        smooth, velocity = values[..., :motors], values[..., motors:]
         return smooth + self._friction.torque(velocity)
 
     def error_rates(self, _time: float, phase: Phase) -> Integral:

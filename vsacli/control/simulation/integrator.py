@@ -13,9 +13,10 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Stored
-from vsacli.control.simulation.boundaries import Boundary
-from vsacli.control.simulation.budget import Budget, Deadline, Derivative, Progress
+from vsacli.control.simulation.budget import Deadline, Progress
 from vsacli.control.simulation.ending import INCOMPLETE, Ending
+from vsacli.control.simulation.equations.equations import Edge, Equations
+from vsacli.control.simulation.equations.stages import dop853_with_stages
 from vsacli.control.simulation.sliding import Sliding, Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
 
@@ -61,86 +62,85 @@ class Method(Stored):
 
 
 class Effort(NamedTuple):
-    """What a run took: methods, evaluations of the equations of motion, and its budget of these."""
+    """What a run took: methods, evaluations of the equations of motion, and its budget of these.
+
+    The provenance says what evaluated them: `engine`, `compiler` and `threads`.
+    """
 
     methods: tuple[Method, ...]
     evaluations: int
     budget: int
+    provenance: Mapping[str, str]
 
 
 class Integrator:
     """`solve_ivp` with boundaries at which a run ends, explicit as long as that leads to the end.
 
     Args:
-        boundaries: at which a run ends.
+        equations: what to integrate, and where that ends.
         tolerances: of each step.
-        budget: of the run.
         progress: called with the time reached, s.
         sliding: of motors with sharp friction, at whose switches other equations of motion take over.
     """
 
     def __init__(
         self,
-        boundaries: Sequence[Boundary],
+        equations: Equations,
         tolerances: Tolerances,
-        budget: Budget,
         progress: Progress,
         sliding: Sliding | None = None,
     ) -> None:
-        self._boundaries, self._sliding = boundaries, sliding
+        self._equations, self._sliding = equations, sliding
         self._tolerances = tolerances
         self._progress = progress
-        self._budget = budget
+        self._budget = equations.budget
         self._methods: list[Method] = []
 
     @property
     def effort(self) -> Effort:
         """Of the run so far."""
-        return Effort(tuple(self._methods), self._budget.used, self._budget.limit)
+        budget, by = self._budget, self._equations.provenance
+        return Effort(tuple(self._methods), budget.used, budget.limit, by)
 
-    def over(
-        self, derivative: Derivative, times: FloatArray, start: FloatArray
-    ) -> tuple[FloatArray, FloatArray, Ending | None]:
+    def over(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
         """States at the times (samples,) reached, and one more where the run ended early."""
         if not self._methods:
             self._methods.append(Method(EXPLICIT, float(times[0])))
-        counted = self._budget.counting(derivative)
         if self._methods[-1].name == IMPLICIT:
-            return self._implicit(counted, times, start)
-        reached, states, ending = self._solve(
-            counted, times, start, self._budget.too_slow, method=EXPLICIT, atol=self._tolerances.atol
-        )
+            return self._implicit(times, start)
+        reached, states, ending = self._explicit(times, start)
         if ending is None or ending.verdict != INCOMPLETE:
             return reached, states, ending
         self._methods.append(Method(IMPLICIT, ending.time))
         rest = np.concatenate((reached[-1:], times[times > ending.time]))
-        later, after, ending = self._implicit(counted, rest, states[-1])
+        later, after, ending = self._implicit(rest, states[-1])
         return np.append(reached[:-1], later[1:]), np.concatenate((states[:-1], after[1:])), ending
 
-    def _implicit(
-        self, derivative: Derivative, times: FloatArray, start: FloatArray
-    ) -> tuple[FloatArray, FloatArray, Ending | None]:
-        slope = partial(jacobian, derivative)
+    def _explicit(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
+        steps: dict[str, Any] = {"method": dop853_with_stages(), "stages": self._equations.stages}
+        return self._solve(times, start, self._budget.too_slow, atol=self._tolerances.atol, **steps)
+
+    def _implicit(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
+        slope = partial(jacobian, self._equations)
         floor = resolved(slope(float(times[0]), start), start, self._tolerances.rtol)
         atol = np.maximum(self._tolerances.atol, floor)
         spent = self._budget.spent
-        return self._solve(derivative, times, start, spent, method=IMPLICIT, atol=atol, jac=slope)
+        return self._solve(times, start, spent, method=IMPLICIT, atol=atol, jac=slope)
 
     def _solve(
         self,
-        derivative: Derivative,
         times: FloatArray,
         start: FloatArray,
         is_due: Callable[[float], bool],
         **options: Any,
     ) -> tuple[FloatArray, FloatArray, Ending | None]:
         deadline = Deadline(self._budget.limit, is_due, float(times[-1]), self._progress)
-        events = [deadline, *self._boundaries, *(self._sliding.switches if self._sliding else ())]
+        events = [deadline, Edge(self._equations), *(self._sliding.switches if self._sliding else ())]
         if self._sliding:  # torques may be others than before
             self._sliding.settle(float(times[0]), start)
         first, at, state, parts = times[:1], float(times[0]), start, []
         while True:
-            solution = self._until_event(derivative, (at, times), state, events, options)
+            solution = self._until_event((at, times), state, events, options)
             parts.append(_evaluated(solution, start))
             event, at, state = _terminal_event(events, solution)
             if not isinstance(event, Switch):
@@ -161,7 +161,6 @@ class Integrator:
 
     def _until_event(
         self,
-        derivative: Derivative,
         span: tuple[float, FloatArray],
         start: FloatArray,
         events: Sequence[Any],
@@ -173,7 +172,7 @@ class Integrator:
         time, times = span
         with np.errstate(all="ignore"):  # a trial step may leave the range of a law
             return solve_ivp(
-                derivative,
+                self._equations,
                 (time, float(times[-1])),
                 start,
                 t_eval=times,

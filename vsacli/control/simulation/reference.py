@@ -9,7 +9,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
-from vsacli.control.simulation.tabulated import tabulate
+from vsacli.control.simulation.table import Table
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -53,9 +53,9 @@ def _tabulated(
         variables = trajectory.at(time).variables()
         return np.concatenate([variables[name] for name in names], axis=1)
 
-    table = tabulate(columns, trajectory.breakpoints)
-    width = table.c.shape[-1] // len(names)
-    parts = [slice(start, start + width) for start in range(0, table.c.shape[-1], width)]
+    table = Table.of(columns, trajectory.breakpoints)
+    width = table.columns // len(names)
+    parts = [slice(start, start + width) for start in range(0, table.columns, width)]
 
     def arrays(time: float | FloatArray) -> dict[str, FloatArray]:
         values = table(time)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -16,11 +16,13 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has
+from vsacli.compute.engine import Tell, unheard
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.budget import Budget, Progress
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.controllers import Feedforward, LinearizingFeedback
+from vsacli.control.simulation.equations.recorded_equations import Computing, RecordedEquations
 from vsacli.control.simulation.goal_tolerance import GoalTolerance
 from vsacli.control.simulation.history import History, history
 from vsacli.control.simulation.integrator import Integrator, Tolerances
@@ -94,10 +96,11 @@ Measured = Literal["state", "positions"]
 
 @dataclass(frozen=True, repr=False)
 class Simulation:
-    """What happened, and the report on it."""
+    """What happened, the report on it, and what computed it: `engine`, `compiler` and `threads`."""
 
     history: History
     report: SimulationReport
+    provenance: Mapping[str, str]
 
     def __repr__(self) -> str:
         return f"Simulation of {self.report}"
@@ -125,6 +128,8 @@ def simulate(
     tolerances: Tolerances = Tolerances(),
     budget: int | None = None,
     progress: Progress = lambda _: None,
+    engine: str = "auto",
+    tell: Tell = unheard,
 ) -> Simulation:
     """Integrate the full model (5) of a robot under a controller.
 
@@ -143,12 +148,16 @@ def simulate(
         budget: after how many evaluations of the equations of motion a run ends, incomplete; by default
             200,000, or 100 for each step of the trajectory where that is more.
         progress: called with the time reached, s.
+        engine: what evaluates the equations of motion: "numpy", "c", or "auto", which compiles them
+            where that saves time.
+        tell: learns what goes wrong with compiled code, and what will take long, before it does.
 
     Raises:
         InputError: a trajectory that is not for the robot, a start that cannot be had, measured positions
             without gains, gains that do not fit, feedback linearization of a robot that mixes rigid joints
             with others, a mass matrix that is not positive definite, springs so stiff or poles so fast that
-            double precision does not resolve them, a budget below 1, encoders of a joint that slides any far.
+            double precision does not resolve them, a budget below 1, encoders of a joint that slides any far,
+            an engine that there is not, or that cannot compute this.
         TypeError: robot or trajectory is none.
     """
     trajectory = fitted(robot, trajectory)
@@ -161,14 +170,19 @@ def simulate(
     def passed(time: float) -> None:
         progress(first + time)
 
-    integrated = _integrate(robot, loop, elapsed, start, measured, readings, tolerances, budget, passed)
+    computing = Computing(engine, tell)
+    integrated = _integrate(
+        robot, loop, elapsed, start, measured, readings, tolerances, budget, passed, computing
+    )
     past = history(robot, loop, integrated, first, readings)
     full: SimulationReport | None = None
     if measured == "positions":
         conditions: Any = {"gains": gains, "model": model, "initial_error": initial_error}
-        full = simulate(robot, trajectory, **conditions, tolerances=tolerances, budget=budget).report
+        integration: Any = {"tolerances": tolerances, "budget": budget, "engine": engine}
+        full = simulate(robot, trajectory, **conditions, **integration).report
     exact = gains is None and (model is None or model is robot) and initial_error.is_zero
-    return Simulation(past, _report(robot, trajectory, gains, past, integrated, goal_tolerance, exact, full))
+    report = _report(robot, trajectory, gains, past, integrated, goal_tolerance, exact, full)
+    return Simulation(past, report, integrated.effort.provenance)
 
 
 def _report(
@@ -269,6 +283,7 @@ def _integrate(
     tolerances: Tolerances,
     limit: int | None,
     progress: Progress,
+    computing: Computing,
 ) -> StateTrajectory:
     """Integrate as far as the controller has torques and the springs obey their laws."""
     last = loop.controller.ending
@@ -282,7 +297,9 @@ def _integrate(
     check_rounding(robot, loop, vector, float(times[0]), _peak_torque(robot, trajectory))
     reached = times if last is None else times[times <= last.time]
     budget = Budget(limit, reached)
-    integrator = Integrator(list(boundaries(loop, vector)), tolerances, budget, progress, slides)
+    ends = list(boundaries(loop, vector))
+    equations = RecordedEquations(loop, ends, budget, *computing)
+    integrator = Integrator(equations, tolerances, progress, slides)
     if measured == "state":
         integrated = continuous(loop, integrator, reached, vector)
     else:

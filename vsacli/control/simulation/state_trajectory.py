@@ -59,7 +59,7 @@ def continuous(
     loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
 ) -> StateTrajectory:
     """The controller acts at every instant, on the true state."""
-    time, states, ending = integrator.over(loop.derivative, times, start)
+    time, states, ending = integrator.over(times, start)
     demand = loop.controller.torque(time, loop.packing.unpack(states))
     return StateTrajectory(time, states, demand, ending, integrator.effort)
 
@@ -84,8 +84,8 @@ def sampled(
     reached, states, ending = [times[:1]], [start[None]], None
     demands = [loop.controller.torque(float(times[0]), measurement.phase)]
     for sample, interval in enumerate(np.stack((times[:-1], times[1:]), axis=1), 1):
-        loop.held = demands[-1]
-        time, after, ending = integrator.over(loop.derivative, interval, states[-1][-1])
+        loop.hold(demands[-1])
+        time, after, ending = integrator.over(interval, states[-1][-1])
         reached.append(time[1:])
         states.append(after[1:])
         measurement.add(read(after[-1], sample), time[-1] - time[0])

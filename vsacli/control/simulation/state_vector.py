@@ -25,6 +25,7 @@ class Packing:
     """How a `Phase` lies in a vector.
 
     Attributes:
+        entries: of the vector.
         motor_velocities: places of the velocities of all motors, (motors,).
     """
 
@@ -32,8 +33,9 @@ class Packing:
         joints, springs = len(drivetrain.present), int(drivetrain.sprung.sum())
         ends = np.cumsum([joints, joints, springs, springs, joints, joints]).tolist()
         self._parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
-        entries: AnyArray = np.arange(ends[-1])
-        dq, dtheta = entries[self._parts[1]], entries[self._parts[3]]
+        self.entries: int = ends[-1]
+        places: AnyArray = np.arange(self.entries)
+        dq, dtheta = places[self._parts[1]], places[self._parts[3]]
         self.motor_velocities = drivetrain.of_all(dq, dtheta)
 
     def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:

@@ -1,0 +1,234 @@
+"""Recorded equations of motion evaluate what their text does, however they are carried out."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from oracles import pinocchio
+from samples.closed_loops import MADE, SHIPPED, Loop, loop_of, made_loop, shipped_loop
+from samples.marks import needs_compiler, slow, slow_but
+from samples.plants import all_rigid, with_actuators
+from samples.robots import vsa_3r
+from samples.simulated import short_motion
+from samples.single_joint import single_joint, step_of
+from scipy.integrate import DOP853
+
+from vsacli.actuators.friction import Friction
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.rigid import Rigid
+from vsacli.base.errors import InputError
+from vsacli.compute.engine import compiler, unheard
+from vsacli.control.gains import Gains
+from vsacli.control.simulation import InitialError, perturbed, simulate
+from vsacli.control.simulation.budget import Budget
+from vsacli.control.simulation.equations.equations import Equations
+from vsacli.control.simulation.equations.loop_code import loop_code
+from vsacli.control.simulation.equations.recorded_equations import RecordedEquations
+from vsacli.control.simulation.equations.recording import record
+from vsacli.control.simulation.equations.stages import dop853_with_stages
+
+AGREEMENT = 1e-11
+"""Relative to the largest rate: rounding of 1e-16 times the condition of M, up to 1e4 with seven joints."""
+
+PLAIN = {"engine": "numpy", "compiler": "", "threads": "1"}
+GAINS = Gains.from_poles([-20] * 4, [-20] * 2)
+QUICK = ("cubic springs", "a measured spring", "prismatic joints", "a damped transmission")
+ENGINES = ("numpy", pytest.param("c", marks=needs_compiler))
+
+
+def equations(case: Loop, engine: str) -> RecordedEquations:
+    """Those of a loop, recorded already."""
+    made = RecordedEquations(case.loop, case.boundaries, Budget(None, np.array([0.0, 1.0])), engine, unheard)
+    while np.isfinite(made._due):
+        made.budget.used = int(made._due) + 1
+        made._improve()
+    return made
+
+
+def assert_agree(case: Loop, engine: str) -> None:
+    """Rates and distances of a recorded loop are those of the text."""
+    found = equations(case, engine)
+    for time, state in case.states(10):
+        expected = case.loop.derivative(time, state)
+        assert np.abs(found(time, state) - expected).max() < AGREEMENT * np.abs(expected).max()
+        nearest = min((float(each.distance(state)) for each in case.boundaries), default=1.0)
+        assert found.distance(state) == pytest.approx(nearest, rel=1e-12, abs=1e-12)
+    several = case.start + 1e-4 * np.eye(len(case.start))
+    expected = case.loop.derivative(0.1, several)
+    assert np.abs(found(0.1, several) - expected).max() < AGREEMENT * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("what", slow_but(QUICK, SHIPPED))
+def test_recorded_rates_are_those_of_the_text(what, engine):
+    assert_agree(shipped_loop(what), engine)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("what", slow_but(["wrench"], MADE))
+def test_recorded_controllers_are_those_of_the_text(what, engine):
+    assert_agree(made_loop(what), engine)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("what", [slow("smooth friction, seven joints"), slow("a lever"), slow("tendons")])
+def test_recorded_feedback_is_that_of_the_text(what, engine):
+    assert_agree(shipped_loop(what, feedback=True), engine)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_recorded_rates_are_those_of_pinocchio(engine):
+    """Of an arm without springs, whose motors add their inertia and damping to the joints."""
+    robot = all_rigid("RPRR", seed=4)
+    case = loop_of(robot, short_motion(4))
+    model = pinocchio.build(robot)
+    data = model.createData()
+    motors = [joint.actuator.motor for joint in robot.joints]
+    model.armature = np.array([motor.inertia for motor in motors])
+    found = equations(case, engine)
+    for time, state in case.states(5):
+        q, dq = state[:4], state[4:8]
+        torque = case.loop.controller.torque(time, case.loop.packing.unpack(state))
+        torque = torque - np.array([motor.damping for motor in motors]) * dq - _damping_of(robot) * dq
+        expected = pin.aba(model, data, q, dq, torque)
+        np.testing.assert_allclose(found(time, state)[4:8], expected, rtol=1e-9, atol=1e-9)
+
+
+def _damping_of(robot):
+    return np.array([joint.damping for joint in robot.joints])
+
+
+@needs_compiler
+def test_the_code_of_robots_that_differ_in_numbers_is_one():
+    """Equal numbers of two joints may make the exact robot's a special one, but not those of errors."""
+    robot, trajectory = vsa_3r(), short_motion(3)
+    cases = [loop_of(robot, trajectory, GAINS, model=perturbed(robot, 0.05, seed)) for seed in (1, 2)]
+    (first, numbers), (second, others) = (loop_code(record(case.loop, case.boundaries)) for case in cases)
+    assert first == second
+    assert len(numbers) == len(others)
+    assert (numbers != others).any()
+    for case in cases:
+        assert_agree(case, "c")
+
+
+@pytest.mark.parametrize("gains", [None, GAINS])
+def test_engines_find_the_same_motion(gains):
+    conditions = {"gains": gains, "initial_error": InitialError(0.01 if gains else 0.0)}
+    runs = [_run(engine, **conditions) for engine in ("numpy", "auto", *(["c"] if _has_compiler() else []))]
+    text = _run_text(**conditions)
+    for run in runs:
+        assert run.report.verdict == text.report.verdict
+        # steps follow rounding, but every 1e3 evaluations some 10 differ
+        assert run.report.evaluations == pytest.approx(text.report.evaluations, rel=0.02)
+        for name in ("q_actual", "dq_actual", "theta_actual", "tau_motor"):
+            found, expected = getattr(run.history, name), getattr(text.history, name)
+            # tolerances of 1e-9, which the open loop magnifies; torques of 100 N m
+            assert found == pytest.approx(expected, rel=1e-6, abs=1e-7, nan_ok=True)
+
+
+def _has_compiler() -> bool:
+    try:
+        compiler.system_compiler()
+    except compiler.CompilerError:
+        return False
+    return True
+
+
+def _run(engine, **conditions):
+    return simulate(vsa_3r(), short_motion(3), engine=engine, **conditions)
+
+
+def _run_text(**conditions):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(RecordedEquations, "_improve", lambda _self: None)
+        return _run("numpy", **conditions)
+
+
+@needs_compiler
+def test_controllers_that_hold_their_torques_are_recorded_too():
+    conditions = {"gains": GAINS, "measured": "positions"}
+    trajectory = short_motion(3, rate=100, duration=0.2)
+    runs = [simulate(vsa_3r(), trajectory, engine=engine, **conditions) for engine in ("c", "numpy")]
+    assert runs[0].provenance["engine"] == "c"
+    assert runs[0].history.q_actual == pytest.approx(runs[1].history.q_actual, abs=1e-8)
+
+
+@needs_compiler
+def test_steps_are_those_of_scipy():
+    """The same times, to rounding: who computes the stages has no part in the control of the steps."""
+    case = shipped_loop("cubic springs")
+    fast = equations(case, "c")
+    options = {"rtol": 1e-9, "atol": 1e-10}
+    ours = dop853_with_stages()(fast, 0.0, case.start, 1.0, stages=fast.stages, **options)
+    theirs = DOP853(case.loop.derivative, 0.0, case.start, 1.0, **options)
+    for _ in range(20):
+        ours.step()
+        theirs.step()
+        assert ours.t == pytest.approx(theirs.t, rel=1e-3)  # of small differences, which rounding changes
+        middle = (theirs.t_old + theirs.t) / 2
+        assert ours.dense_output()(middle) == pytest.approx(theirs.dense_output()(middle), abs=1e-9)
+    assert fast.budget.used >= theirs.nfev
+
+
+@needs_compiler
+def test_steps_start_from_states_that_lie_apart_in_memory():
+    case = shipped_loop("cubic springs")
+    columns = np.stack((case.start, -case.start), axis=1)
+    options = {"stages": equations(case, "c").stages, "rtol": 1e-9, "atol": 1e-10}
+    apart, alone = (
+        dop853_with_stages()(case.loop.derivative, 0.0, start, 1.0, **options)
+        for start in (columns[:, 0], case.start)
+    )
+    apart.step()
+    alone.step()
+    assert np.array_equal(apart.y, alone.y)
+
+
+def test_without_a_compiler_runs_go_on(monkeypatch):
+    def none():
+        raise compiler.CompilerError("there is no C compiler 'cc'")
+
+    monkeypatch.setattr("vsacli.control.simulation.equations.recorded_equations.system_compiler", none)
+    assert _run("auto", gains=GAINS).provenance == PLAIN
+    with pytest.raises(InputError, match=r"there is no C compiler 'cc'; the engine numpy needs none"):
+        _run("c")
+
+
+def test_an_engine_that_there_is_not_is_refused():
+    with pytest.raises(InputError, match="unknown engine 'C'"):
+        _run("C")
+
+
+def test_motors_that_stick_are_left_to_the_text():
+    sharp = Rigid(motor=Motor(inertia=0.5, friction=Friction(coulomb=(2.0, 2.0))))
+    robot, trajectory = single_joint(sharp), step_of(1.0)
+    auto, plain = (simulate(robot, trajectory, engine=engine) for engine in ("auto", "numpy"))
+    assert np.array_equal(auto.history.q_actual, plain.history.q_actual)
+    with pytest.raises(InputError, match=r"motors with sharp friction stick and slide; take .* numpy"):
+        simulate(robot, trajectory, engine="c")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_link_without_mass_is_named_by_every_engine(engine):
+    """Where numbers are not finite, the text says why."""
+    robot = with_actuators(vsa_3r(), {})
+    weightless = dataclasses.replace(robot.joints[2].link, mass=0.0, inertia=_no_inertia(robot))
+    joints = (*robot.joints[:2], dataclasses.replace(robot.joints[2], link=weightless))
+    with pytest.raises(InputError, match="elbow: the inertia it moves is not positive"):
+        simulate(dataclasses.replace(robot, joints=joints), short_motion(3), engine=engine)
+
+
+def _no_inertia(robot):
+    inertia = robot.joints[2].link.inertia
+    return dataclasses.replace(inertia, xx=0.0, yy=0.0, zz=0.0, xy=0.0, xz=0.0, yz=0.0)
+
+
+def test_equations_from_text_count_what_they_evaluate():
+    case = shipped_loop("one spring")
+    plain = Equations(case.loop, case.boundaries, Budget(None, np.array([0.0, 1.0])))
+    plain(0.0, np.tile(case.start, (3, 1)))
+    assert plain.budget.used == 3
+    assert plain.provenance == PLAIN

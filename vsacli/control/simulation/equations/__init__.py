@@ -1,0 +1,1 @@
+"""The equations of motion of a closed loop, as text, recorded, or compiled, and steps through them."""

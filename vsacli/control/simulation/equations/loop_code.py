@@ -1,0 +1,72 @@
+"""C for the equations of motion of a closed loop, with the numbers of robot and controller as data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from importlib.resources import files
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.compute.engine.compiled_engine import operation_count
+from vsacli.compute.engine.libraries import Code
+from vsacli.compute.tracing import Kind, Program
+from vsacli.compute.tracing.c_code import Writer, digits, table_declarations, table_names
+from vsacli.control.codegen.scalar import HELPERS, Scalar, helper_text
+from vsacli.control.simulation.equations.recording import Recording
+
+
+class _Numbers(Scalar):
+    """Plain C whose constants are entries of an array, in the order in which they are written.
+
+    Robots that differ in numbers alone so have the same text.
+
+    Attributes:
+        values: the constants.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("double")
+        self.values: list[float] = []
+
+    def real(self, number: float) -> str:
+        """As of `Dialect`."""
+        self.values.append(number)
+        return f"p[{len(self.values) - 1}]"
+
+    def entry(self, number: float) -> str:
+        """As of `Dialect`; tables stay in the text."""
+        return digits(number)
+
+
+def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
+    """What to compile for a recording, and the numbers that the code is to be given."""
+    programs = {"rates": recording.rates, "distances": recording.distances}
+    numbers, tables = _Numbers(), table_names(programs.values())
+    writer = Writer(numbers, tables)
+    lines = [
+        f"#define ENTRIES {recording.entries}",
+        f"#define COLUMNS {sum(table.columns for table in recording.tables)}",
+        files("vsacli.control.simulation.equations").joinpath("loop.c").read_text(encoding="utf-8"),
+        *(helper_text(name, "double") for name in HELPERS),
+        *table_declarations(tables, numbers),
+    ]
+    for name, program in programs.items():
+        lines += _function(name, program, recording.entries, writer)
+    code = Code("\n".join([*lines, ""]), sum(map(operation_count, programs.values())))
+    return code, np.array(numbers.values)
+
+
+def _function(name: str, program: Program, entries: int, writer: Writer) -> Iterator[str]:
+    """A function of a program, whose inputs are the entries of a state, then columns of tables."""
+    places = (
+        f"y[{number}]" if number < entries else f"s[{number - entries}]"
+        for number in range(len(program.inputs))
+    )
+    names = {symbol.index: place for symbol, place in zip(program.inputs, places, strict=True)}
+    yield f"static void {name}(const double *p, const double *y, const double *s, double *result)"
+    yield "{"
+    yield from writer.statements(program, names)
+    for number, output in enumerate(program.outputs):
+        yield f"result[{number}] = {writer.value(output, Kind.REAL, names)};"
+    yield "}"

@@ -1,0 +1,160 @@
+"""Equations of motion that are recorded and compiled once they are evaluated often enough."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import NamedTuple
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.compute.engine.choice import check_engine
+from vsacli.compute.engine.compiler import CompilerError, system_compiler
+from vsacli.compute.engine.engines import Tell, unheard
+from vsacli.compute.engine.libraries import MOST_OPERATIONS, Worthwhile, compiling_seconds, load
+from vsacli.control.simulation.boundaries import Boundary
+from vsacli.control.simulation.budget import Budget
+from vsacli.control.simulation.closed_loop import ClosedLoop
+from vsacli.control.simulation.equations.compiled_loop import CompiledLoop, open_loop
+from vsacli.control.simulation.equations.equations import Equations
+from vsacli.control.simulation.equations.loop_code import loop_code
+from vsacli.control.simulation.equations.number_program import NumberProgram
+from vsacli.control.simulation.equations.recording import Recording, record
+from vsacli.control.simulation.equations.stages import Stages
+
+RECORD_FROM = 50
+"""Evaluations for each joint from which on a program saves more time than recording it takes: 3 to 30 ms with
+three joints, 30 to 130 ms with seven, where an evaluation of the text takes 0.1 to 0.3 ms."""
+
+NUMBER_SECONDS = 4e-8
+"""What Python takes for an operation on plain numbers."""
+
+TEXT_SECONDS = 2e-4
+"""What NumPy takes for the text of an evaluation."""
+
+LOOK_SECONDS = 0.02
+"""What it takes to see whether there is compiled code."""
+
+
+class Computing(NamedTuple):
+    """What evaluates equations of motion.
+
+    Attributes:
+        engine: "numpy" compiles nothing, "c" at once, "auto" where that saves time.
+        tell: learns what goes wrong with compiled code, and what will take long, before it does.
+    """
+
+    engine: str
+    tell: Tell = unheard
+
+
+class RecordedEquations(Equations):
+    """Equations whose evaluations pass from the text to a program on numbers, and from that to compiled code.
+
+    Each comes when those before have taken about as long as it takes to make it, so a run never takes much
+    more than twice what the best choice would have taken, however long it becomes. When that is goes by the
+    number of evaluations, so that a run can be repeated to the last bit unless the cache has new code.
+
+    Args:
+        loop: a robot under its controller.
+        boundaries: at which a run ends.
+        budget: of the run.
+        engine, tell: as of `Computing`.
+
+    Raises:
+        InputError: there is no engine of that name; at the first evaluation, it is "c" and there is no
+            compiler that works, or nothing that it could compile.
+    """
+
+    def __init__(
+        self, loop: ClosedLoop, boundaries: Sequence[Boundary], budget: Budget, engine: str, tell: Tell
+    ) -> None:
+        super().__init__(loop, boundaries, budget)
+        check_engine(engine)
+        self._tell = tell
+        self._program: NumberProgram | None = None
+        self._compiled: CompiledLoop | None = None
+        self._compiler = ""
+        self._later = self._compiling() if engine == "c" else self._improving(compiles=engine == "auto")
+        self._due = next(self._later)
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """As of `Equations`: what computed last."""
+        if self._compiled is None:
+            return super().provenance
+        return {"engine": "c", "compiler": self._compiler, "threads": "1"}
+
+    def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
+        """As of `Equations`; where a number is not finite the text has its say."""
+        self._improve()
+        fast = self._compiled.derivatives if self._compiled else self._program
+        if fast is not None:
+            with suppress(ArithmeticError, ValueError):  # of Python, instead of NaN and infinity
+                rates = fast(time, vectors)
+                if math.isfinite(rates.sum()):
+                    self.budget.used += vectors.size // vectors.shape[-1]
+                    return rates
+        return super().__call__(time, vectors)
+
+    def stages(
+        self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
+    ) -> FloatArray | None:
+        """As of `Equations`."""
+        self._improve()
+        if self._compiled is None:
+            return None
+        state = self._compiled.stages(time, step, vector, which, rates)
+        if not math.isfinite(rates[which.last].sum()):
+            return None
+        self.budget.used += which.last - which.first + 1
+        return state
+
+    def distance(self, vector: FloatArray) -> float:
+        """As of `Equations`."""
+        return super().distance(vector) if self._compiled is None else self._compiled.distance(vector)
+
+    def _improve(self) -> None:
+        """Take what is faster if it is due."""
+        if self.budget.used >= self._due:
+            self._due = next(self._later, math.inf)
+
+    def _improving(self, *, compiles: bool) -> Iterator[float]:
+        """Go on to what is faster; yields after how many evaluations to be asked again."""
+        yield RECORD_FROM * len(self.loop.plant.drivetrain.present)
+        with suppress(NotImplementedError, CompilerError):
+            recording = record(self.loop, self.boundaries)
+            operations = len(recording.rates.operations)
+            with suppress(NotImplementedError):  # of loops
+                self._program = NumberProgram(recording)
+            seconds = TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
+            begin = self.budget.used
+            if compiles and operations <= MOST_OPERATIONS:
+                yield begin + LOOK_SECONDS / seconds
+                self._load(recording, lambda _operations: False)
+                if self._compiled is None:
+                    yield begin + compiling_seconds(operations) / seconds
+                    self._load(recording, lambda _operations: True)
+
+    def _compiling(self) -> Iterator[float]:
+        """The same for the engine "c"; that it cannot be had is an InputError."""
+        yield 0.0
+        try:
+            self._load(record(self.loop, self.boundaries), lambda _operations: True)
+        except CompilerError as error:
+            raise InputError.one(f"{error}; the engine numpy needs none") from error
+        except NotImplementedError as error:
+            raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
+
+    def _load(self, recording: Recording, worthwhile: Worthwhile) -> None:
+        """Load compiled code; compile it if that is worthwhile.
+
+        Raises:
+            CompilerError: it cannot be had.
+        """
+        code, numbers = loop_code(recording)
+        compiler = system_compiler()
+        loaded = load(code, open_loop, compiler, self._tell, worthwhile)
+        if loaded is not None:
+            self._compiled, self._compiler = CompiledLoop(loaded.library, numbers, recording), compiler.name
