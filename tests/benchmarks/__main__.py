@@ -23,6 +23,7 @@ import recorders
 import sensitivities
 import simulations
 import stages
+import storage
 from machine import description
 from subjects import ROOT
 
@@ -48,6 +49,7 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     yield "costs", page.cost_table(compiled.costs())
     runs = (stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c"))
     yield "stages", page.stage_table(*runs)
+    yield "storage", page.storage_table(storage.compare(repeats))
     yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats))
     yield "sensitivity", page.sensitivity_part(sensitivities.compare(3 * repeats))
     yield "simulations", page.simulation_table(simulations.compare(repeats))

@@ -12,6 +12,7 @@ from recorders import Recorder
 from sensitivities import INVERSE_DYNAMICS, SAMPLES, Sensitivities
 from simulations import COMPILED, RECORDED, TEXT, Simulated
 from stages import Stages
+from storage import Stored
 from timing import Seconds
 
 
@@ -104,10 +105,21 @@ def recorder_table(recorders: Iterable[Recorder]) -> str:
 def stage_table(numpy: Stages, compiled: Stages) -> str:
     """The stages of a run, with either engine."""
     rows = (
-        [name, micro(by_numpy), micro(by_code)]
+        [name.replace("_", " "), micro(by_numpy), micro(by_code)]
         for name, by_numpy, by_code in zip(Stages._fields, numpy, compiled, strict=True)
     )
     return table(("stage, µs a sample of the 7R arm", "NumPy", "compiled, 1 thread"), rows)
+
+
+def storage_table(found: Mapping[str, Mapping[str, Stored]]) -> str:
+    """Ways to store results, on each subject."""
+    ways = next(iter(found.values()))
+    header = ("stored as", *(f"{subject}: µs to write, to read, bytes" for subject in found))
+    return table(header, ([way, *(_cell(by_way[way]) for by_way in found.values())] for way in ways))
+
+
+def _cell(stored: Stored) -> str:
+    return f"{micro(stored.write)}, {micro(stored.read)}, {stored.size:.0f}"
 
 
 def sensitivity_part(found: Sensitivities) -> str:

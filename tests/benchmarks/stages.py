@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,17 +22,19 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
-VARIABLES = ("tau_motor", "flags")
+FEW = ("tau_motor", "flags")
 
 
 class Stages(NamedTuple):
-    """Seconds a sample of the arm with seven joints."""
+    """Seconds a sample of the arm with seven joints; the last stage is all of it at once."""
 
     sampling: float
     recursion: float
     actuation: float
     bookkeeping: float
-    writing: float
+    writing_tau_motor_and_flags: float
+    writing_all_variables: float
+    run_with_all_variables: float
 
 
 def trajectory_of(samples: int) -> Trajectory:
@@ -57,7 +59,9 @@ def split(samples: int, repeats: int, engine: str) -> Stages:
         "recur": lambda: [link_torques(robot, m.q, m.dq, m.ddq, m.d3q, m.d4q, engine=links) for m in motions],
         "compute": lambda: [compute_block(robot, m, engine=whole) for m in motions],
         "run": lambda: _run(Run(robot, trajectory, engine=engine, threads=1)),
-        "write": lambda: _write(blocks, robot, trajectory),
+        "write": lambda: _write(blocks, robot, trajectory, FEW),
+        "write all": lambda: _write(blocks, robot, trajectory),
+        "run and write": lambda: _write(Run(robot, trajectory, engine=engine, threads=1), robot, trajectory),
     }
     each = {name: seconds / samples for name, seconds in medians(ways, repeats).items()}
     return Stages(
@@ -65,7 +69,9 @@ def split(samples: int, repeats: int, engine: str) -> Stages:
         recursion=each["recur"],
         actuation=each["compute"] - each["recur"],
         bookkeeping=each["run"] - each["compute"] - each["sample"],
-        writing=each["write"],
+        writing_tau_motor_and_flags=each["write"],
+        writing_all_variables=each["write all"],
+        run_with_all_variables=each["run and write"],
     )
 
 
@@ -75,11 +81,13 @@ def _run(run: Run) -> None:
     run.report()
 
 
-def _write(blocks: Sequence[Block], robot: Robot, trajectory: Trajectory) -> None:
+def _write(
+    blocks: Iterable[Block], robot: Robot, trajectory: Trajectory, variables: Sequence[str] | None = None
+) -> None:
     with (
         tempfile.TemporaryDirectory() as folder,
         Outputs() as outputs,
-        ResultWriter(outputs.file(Path(folder, "result.h5")), robot, trajectory, VARIABLES) as writer,
+        ResultWriter(outputs.file(Path(folder, "result.h5")), robot, trajectory, variables) as writer,
     ):
         for block in blocks:
             writer.write(block)
