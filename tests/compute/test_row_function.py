@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from samples.shipped import shipped_robot
 
 from vsacli.compute.aligned_rows import LINE, address, aligned_rows
+from vsacli.compute.control_flow import where_needed
 from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.choice import TRACE_FROM
 from vsacli.compute.engine.engines import TracedEngine, kernel_program
+from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.tracing.python_code import RowFunction
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
@@ -73,6 +77,23 @@ def test_a_kernel_with_loops_runs_as_it_is():
     with pytest.raises(NotImplementedError, match="has no form on rows"):
         RowFunction(kernel_program(kernel))
     np.testing.assert_array_equal(TracedEngine().run(kernel, rows), NUMPY.run(kernel, rows))
+
+
+@dataclass(frozen=True)
+class Root(RowKernel):
+    """Of numbers above zero; of others zero, by a branch in which both stay what they are."""
+
+    arguments = results = RowLayout({"number": ()})
+
+    def __call__(self, rows):
+        return where_needed(rows[0] > 0, lambda above: [np.sqrt(above)], rows, [np.zeros_like(rows[0])])
+
+
+def test_a_kernel_with_branches_runs_as_it_is():
+    with pytest.raises(NotImplementedError, match="branch has no form on rows"):
+        RowFunction(kernel_program(Root()))
+    rows = [np.array([4.0, -1.0])]
+    np.testing.assert_array_equal(TracedEngine().run(Root(), rows), [[2.0, 0.0]])
 
 
 def test_tracing_has_to_repay():

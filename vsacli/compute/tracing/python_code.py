@@ -83,6 +83,7 @@ Workspace = tuple[npt.NDArray[Any], ...]
 
 _DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint16}
 _LETTERS = {Kind.REAL: "r", Kind.TRUTH: "t", Kind.BITS: "b"}
+_NONE_ON_ROWS = {"loop", "branch", "item", "take"}
 _SELECTIONS = {"where": "{1}, {2}", "bits": "{1}, 0"}
 
 
@@ -163,7 +164,7 @@ class _RowAllocation:
 
     def _operation(self, number: int) -> Iterator[str]:
         symbol = self._program.operations[number]
-        if symbol.kind not in _DTYPES or symbol.operation in {"item", "take"}:
+        if symbol.kind not in _DTYPES or symbol.operation in _NONE_ON_ROWS:
             raise NotImplementedError(f"{symbol.operation} has no form on rows")
         operands = [self._operand(operand, symbol.kind) for operand in symbol.operands]
         if symbol.operation in _SELECTIONS:  # written in two steps, so no operand may lie in the same row
