@@ -17,7 +17,7 @@ import numpy as np
 from vsacli.analysis.clearances import bounded_quantities, clearances
 from vsacli.analysis.joint_report import Worst
 from vsacli.analysis.minima import KNOWN, ROUNDING, Brackets, Known, brackets, narrowed
-from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, IndexArray
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.model import Robot
@@ -41,7 +41,7 @@ class Minima(NamedTuple):
     """Minima between the steps of a block.
 
     Attributes:
-        block: everything at their times; a row each.
+        block: of each minimum everything of its own joint, as of the only joint there is; a row each.
         quantity: what is least there, by number of `Between.quantities`.
         joint: whose it is, by index.
         clearance: how little.
@@ -68,8 +68,14 @@ class Minima(NamedTuple):
         )
 
     def of_joint(self, index: int) -> Block:
-        """Everything at those of one joint."""
-        return self.where(self.joint == index).block
+        """Everything of one joint at its minima, in its place; joints before it are views of the same."""
+        own = self.block.taken(self.joint == index)
+        return own.replaced(
+            **{
+                name: np.broadcast_to(array, (len(array), index + 1, *array.shape[2:]))
+                for name, array in _of_joints(own).items()
+            }
+        )
 
 
 class Between:
@@ -125,11 +131,11 @@ class Between:
     def add(self, minima: Minima) -> None:
         """Take minima into the report, which have passed and are part of the run."""
         for number in set(minima.quantity.tolist()):
-            own = np.flatnonzero(minima.quantity == number)
-            least = own[minima.clearance[own].argmin()]
-            clearance = float(minima.clearance[least])
+            own, quantity = minima.where(minima.quantity == number), self.quantities[number]
+            least = int(own.clearance.argmin())
+            clearance = float(own.clearance[least])
             if clearance < self._least_between.get(number, (math.inf,))[0]:
-                self._least_between[number] = clearance, self.quantities[number].at(minima.block, least)
+                self._least_between[number] = clearance, quantity.at(own.of_joint(quantity.number), least)
 
     def reports(self) -> list[dict[str, Worst]]:
         """For each joint what comes nearer to its bound between the steps than at any step, by its kind."""
@@ -203,10 +209,14 @@ class Between:
 
     def _keep(self, found: Brackets, steps: IndexArray, crossed: BoolArray) -> None:
         """Everything at minima, with the flags of what is least there, for the block of the nearest step."""
-        block = self._judged(self._compute(self._trajectory.at(found.time[:, 1])))
-        own = block.replaced(flags=block.flags & self._bits[found.function, None])
-        joint = self._joint[found.function]
-        self._found.append(Minima(own, found.function, joint, found.value[:, 1], steps, crossed))
+        for part in self._parts(len(steps)):
+            quantity, time = found.function[part], found.time[part, 1]
+            block, joint = self._judged(self._compute(self._trajectory.at(time))), self._joint[quantity]
+            each = np.arange(len(time)), joint, np.newaxis
+            own = {name: array[each] for name, array in _of_joints(block).items()}
+            own["flags"] &= self._bits[quantity, None]
+            rows = quantity, joint, found.value[part, 1], steps[part], crossed[part]
+            self._found.append(Minima(block.replaced(**own), *rows))
 
     def _evaluated(self, quantity: IndexArray, times: FloatArray) -> FloatArray:
         """The clearances of quantities (n,) at times of their own, (n, times)."""
@@ -218,11 +228,14 @@ class Between:
 
     def _computed(self, time: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
         """The clearances of all quantities at any times, in blocks."""
-        count = usual_block(self._joints)
-        for start in range(0, len(time), count):
-            part = slice(start, start + count)
+        for part in self._parts(len(time)):
             block = self._compute(self._trajectory.at(time[part]))
             yield part, clearances(self.quantities, block)
+
+    def _parts(self, times: int) -> Iterator[slice]:
+        """So many times in blocks of the usual size."""
+        count = usual_block(self._joints)
+        return (slice(start, start + count) for start in range(0, times, count))
 
     def _passing(self, block: Block) -> tuple[Block, list[Minima]]:
         """A block with its flags, and the minima that are nearest to its steps."""
@@ -234,7 +247,12 @@ class Between:
             if not inside.all():
                 later.append(found.where(~inside))
         for found in own:
-            bits = np.where(found.crossed, found.block.flags[np.arange(len(found.joint)), found.joint], 0)
+            bits = np.where(found.crossed, found.block.flags[:, 0], 0)
             np.bitwise_or.at(block.flags, (found.step, found.joint), bits)
         self._found, self._passed = later, stop
         return block, own
+
+
+def _of_joints(block: Block) -> dict[str, AnyArray]:
+    """The variables of joints, by name."""
+    return {name: array for name, array in block.arrays().items() if "joint" in block.declared[name].dims}

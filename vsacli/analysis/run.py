@@ -148,8 +148,8 @@ class Run:
         self._samples += len(block.time)
         for minima in between:
             self._between.add(minima)
-            for index, summary in enumerate(self._summaries):
-                summary.add_between(minima.of_joint(index))
+            for index in set(minima.joint.tolist()):
+                self._summaries[index].add_bounded(minima.of_joint(index))
         self._passages.add(block)
         self._springs.add(block)
         for summary in self._summaries:

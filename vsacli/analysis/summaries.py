@@ -53,7 +53,7 @@ class JointSummary:
             self._count(flags, block.time)
             self._record_not_finite(flags, block.time)
             self._record_instability(flags, block)
-        self._add_bounded(block)
+        self.add_bounded(block)
         least, most = self._stiffness
         self._stiffness = (
             np.fmin(least, np.fmin.reduce(stiffness)),
@@ -64,13 +64,8 @@ class JointSummary:
             motor.add(block.time, block.dtheta[:, index, motor.number - 1])
         self._peaks = np.fmax(self._peaks, [np.fmax.reduce(np.abs(row)) for row in rows])
 
-    def add_between(self, block: Block) -> None:
-        """Merge minima between the steps: whose flags have steps of their own, which count."""
-        if block.time.size:
-            self._add_bounded(block)
-
-    def _add_bounded(self, block: Block) -> None:
-        """Merge what is worst."""
+    def add_bounded(self, block: Block) -> None:
+        """Merge what is worst, of steps or of minima between them, whose flags have steps that count."""
         flags = block.flags[:, self._index]
         flagged = bool(flags.any())
         if "stiffness" in self._joint.actuator.commanded:
