@@ -7,11 +7,15 @@ import math
 import numpy as np
 import pytest
 from samples.springs import SPRINGS, measured, on_side_2, stiffness_under
+from scipy.optimize import brentq
 
 from vsacli.actuators.laws import Cubic, FourBar, Polynomial, SpringLaw
 from vsacli.actuators.laws.tendon import Mirrored
+from vsacli.actuators.pairs.balance import Balance
 from vsacli.actuators.pairs.critical_curves import sample_hardening
-from vsacli.actuators.pairs.folds import map_folds
+from vsacli.actuators.pairs.fold_map import FoldMap, map_folds
+from vsacli.actuators.pairs.folds import outermost_fold
+from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)
 
@@ -61,7 +65,7 @@ def test_a_measured_curve_that_rounds_at_its_end_has_no_peak_there(low: float):
     hardening = sample_hardening(law)
     assert hardening is not None
     assert np.all((hardening.peaks > 0) & (hardening.peaks < len(hardening.phi) - 1))
-    assert np.all(np.diff(map_folds(law.law, law.law).edges) > 0)
+    assert np.all(np.diff(map_folds(law.law, law.law).tau_e) >= 0)
 
 
 def test_a_tendon_that_pulls_the_other_way_has_no_positive_torque():
@@ -69,24 +73,76 @@ def test_a_tendon_that_pulls_the_other_way_has_no_positive_torque():
     assert sample_hardening(law) is None
 
 
-@pytest.mark.parametrize("name", SPRINGS)
-def test_corners_of_the_boxes_are_folds(name: str):
+def springs_of(name: str) -> tuple[SpringLaw, SpringLaw]:
     (first, _), (second, _) = SPRINGS[name][0], on_side_2(SPRINGS[name][1])
+    return first, second
+
+
+@pytest.mark.parametrize("name", SPRINGS)
+def test_nodes_of_the_map_are_folds(name: str):
+    first, second = springs_of(name)
     folds = map_folds(first, second)
-    assert np.all(np.diff(folds.edges) > 0)
-    assert (folds.edges[0], folds.edges[-1]) == (-math.inf, math.inf)
-    for tau_e, phi_1, phi_2 in zip(folds.tau_e, folds.phi_1, folds.phi_2, strict=True):
-        known = np.isfinite(tau_e) & (np.abs(tau_e) < 1e3) & (np.abs(tau_e) > 1e-6)
-        tau_e, phi_1, phi_2 = tau_e[known], phi_1[known], phi_2[known]
-        np.testing.assert_allclose(first.torque(phi_1) + second.torque(phi_2), tau_e, rtol=4 * EPS)
-        rho_1, rho_2 = first.hardening(phi_1), second.hardening(phi_2)
-        # One of the two deflections is a root for the hardening of the other.
-        np.testing.assert_allclose(rho_1, rho_2, rtol=1e-10)
+    assert np.all(np.diff(folds.tau_e) >= 0)
+    assert folds.tau_e[-1] == math.inf
+    known = np.isfinite(folds.phi_1) & (np.abs(folds.tau_e) < 1e3) & (np.abs(folds.tau_e) > 1e-6)
+    tau_e, phi_1, phi_2 = folds.tau_e[known], folds.phi_1[known], folds.phi_2[known]
+    np.testing.assert_allclose(first.torque(phi_1) + second.torque(phi_2), tau_e, rtol=4 * EPS)
+    rho_1, rho_2 = first.hardening(phi_1), second.hardening(phi_2)
+    # One of the two deflections is a root for the hardening of the other.
+    np.testing.assert_allclose(rho_1, rho_2, rtol=1e-10)
+
+
+def torques_of(folds: FoldMap) -> FloatArray:
+    """Torques in every cell up to 100 N m: next to its ends, since two folds are born there, and anywhere."""
+    low, high = folds.tau_e[:-1], folds.tau_e[1:]
+    cells = np.isfinite(folds.phi_1[:-1] + folds.phi_1[1:]) & (high - low > 1e-9 * np.abs(high))
+    cells &= (np.abs(low) < 100) & (np.abs(high) < 100) & (np.abs(low) + np.abs(high) > 1e-3)
+    shares = np.concatenate((np.geomspace(1e-9, 0.1, 5), np.random.default_rng(20).uniform(0, 1, 8)))
+    shares = np.concatenate((shares, 1 - shares[:5]))[:, None]
+    return (low[cells] + shares * (high - low)[cells]).ravel()
+
+
+@pytest.mark.parametrize("name", ["cubic", "polynomial", "sinh", "four_bar", "table"])
+def test_the_outermost_fold_is_where_a_scalar_solver_finds_it(name: str):
+    first, second = springs_of(name)
+    folds, balance = map_folds(first, second), Balance(first, second)
+    tau_e = torques_of(folds)
+    exists, found = outermost_fold(balance, folds, tau_e)
+    assert exists.all()
+    # The balance of the torques is met but for rounding of the two.
+    scale = np.abs(found.one.tau) + np.abs(found.two.tau)
+    assert np.all(np.abs(found.torque - tau_e) <= 8 * EPS * scale)
+    for torque, phi_1, phi_2, stiffness in zip(
+        tau_e[::7], found.phi_1[::7], found.phi_2[::7], found.stiffness[::7], strict=True
+    ):
+        exact = scalar_fold(balance, torque, phi_1, phi_2)
+        # Tables are sums of seven terms, and a four-bar linkage loses digits next to its end.
+        assert stiffness == pytest.approx(exact, rel=3e-14)
+
+
+def scalar_fold(balance: Balance, tau_e: float, phi_1: float, phi_2: float) -> float:
+    """Stiffness at the fold that Brent's method finds next to deflections, along the curve of equal tau_e."""
+
+    def deflections(t: float) -> tuple[FloatArray, FloatArray]:
+        return balance.deflections_at(np.array(tau_e), np.array(t))
+
+    def slope(t: float) -> float:
+        return float(balance.stiffness_slope(*deflections(t)))
+
+    middle = float(balance.first.torque(np.array(phi_1)) - balance.second.torque(np.array(phi_2))) / 2
+    least, largest = balance.preload_range(np.array(tau_e))
+    for share in np.geomspace(1e-9, 1, 40):
+        width = share * (abs(middle) + abs(tau_e))
+        low, high = max(middle - width, float(least)), min(middle + width, float(largest))
+        if slope(low) * slope(high) < 0:
+            t = brentq(slope, low, high, xtol=1e-300, rtol=4 * EPS)
+            return float(balance.stiffness(*deflections(t)))
+    raise AssertionError("there is no fold next to these deflections")
 
 
 def test_tendons_against_each_other_have_no_fold():
     (first, _), (second, _) = SPRINGS["exponential"][0], on_side_2(SPRINGS["exponential"][1])
-    assert np.all(np.isnan(map_folds(first, second).tau_e))
+    assert np.all(np.isnan(map_folds(first, second).phi_1))
 
 
 def folds_of(springs: tuple[Cubic, Cubic], tau_e: float) -> int:
@@ -100,9 +156,9 @@ def folds_of(springs: tuple[Cubic, Cubic], tau_e: float) -> int:
 def test_two_folds_are_born_at_the_cusp_where_the_outermost_fold_jumps():
     springs = Cubic(k=400, k_c=2000), Cubic(k=440, k_c=2000)
     folds = map_folds(*springs)
-    # Neighbouring boxes touch, except where the outermost fold jumps.
-    jump = np.abs(folds.phi_1[0, 1:] - folds.phi_1[1, :-1]) > 1e-3 * np.abs(folds.phi_1[1, :-1])
-    jumps = folds.edges[1:-1][jump]
+    # Where the outermost fold jumps there are two nodes of one torque.
+    jump = np.abs(np.diff(folds.phi_1)) > 1e-3 * np.abs(folds.phi_1[1:])
+    jumps = folds.tau_e[1:][jump & (np.diff(folds.tau_e) == 0)]
     (cusp,) = jumps[np.abs(jumps) < 1e6]
     # Right after the cusp they are apart by the root of the relative distance, and so seen by the scan.
     assert folds_of(springs, cusp * (1 - 1e-4)) == 1
