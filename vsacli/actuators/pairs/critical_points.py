@@ -11,10 +11,11 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values
 
 SHORT_RTOL = 2e-5
-"""Relative distance to a critical point, in deflection and in stiffness, of which one step leaves rounding only.
+"""Relative distance to a critical point of which one step leaves rounding only.
 
 It squares the distance along the curve of equal tau_e, of which the stiffness has the square again; of the
-torque balance it leaves the fourth power.
+torque balance it leaves the fourth power. The stiffness after the step lacks the third power, a hundredth or
+so of it: with measured springs, the worst by trial, 1e-14 from this distance, 2e-13 from 5e-5.
 """
 
 
@@ -41,12 +42,12 @@ def newton_step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
     return step_1 - shift, step_2 - shift
 
 
-def is_short(state: PairState, rho: Sides, steps: Sides, rtol: float = SHORT_RTOL) -> BoolArray:
-    """Whether a step is so short that the next would be rounding, or as short as a tolerance says."""
+def is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
+    """Whether a step is so short that the next would be rounding."""
     (rho_1, rho_2), (size_1, size_2) = rho, map(np.abs, steps)
     hardened = np.abs(rho_1) * size_1 + np.abs(rho_2) * size_2
-    short: BoolArray = (hardened <= rtol) & (
-        size_1 + size_2 <= rtol * (np.abs(state.phi_1) + np.abs(state.phi_2))
+    short: BoolArray = (hardened <= SHORT_RTOL) & (
+        size_1 + size_2 <= SHORT_RTOL * (np.abs(state.phi_1) + np.abs(state.phi_2))
     )
     return short
 

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
 from vsacli.compute.tracing import Kind, Program, Symbol
-from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations, table_names
+from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations
+from vsacli.compute.tracing.c_tables import Place, Tables
 
 _OPERATORS = {"and": " & ", "or": " | "}
 _CHOOSE = {
@@ -21,11 +22,23 @@ class VectorDialect(Dialect):
     """Vector types of GCC and Clang, as in lanes.c: comparisons give masks, all bits set or none."""
 
     def __init__(self) -> None:
-        super().__init__({kind: "reals" if kind is Kind.REAL else "integers" for kind in Kind}, "double")
+        super().__init__({kind: "reals" if kind is Kind.REAL else "integers" for kind in Kind})
 
     def real(self, number: float) -> str:
         """As of `Dialect`."""
         return f"spread({digits(number)})"
+
+    def array_type(self, _values: tuple[float, ...], _searched: bool) -> str:
+        """As of `Dialect`; what is gathered from it is of this type."""
+        return "double"
+
+    def entry(self, number: float, _array_type: str) -> str:
+        """As of `Dialect`."""
+        return digits(number)
+
+    def take(self, place: Place, index: str) -> str:
+        """As of `Dialect`."""
+        return f"each_take({place.pointer}, {index})"
 
     def integer(self, number: int) -> str:
         """As of `Dialect`."""
@@ -50,8 +63,7 @@ class VectorDialect(Dialect):
     def function(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
         """As of `Dialect`."""
         if name == "search":
-            table, value = operands
-            return f"search({table}, sizeof {table} / sizeof {table}[0], {value})"
+            return f"search({', '.join(operands)})"
         chosen = f"{name}_integer" if kind is Kind.INDEX else name
         return f"each_{chosen}({', '.join(operands)})"
 
@@ -73,7 +85,7 @@ def batch_source(program: Program) -> str:
 
 def _group(program: Program) -> Iterator[str]:
     """The function that computes one sample a lane."""
-    tables = table_names([program])
+    tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
     writer = Writer(VECTORS, tables)
     names = {symbol.index: f"x{number}" for number, symbol in enumerate(program.inputs)}

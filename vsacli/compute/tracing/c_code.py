@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from vsacli.compute.tracing.c_tables import Place, Tables
 from vsacli.compute.tracing.program import (
     BITWISE,
     LOGICAL,
@@ -52,20 +53,26 @@ class Dialect(ABC):
 
     Attributes:
         types: C type of each kind of value.
-        table_type: that of the constants in a table.
     """
 
-    def __init__(self, types: Mapping[Kind, str], table_type: str) -> None:
+    def __init__(self, types: Mapping[Kind, str]) -> None:
         self.types = types
-        self.table_type = table_type
 
     @abstractmethod
     def real(self, number: float) -> str:
         """A constant."""
 
-    def entry(self, number: float) -> str:
-        """A constant in a table."""
-        return digits(number)
+    @abstractmethod
+    def array_type(self, values: tuple[float, ...], searched: bool) -> str:
+        """Type of the constants in an array, and whether a search goes through them."""
+
+    @abstractmethod
+    def entry(self, number: float, array_type: str) -> str:
+        """A constant in an array of a type."""
+
+    @abstractmethod
+    def take(self, place: Place, index: str) -> str:
+        """The entry of a table at an index."""
 
     @abstractmethod
     def integer(self, number: int) -> str:
@@ -91,8 +98,8 @@ class Dialect(ABC):
     def function(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
         """A call that gives a value of a kind.
 
-        The name is one of math.h; or `maximum`, `minimum`, which NaN passes through; or `take`, `search` in a
-        table.
+        The name is one of math.h; or `maximum`, `minimum`, which NaN passes through; or `search` in a table,
+        which are a pointer and a number of entries.
         """
 
     @abstractmethod
@@ -124,10 +131,10 @@ class Writer:
 
     Args:
         dialect: how to write.
-        tables: what their constants are called.
+        tables: where their constants are.
     """
 
-    def __init__(self, dialect: Dialect, tables: Mapping[Table, str]) -> None:
+    def __init__(self, dialect: Dialect, tables: Tables) -> None:
         self._dialect = dialect
         self._tables = tables
 
@@ -148,8 +155,10 @@ class Writer:
 
     def _expression(self, symbol: Symbol, names: Names, prefix: str) -> str:
         operation, dialect = symbol.operation, self._dialect
+        if isinstance(table := symbol.operands[0], Table):
+            return self._from_table(table, symbol, names, prefix)
         texts = [
-            self._tables[operand] if isinstance(operand, Table) else self.value(operand, kind, names, prefix)
+            self.value(operand, kind, names, prefix)
             for operand, kind in zip(symbol.operands, _kinds_of_operands(symbol), strict=True)
         ]
         if operation in INFIX and not (operation in BITWISE and symbol.kind is Kind.TRUTH):
@@ -165,6 +174,14 @@ class Writer:
         if operation in LOGICAL:
             return dialect.logical(LOGICAL[operation], texts)
         return dialect.function(symbol.kind, C_NAMES.get(operation, operation), texts)
+
+    def _from_table(self, table: Table, symbol: Symbol, names: Names, prefix: str) -> str:
+        place, taken = self._tables.place(table), symbol.operation == "take"
+        operand = self.value(symbol.operands[1], Kind.INDEX if taken else Kind.REAL, names, prefix)
+        if taken:
+            return self._dialect.take(place, operand)
+        searched = (place.pointer, str(len(table.values)), operand)
+        return self._dialect.function(Kind.INDEX, C_NAMES[symbol.operation], searched)
 
     def _nested(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
         """A loop or branch: variables of its results, and the block that computes them."""
@@ -230,26 +247,11 @@ class Writer:
             yield f"{result} = {self._dialect.replaced(kind, where, f'{result}_new', result)};"
 
 
-def table_names(programs: Iterable[Program]) -> dict[Table, str]:
-    """What the tables of programs are called."""
-    found = dict.fromkeys(table for program in programs for table in _tables(program))
-    return {table: f"table_{number}" for number, table in enumerate(found)}
-
-
-def table_declarations(names: Mapping[Table, str], dialect: Dialect) -> Iterator[str]:
+def table_declarations(tables: Tables, dialect: Dialect) -> Iterator[str]:
     """Constants at the head of a file."""
-    for table, name in names.items():
-        values = ", ".join(map(dialect.entry, table.values))
-        yield f"static const {dialect.table_type} {name}[{len(table.values)}] = {{{values}}};"
-
-
-def _tables(program: Program) -> Iterator[Table]:
-    for symbol in program.operations:
-        for operand in symbol.operands:
-            if isinstance(operand, Table):
-                yield operand
-            elif isinstance(operand, Loop | Branch):
-                yield from _tables(operand.body)
+    for name, array_type, values in tables.arrays:
+        entries = ", ".join(dialect.entry(value, array_type) for value in values)
+        yield f"static const {array_type} {name}[{len(values)}] = {{{entries}}};"
 
 
 def _name(symbol: Symbol, names: Names, prefix: str) -> str:
@@ -270,6 +272,5 @@ def _kinds_of_operands(symbol: Symbol) -> list[Kind]:
         return [Kind.TRUTH, symbol.kind, symbol.kind]
     if symbol.operation == "bits":
         return [Kind.TRUTH, Kind.BITS]
-    of_constants = Kind.INDEX if symbol.operation == "take" else Kind.REAL
-    kind = next((operand.kind for operand in symbol.operands if isinstance(operand, Symbol)), of_constants)
+    kind = next((operand.kind for operand in symbol.operands if isinstance(operand, Symbol)), Kind.REAL)
     return [kind] * len(symbol.operands)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from vsacli.compute.tracing.c_code import INFIX, table_names
+from vsacli.compute.tracing.c_code import INFIX
+from vsacli.compute.tracing.c_tables import table_uses
 from vsacli.compute.tracing.program import LOGICAL, Program, Symbol, Table
 
 _CHOICES = {"where": "{1} if {0} else {2}", "take": "{0}[{1}]", "negative": "-{0}"}
@@ -24,7 +25,8 @@ def function_text(program: Program, name: str, arguments: Mapping[str, int]) -> 
     Raises:
         NotImplementedError: the program has loops or branches.
     """
-    tables = table_names([program])
+    distinct = dict.fromkeys(table for table, _ in table_uses(program))
+    tables = {table: f"table_{number}" for number, table in enumerate(distinct)}
     inputs, lines = iter(program.inputs), []
     for argument, count in arguments.items():
         lines.append(f"    {', '.join(_value(next(inputs)) for _ in range(count))}, = {argument}")

@@ -7,11 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from vsacli.compute.tracing import Program, Symbol
-from vsacli.compute.tracing.c_code import table_names
+from vsacli.compute.tracing.c_tables import Tables
 from vsacli.compute.tracing.program import FUNCTIONS, Branch, Loop, Table
-
-BYTES = {"double": 8, "float": 4}
-"""Of a number."""
+from vsacli.control.codegen.scalar import BYTES, Scalar
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,8 @@ def worst_cost(program: Program) -> Cost:
 
 def table_bytes(programs: Iterable[Program], precision: str) -> int:
     """Memory of the constant tables that the functions share."""
-    return BYTES[precision] * sum(len(table.values) for table in table_names(programs))
+    tables = Tables(programs, Scalar(precision).array_type)
+    return sum(BYTES[array.type] * len(array.values) for array in tables.arrays)
 
 
 def _of_operation(symbol: Symbol) -> Cost:

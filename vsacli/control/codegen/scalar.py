@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from vsacli.compute.tracing import Kind, Program, Symbol
-from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations, table_names
+from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations
+from vsacli.compute.tracing.c_tables import Place, Tables
 from vsacli.control.codegen.interface import Function, Structure, structures
 
 PRECISIONS = ("double", "float")
@@ -68,7 +69,7 @@ class Scalar(Dialect):
 
     def __init__(self, precision: str) -> None:
         types = {Kind.REAL: precision, Kind.TRUTH: "int", Kind.BITS: "unsigned", Kind.INDEX: "int"}
-        super().__init__(types, precision)
+        super().__init__(types)
         self._suffix = "f" if precision == "float" else ""
 
     def real(self, number: float) -> str:
@@ -80,9 +81,22 @@ class Scalar(Dialect):
             return text
         return text.replace(")", "f)") if text.endswith(")") else f"{text}f"
 
-    def entry(self, number: float) -> str:
+    def array_type(self, values: tuple[float, ...], searched: bool) -> str:
+        """As of `Dialect`: the smallest that holds all digits, or as many as the precision has."""
+        number = self.types[Kind.REAL]
+        if searched:
+            return number
+        return next((name for name, holds in _SMALLER_TYPES.items() if all(map(holds, values))), number)
+
+    def entry(self, number: float, array_type: str) -> str:
         """As of `Dialect`."""
-        return self.real(number)
+        return self.real(number) if array_type in PRECISIONS else str(int(number))
+
+    def take(self, place: Place, index: str) -> str:
+        """As of `Dialect`."""
+        own, of_entry = self.types[Kind.REAL], place.array.type
+        entry = f"{place.array.name}[{index}{f' + {place.offset}' if place.offset else ''}]"
+        return entry if of_entry == own else f"({own}){entry}"
 
     def integer(self, number: int) -> str:
         """As of `Dialect`."""
@@ -106,11 +120,8 @@ class Scalar(Dialect):
 
     def function(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
         """As of `Dialect`."""
-        if name == "take":
-            return f"{operands[0]}[{operands[1]}]"
         if name == "search":
-            table, value = operands
-            return f"search({table}, (int)(sizeof {table} / sizeof {table}[0]), {value})"
+            return f"search({', '.join(operands)})"
         if name in HELPERS:
             called = f"{name}_index" if kind is Kind.INDEX else name
         else:
@@ -124,6 +135,27 @@ class Scalar(Dialect):
     def replaced(self, _kind: Kind, _truth: str, new: str, _old: str) -> str:
         """As of `Dialect`."""
         return new
+
+
+def _holds_float(value: float) -> bool:
+    """Whether single precision has all digits of a number that is not below its range."""
+    return math.isnan(value) or (_in_range(value) == value and float(np.float32(value)) == value)
+
+
+def _holds_integer(largest: int) -> Callable[[float], bool]:
+    """Whether a whole number of so many values has all digits; minus zero is none."""
+    return lambda value: abs(value) <= largest and value == int(value) and str(value) != "-0.0"
+
+
+_SMALLER_TYPES = {
+    "signed char": _holds_integer(127),
+    "short": _holds_integer(32767),
+    "float": _holds_float,
+}
+"""Types of constants, and which values they hold."""
+
+BYTES = {"signed char": 1, "short": 2, "float": 4, "double": 8}
+"""Of an entry of each type."""
 
 
 def _in_range(number: float) -> float:
@@ -146,7 +178,7 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
     """
     dialect = Scalar(precision)
     programs = [function.program for function in functions]
-    tables = table_names(programs)
+    tables = Tables(programs, dialect.array_type)
     writer = Writer(dialect, tables)
     bodies = [
         "\n".join(_definition(prefix, function, program, writer))
