@@ -11,8 +11,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine.compiled_engine import operation_count
 from vsacli.compute.engine.libraries import Code
 from vsacli.compute.tracing import Kind, Program
-from vsacli.compute.tracing.c_code import Writer, digits, table_declarations, table_names
-from vsacli.control.codegen.scalar import HELPERS, Scalar, helper_text
+from vsacli.compute.tracing.c_code import Writer, digits, table_declarations
+from vsacli.compute.tracing.c_tables import Tables
+from vsacli.control.codegen.scalar import HELPERS, PRECISIONS, Scalar, helper_text
 from vsacli.control.simulation.equations.recording import Recording
 
 
@@ -34,15 +35,16 @@ class _Numbers(Scalar):
         self.values.append(number)
         return f"p[{len(self.values) - 1}]"
 
-    def entry(self, number: float) -> str:
+    def entry(self, number: float, array_type: str) -> str:
         """As of `Dialect`; tables stay in the text."""
-        return digits(number)
+        return digits(number) if array_type in PRECISIONS else super().entry(number, array_type)
 
 
 def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
     """What to compile for a recording, and the numbers that the code is to be given."""
     programs = {"rates": recording.rates, "distances": recording.distances}
-    numbers, tables = _Numbers(), table_names(programs.values())
+    numbers = _Numbers()
+    tables = Tables(programs.values(), numbers.array_type)
     writer = Writer(numbers, tables)
     lines = [
         f"#define ENTRIES {recording.entries}",
