@@ -19,7 +19,7 @@ from vsacli.compute.engine import NUMPY, choice, choose, compiler, libraries
 from vsacli.compute.engine.cache import open_cache
 from vsacli.compute.engine.choice import LOOK_FROM
 from vsacli.compute.engine.compiled_engine import CompiledEngine
-from vsacli.compute.engine.libraries import _loaded
+from vsacli.compute.engine.libraries import Code, _loaded
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 
 KERNEL = LinkTorques(vsa_3r())
@@ -145,11 +145,9 @@ def test_no_threads_are_refused(vsacli, motion):
 
 
 def test_compiling_repays_neither_for_little_work_nor_for_long_code():
-    assert [choice._repays(operations, 300_000) for operations in (200, 4_500, 70_000)] == [
-        False,
-        True,
-        False,
-    ]
+    short, arm, long = (Code("", sum(functions), functions) for functions in ((200,), (4_500,), (100_000,)))
+    assert [choice._repays(code, 300_000) for code in (short, arm, long)] == [False, True, False]
+    assert choice._repays(Code("", 100_000, (500,) * 200), 300_000)
 
 
 # Environments in which "auto" computes with NumPy, and "c" says why it cannot
@@ -206,10 +204,10 @@ def test_what_takes_long_is_announced_and_what_takes_too_long_refused(monkeypatc
     choose("c", KERNEL, 1, tell=said.append)
     assert re.fullmatch(r"compiling takes about \d+ s, this once \(at most 120 s\)", said[0])
     _loaded.clear()
-    monkeypatch.setattr(libraries, "MOST_OPERATIONS", 10)
+    monkeypatch.setattr(libraries, "TIMEOUT", 0.1)
     monkeypatch.setenv("CC", "cc -DANOTHER")  # whose code is not in the cache
     assert "would not repay" in choose("auto", KERNEL, 10_000_000).reason
-    with pytest.raises(InputError, match=r"a step takes \d+ operations, more than the 10 that are compiled"):
+    with pytest.raises(InputError, match=r"compiling \d+ operations would take about \d+ s, more than 0.1 s"):
         choose("c", KERNEL, 1)
 
 

@@ -1,4 +1,4 @@
-"""Loops and branches over samples, each of which runs as if it were alone.
+"""Loops and branches over samples, each of which runs as if it were alone; and calls that are alike.
 
 Everything else in the solvers is elementwise: NumPy functions, comparisons, `np.where`, and lookups in
 constant arrays with `np.searchsorted` and `look_up`. So one text computes blocks of samples, or is traced to
@@ -8,7 +8,8 @@ its first argument, and `vsacli.compute.tracing` registers the second text, for 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from functools import singledispatch
 from typing import Any
 
@@ -55,6 +56,37 @@ def cell_of(position: FloatArray, count: int) -> IndexArray:
     return result
 
 
+def call(row: Any, function: Callable[..., Any], *arguments: Any) -> Any:
+    """`function(*arguments)`, which may be recorded once for all calls that are alike.
+
+    These have equal functions, and arguments that are equal but for rows of samples. So what is computed
+    joint by joint need not be written out as often.
+
+    Args:
+        row: any of the rows of samples among the arguments.
+        function: one that does nothing but compute its result, of nothing but its arguments; hashable.
+        arguments: rows of samples, constants, hashable objects, and tuples, lists and dictionaries of such.
+    """
+    return call_on(row, function, arguments)
+
+
+@dataclass(frozen=True)
+class Keyed:
+    """A function that equals another one if its key does, for `call`.
+
+    Attributes:
+        key: all that decides on what it computes.
+        function: the function.
+    """
+
+    key: Hashable
+    function: Callable[..., Any] = field(compare=False)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the function computes."""
+        return self.function(*arguments)
+
+
 @singledispatch
 def repeat_on(_: Any, step: Step, state: Values, constants: Values, limit: int) -> Values:
     """`repeat` on NumPy arrays."""
@@ -94,6 +126,12 @@ def where_needed_on(mask: Any, function: Function, arguments: Values, otherwise:
         return function(*arguments)
     found = _put(_flat(otherwise), samples, function(*_taken(_flat(arguments), samples)))
     return _shaped(found, mask.shape)
+
+
+@singledispatch
+def call_on(_: Any, function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
+    """`call` on anything but rows of symbols."""
+    return function(*arguments)
 
 
 @singledispatch

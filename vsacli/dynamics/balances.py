@@ -14,9 +14,10 @@ from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.variables import VARIABLES, Block, Variable
+from vsacli.compute.control_flow import call
 from vsacli.compute.vector import Scalar
 from vsacli.dynamics.dampers import motor_torques
-from vsacli.dynamics.inverse import InverseDynamics, rows_of_joints
+from vsacli.dynamics.inverse import InverseDynamics, behind_link, rows_of_joints
 from vsacli.robot.joint import Joint
 
 BALANCES = {
@@ -55,9 +56,13 @@ class BalancedDynamics(InverseDynamics):
     def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
         """The rows of each result by name, from the kernel's arguments and the variables of the joints."""
         joints = self.robot.joints
-        powers, rates = zip(*map(passed_power, joints, of_joints), strict=True)
-        passed = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
-        return {**super().rows_of(rows, of_joints), **passed, **spring_balances(joints, of_joints)}
+        passed = [
+            call(rows[0], behind_link(passed_power, joint), of_joint)
+            for joint, of_joint in zip(joints, of_joints, strict=True)
+        ]
+        powers, rates = zip(*passed, strict=True)
+        by_motor = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
+        return {**super().rows_of(rows, of_joints), **by_motor, **spring_balances(joints, of_joints)}
 
 
 def damped_joints(joints: Sequence[Joint]) -> list[int]:
@@ -76,20 +81,30 @@ def spring_balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> di
     for joint, of_joint in zip(joints, of_joints, strict=True):
         if not joint.actuator.sprung:
             continue
-        regular = ~has(of_joint["flags"], Flag.INFEASIBLE | Flag.SINGULAR)
-        tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
-        carried = joint.actuator.carried(of_joint)
-        size = np.maximum(carried.size, np.finfo(float).tiny)
-        of_stiffness = np.abs(carried.stiffness - stiffness) / np.where(regular, stiffness, 1.0)
-        errors.append(np.where(regular, of_stiffness, 0.0))
-        if joint.damper_at("transmission"):
-            residual = np.abs(carried.tau_e + of_joint["tau_damper"] - tau_e)
-            residual = np.maximum(residual - _rounding_of_damper(of_joint), 0.0)
-            missing.append(np.where(regular, residual, 0.0))
-            sizes.append(np.where(regular, np.maximum(size, np.abs(tau_e)), 0.0))
+        of_stiffness, of_torque, size = call(of_joint["tau_e"], behind_link(_balance, joint), of_joint)
+        errors.append(of_stiffness)
+        if size is None:
+            errors.append(of_torque)
         else:
-            errors.append(np.where(regular, np.abs(carried.tau_e - tau_e) / size, 0.0))
+            missing.append(of_torque)
+            sizes.append(size)
     return {"spring_error": [reduce(np.maximum, errors)], "damped_error": missing, "damped_size": sizes}
+
+
+def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Errors of stiffness and of torque, both scaled; beside a damper the latter in N m, and its size."""
+    regular = ~has(of_joint["flags"], Flag.INFEASIBLE | Flag.SINGULAR)
+    tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
+    carried = joint.actuator.carried(of_joint)
+    size = np.maximum(carried.size, np.finfo(float).tiny)
+    of_stiffness = np.abs(carried.stiffness - stiffness) / np.where(regular, stiffness, 1.0)
+    of_stiffness = np.where(regular, of_stiffness, 0.0)
+    if not joint.damper_at("transmission"):
+        return of_stiffness, np.where(regular, np.abs(carried.tau_e - tau_e) / size, 0.0), None
+    residual = np.abs(carried.tau_e + of_joint["tau_damper"] - tau_e)
+    residual = np.maximum(residual - _rounding_of_damper(of_joint), 0.0)
+    size = np.where(regular, np.maximum(size, np.abs(tau_e)), 0.0)
+    return of_stiffness, np.where(regular, residual, 0.0), size
 
 
 def _rounding_of_damper(of_joint: OfJoint) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from vsacli.base.arrays import FloatArray, by_joint, checked_shape, over_time
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
+from vsacli.compute.control_flow import Keyed, call
 from vsacli.compute.engine import Engine, choose
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import (
@@ -113,7 +115,7 @@ class LinkTorques(RowKernel):
         none = [0] * len(joints)
         dampings = zip(*(given.get(name, none) for name in DAMPING.names), strict=True)
         states = [
-            joint_state(joint, q, (dq, ddq, d3q, d4q), damping)
+            call(q, _state_of(joint), q, (dq, ddq, d3q, d4q), damping)
             for joint, damping, q, dq, ddq, d3q, d4q in zip(
                 joints, dampings, *(given[name] for name in POSITION.names), strict=True
             )
@@ -236,6 +238,11 @@ def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[Fl
         if (shape := np.shape(array)) != expected:
             raise InputError.one(f"{name} must have the shape {expected}, not {shape}")
         yield by_joint(np.atleast_2d(array))
+
+
+def _state_of(joint: Joint) -> Keyed:
+    """`joint_state` of a joint."""
+    return Keyed((joint.type, joint.dh, joint.friction, joint.damper), partial(joint_state, joint))
 
 
 def joint_state(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -19,6 +19,7 @@ from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.base.json_records import Stored
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.variables import VARIABLES, Block
+from vsacli.compute.control_flow import Keyed, call
 from vsacli.compute.engine import NUMPY, Engine, samples_per_pass
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import Scalar
@@ -27,6 +28,7 @@ from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.losses import dissipated_power
 from vsacli.robot.commanded_joints import takers
+from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.devices import with_devices
 from vsacli.trajectory.motion import Motion
@@ -135,11 +137,13 @@ class InverseDynamics(RowKernel):
         for index, joint in enumerate(self.robot.joints):
             command = Command.of({name: of_all[name][index] for name in names})
             phi = np.stack(given["phi"][SIDES * index : SIDES * (index + 1)]) if self.integrated else None
-            driven = drive(joint, command, self.near_singular, phi, self._internal(index, given))
+            internal = self._internal(index, given)
+            driving = behind_link(drive, joint, self.limits[index])
+            driven = call(rows[0], driving, command, self.near_singular, phi, internal)
             found.append({**command.arrays(), **driven._asdict()})
         if self.robot.has(VARIABLES["dissipated_power"]):
             for joint, of_joint in zip(self.robot.joints, found, strict=True):
-                of_joint["dissipated_power"] = dissipated_power(joint, of_joint)
+                of_joint["dissipated_power"] = call(rows[0], behind_link(dissipated_power, joint), of_joint)
         return found
 
     def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
@@ -166,6 +170,18 @@ class InverseDynamics(RowKernel):
         deflections = np.stack(given[INTERNAL[0]][SIDES * place : SIDES * (place + 1)])
         rates = [None, None] if self.driven else [given[name][place] for name in INTERNAL[1:]]
         return InternalMotion(deflections, *rates)
+
+
+def behind_link(function: Callable[..., Any], joint: Joint, *further: Hashable) -> Keyed:
+    """A function of a joint to be called with arrays, where neither its name, its row nor its link counts.
+
+    Args:
+        function: takes the joint first.
+        joint: the joint.
+        further: what else of it counts, though joints may be equal without it.
+    """
+    counting = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
+    return Keyed((function, *counting, *further), partial(function, joint))
 
 
 def _as_row(torque: Scalar, row: Scalar) -> Scalar:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from vsacli.compute.control_flow import call
 from vsacli.compute.vector import ZERO, Rotation, Scalar, SymmetricTensor, Vector, add, cross, mul
 from vsacli.dynamics.chain import JointState, LinkConstants, TipLoad, TorqueDerivatives
 
@@ -110,7 +111,7 @@ def forward(links: Sequence[LinkConstants], states: Sequence[JointState], previo
     """Run (36)-(51) over the rest of a chain, beyond a frame whose motion is known."""
     bodies = []
     for link, state in zip(links, states, strict=True):
-        body = _forward(link, state, previous)
+        body: Body = call(state.rates[0], _forward, link, state, previous)
         previous = body.frame
         bodies.append(body)
     return bodies
@@ -120,13 +121,12 @@ def backward(
     links: Sequence[LinkConstants], states: Sequence[JointState], bodies: Sequence[Body], tip: TipLoad | None
 ) -> list[TorqueDerivatives]:
     """Run (52)-(60) over a whole chain; arguments and result as of `recursion`."""
-    torques = []
+    torques: list[TorqueDerivatives] = []
     beyond = _NO_REACTION if tip is None else _tip_reaction(tip, bodies)
     for link, state, body in zip(reversed(links), reversed(states), reversed(bodies), strict=True):
-        reaction = _backward(body, beyond)
-        torques.append(_project(link, state, body, reaction))
-        if len(torques) < len(links):
-            beyond = _in_previous_frame(body.rotation, reaction)
+        of_base = body is bodies[0]
+        torque, beyond = call(state.rates[0], _backward, link, state, body, beyond, of_base)
+        torques.append(torque)
     return torques[::-1]
 
 
@@ -229,7 +229,7 @@ def _tip_reaction(tip: TipLoad, bodies: Sequence[Body]) -> _Reaction:
 
 def _into_last_frame(rotations: Sequence[Rotation], v: Vector) -> Vector:
     for rotation in rotations:
-        v = rotation.undo(v)
+        v = call(v.x, Rotation.undo, rotation, v)
     return v
 
 
@@ -240,7 +240,16 @@ def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vec
     return u, du + w_u, ddu + cross(w, du) * 2 + cross(g, u) + cross(w, w_u)
 
 
-def _backward(body: Body, tip: _Reaction) -> _Reaction:
+def _backward(
+    link: LinkConstants, state: JointState, body: Body, beyond: _Reaction, of_base: bool
+) -> tuple[TorqueDerivatives, _Reaction]:
+    """The torque of a joint, and what its link demands of the one before, if that is not the base."""
+    reaction = _reaction(body, beyond)
+    torque = _project(link, state, body, reaction)
+    return torque, _NO_REACTION if of_base else _in_previous_frame(body.rotation, reaction)
+
+
+def _reaction(body: Body, tip: _Reaction) -> _Reaction:
     (c, dc, ddc), (p, dp, ddp) = body.c, body.p
     force, dforce, ddforce = body.force
     moment, dmoment, ddmoment = body.moment

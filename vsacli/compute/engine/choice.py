@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.compute.engine.engines import Engine, Kernel, NumPyEngine, Tell, TracedEngine, unheard
+
+if TYPE_CHECKING:
+    from vsacli.compute.engine.libraries import Code
 
 NAMES = ("numpy", "c", "auto")
 """Engines that may be asked for."""
@@ -74,7 +77,7 @@ def choose(
     try:
         compiler = system_compiler()
         engine = CompiledEngine(compiler, threads, tell)
-        loaded = engine.prepare(kernel, lambda operations: name == "c" or _repays(operations, samples))
+        loaded = engine.prepare(kernel, lambda code: name == "c" or _repays(code, samples))
     except CompilerError as error:
         if name == "c":
             raise InputError.one(f"{error}; the engine numpy needs none") from error
@@ -113,13 +116,12 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
     check_engine(name)
     if name == "numpy" or (name == "auto" and samples < LOOK_FROM):
         return Settled("numpy")
-    from vsacli.compute.engine.compiled_engine import MOST_RECORDED, operation_count
+    from vsacli.compute.engine.compiled_engine import kernel_code
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
-    from vsacli.compute.engine.engines import kernel_program
 
     try:
         compiler = system_compiler()
-        repays = name == "c" or _repays(operation_count(kernel_program(kernel, MOST_RECORDED)), samples)
+        repays = name == "c" or _repays(kernel_code(kernel), samples)
     except CompilerError as error:
         if name == "c":
             raise InputError.one(f"{error}; the engine numpy needs none") from error
@@ -139,12 +141,10 @@ def check_engine(name: str) -> None:
         raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
 
 
-def _repays(operations: int, samples: int) -> bool:
-    """Whether NumPy would be busy for longer than the compiler."""
-    from vsacli.compute.engine.libraries import MOST_OPERATIONS, compiling_seconds
-
-    repays = operations * samples * NUMPY_SECONDS > compiling_seconds(operations)
-    return repays and operations <= MOST_OPERATIONS
+def _repays(code: Code, samples: int) -> bool:
+    """Whether NumPy would be busy for longer than the compiler, which is done in time."""
+    repays = code.operations * samples * NUMPY_SECONDS > code.compiling_seconds
+    return repays and not code.takes_too_long
 
 
 def _numpy(samples: int) -> Engine:

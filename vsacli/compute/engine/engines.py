@@ -132,8 +132,8 @@ def _row_function(kernel: Kernel) -> RowFunction | None:
         return None
 
 
-def kernel_program(kernel: Kernel, most: int = sys.maxsize) -> Program:
+def kernel_program(kernel: Kernel, most: int = sys.maxsize, *, calling: bool = False) -> Program:
     """What a kernel does to one sample; arguments and errors as of `trace`."""
     from vsacli.compute.tracing import Kind, trace
 
-    return trace(kernel, [Kind.REAL] * kernel.inputs, most)
+    return trace(kernel, [Kind.REAL] * kernel.inputs, most, calling=calling)

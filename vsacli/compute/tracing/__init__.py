@@ -1,8 +1,22 @@
 """Tracing: run on symbols, the text that NumPy runs leaves a program, which becomes Python or C."""
 
-from vsacli.compute.tracing import traced_control_flow  # noqa: F401  (registers loops and branches of symbols)
+from vsacli.compute.tracing import (  # noqa: F401  (register loops, branches and calls of symbols)
+    traced_calls,
+    traced_control_flow,
+)
 from vsacli.compute.tracing.array import TracedArray, cells_of, trace
 from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol
-from vsacli.compute.tracing.tape import Tape
+from vsacli.compute.tracing.tape import MOST_RECORDED, Tape, TooLongError
 
-__all__ = ["Kind", "Operand", "Program", "Symbol", "Tape", "TracedArray", "cells_of", "trace"]
+__all__ = [
+    "MOST_RECORDED",
+    "Kind",
+    "Operand",
+    "Program",
+    "Symbol",
+    "Tape",
+    "TooLongError",
+    "TracedArray",
+    "cells_of",
+    "trace",
+]

@@ -158,7 +158,11 @@ def _index(index: Any) -> Any:
 
 
 def trace(
-    function: Callable[[Sequence[Any]], Sequence[Any]], kinds: Sequence[Kind], most: int = sys.maxsize
+    function: Callable[[Sequence[Any]], Sequence[Any]],
+    kinds: Sequence[Kind],
+    most: int = sys.maxsize,
+    *,
+    calling: bool = False,
 ) -> Program:
     """The program of a function of rows of samples: what it does to one sample.
 
@@ -166,10 +170,11 @@ def trace(
         function: from rows of samples to rows of results; each sample is computed by itself.
         kinds: of the rows that it takes.
         most: operations that are recorded.
+        calling: whether calls are recorded as such, else what they do.
 
     Raises:
-        NotImplementedError: it has no such program, or one of more operations.
+        NotImplementedError: it has no such program, or, as `TooLongError`, one of more operations.
     """
-    tape = Tape(most)
+    tape = Tape(most, calling)
     rows = [TracedArray(tape, [tape.input(kind)]) for kind in kinds]
     return tape.program([cells_of(result).item() for result in function(rows)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from vsacli.compute.tracing.c_tables import Place, Tables
@@ -19,6 +19,7 @@ from vsacli.compute.tracing.program import (
     Symbol,
     Table,
     kind_of,
+    kinds_of_operands,
 )
 
 INFIX = {
@@ -110,6 +111,18 @@ class Dialect(ABC):
     def replaced(self, kind: Kind, truth: str, new: str, old: str) -> str:
         """The new value, for samples for which a truth value holds, in a place where it does for one."""
 
+    @abstractmethod
+    def from_slot(self, kind: Kind, slot: str) -> str:
+        """The value of a kind that lies in a place for real ones."""
+
+    @abstractmethod
+    def to_slot(self, kind: Kind, value: str) -> str:
+        """A value of a kind as it lies in a place for real ones."""
+
+    @abstractmethod
+    def from_table(self, entry: str) -> str:
+        """A real value from a table of constants."""
+
     def constant(self, value: float | int | bool, kind: Kind) -> str:
         """A constant of a kind."""
         if kind is Kind.TRUTH:
@@ -138,9 +151,9 @@ class Writer:
         self._dialect = dialect
         self._tables = tables
 
-    def statements(self, program: Program, names: Names, prefix: str = "v") -> Iterator[str]:
-        """Declarations of all values of a program, in its order; names of values begin with the prefix."""
-        for symbol in program.operations:
+    def statements(self, operations: Iterable[Symbol], names: Names, prefix: str = "v") -> Iterator[str]:
+        """Declarations of the values of operations, in their order; names of values begin with the prefix."""
+        for symbol in operations:
             if symbol.operation in {"loop", "branch"}:
                 yield from self._nested(symbol, names, prefix)
             elif symbol.operation != "item":
@@ -159,7 +172,7 @@ class Writer:
             return self._from_table(table, symbol, names, prefix)
         texts = [
             self.value(operand, kind, names, prefix)
-            for operand, kind in zip(symbol.operands, _kinds_of_operands(symbol), strict=True)
+            for operand, kind in zip(symbol.operands, kinds_of_operands(symbol), strict=True)
         ]
         if operation in INFIX and not (operation in BITWISE and symbol.kind is Kind.TRUTH):
             return f"{texts[0]} {INFIX[operation]} {texts[1]}"
@@ -238,7 +251,7 @@ class Writer:
     def _body(self, body: Program, own: str, names: Names, results: list[str], where: str) -> Iterator[str]:
         """Statements of a body, and its outputs put into variables all at once."""
         prefix = f"{own}_v"
-        yield from self.statements(body, names, prefix)
+        yield from self.statements(body.operations, names, prefix)
         kinds = [kind_of(output) for output in body.outputs]
         for result, output, kind in zip(results, body.outputs, kinds, strict=False):
             value = self.value(output, kind, names, prefix)
@@ -264,13 +277,3 @@ def _name(symbol: Symbol, names: Names, prefix: str) -> str:
 def _renamed(body: Program, texts: list[str]) -> Names:
     """The inputs of a body by what they are given."""
     return {symbol.index: text for symbol, text in zip(body.inputs, texts, strict=True)}
-
-
-def _kinds_of_operands(symbol: Symbol) -> list[Kind]:
-    """As what each operand counts, which decides how a constant is written."""
-    if symbol.operation == "where":
-        return [Kind.TRUTH, symbol.kind, symbol.kind]
-    if symbol.operation == "bits":
-        return [Kind.TRUTH, Kind.BITS]
-    kind = next((operand.kind for operand in symbol.operands if isinstance(operand, Symbol)), Kind.REAL)
-    return [kind] * len(symbol.operands)

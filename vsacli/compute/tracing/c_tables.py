@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
-from vsacli.compute.tracing.program import Branch, Loop, Program, Table
+from vsacli.compute.tracing.program import Branch, Call, Loop, Program, Table
 
 
 class ConstantArray(NamedTuple):
@@ -51,7 +51,7 @@ class Tables:
     """
 
     def __init__(self, programs: Iterable[Program], array_type: ArrayType) -> None:
-        uses = [use for program in programs for use in table_uses(program)]
+        uses = list(table_uses(*programs))
         distinct = dict.fromkeys(table for table, _ in uses)
         contents: list[tuple[float, ...]] = []
         self._places = {
@@ -82,11 +82,20 @@ def _part(contents: list[tuple[float, ...]], values: tuple[float, ...]) -> tuple
     return len(contents) - 1, 0
 
 
-def table_uses(program: Program) -> Iterator[tuple[Table, str]]:
-    """Tables with the operations on them, in bodies also."""
+def table_uses(*programs: Program) -> Iterator[tuple[Table, str]]:
+    """Tables with the operations on them, in bodies also, of which each is looked at once."""
+    seen: set[int] = set()
+    for program in programs:
+        yield from _uses(program, seen)
+
+
+def _uses(program: Program, seen: set[int]) -> Iterator[tuple[Table, str]]:
+    if id(program) in seen:
+        return
+    seen.add(id(program))
     for symbol in program.operations:
         for operand in symbol.operands:
             if isinstance(operand, Table):
                 yield operand, symbol.operation
-            elif isinstance(operand, Loop | Branch):
-                yield from table_uses(operand.body)
+            elif isinstance(operand, Loop | Branch | Call):
+                yield from _uses(operand.body, seen)

@@ -6,7 +6,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from vsacli.compute.tracing.program import Branch, Loop, Operand, Program, Symbol
+from vsacli.compute.tracing.program import Branch, Call, Loop, Operand, Program, Symbol
+
+Shortened = dict[tuple[int, frozenset[int]], Program]
+"""What is left of programs that are called, by their identity and the places of the outputs that are read."""
 
 
 def without_dead_code(
@@ -15,6 +18,7 @@ def without_dead_code(
     """The program that computes these outputs by those of the operations that they need."""
     needed = {output.index for output in outputs if isinstance(output, Symbol)}
     items: dict[int, set[int]] = defaultdict(set)
+    shortened: Shortened = {}
     kept = []
     for symbol in reversed(operations):
         if symbol.index not in needed:
@@ -26,6 +30,8 @@ def without_dead_code(
             symbol = _loop(symbol, items[symbol.index])
         elif symbol.operation == "branch":
             symbol = _branch(symbol, items[symbol.index])
+        elif symbol.operation == "call":
+            symbol = _call(symbol, items[symbol.index], shortened)
         needed.update(operand.index for operand in symbol.operands if isinstance(operand, Symbol))
         kept.append(symbol)
     return Program(tuple(inputs), tuple(reversed(kept)), tuple(outputs))
@@ -49,7 +55,7 @@ def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
             inputs.append(inner)
             given.append(operand)
     loop = Loop(shorter._replace(inputs=tuple(inputs)), limit, tuple(_chosen(numbers, live)))
-    return _like(symbol, [loop, *given])
+    return symbol.with_operands([loop, *given])
 
 
 def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
@@ -67,7 +73,23 @@ def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
         shorter._replace(inputs=tuple(inner for inner, _ in arguments)), tuple(_chosen(numbers, places))
     )
     given = [operand for _, operand in arguments]
-    return _like(symbol, [branch, truth, *_chosen(operands, places), *given])
+    return symbol.with_operands([branch, truth, *_chosen(operands, places), *given])
+
+
+def _call(symbol: Symbol, wanted: set[int], shortened: Shortened) -> Symbol:
+    """A call with the wanted outputs; calls of one program for the same outputs keep one program."""
+    (body, numbers), *operands = symbol.operands
+    places = frozenset(_places(numbers, wanted))
+    key = id(body), places
+    if key not in shortened:
+        shorter = without_dead_code(body.inputs, body.operations, _chosen(body.outputs, places))
+        used = _used(shorter)
+        inputs = tuple(inner for inner in body.inputs if inner.index in used)
+        shortened[key] = shorter._replace(inputs=inputs)
+    shorter = shortened[key]
+    left = {inner.index for inner in shorter.inputs}
+    given = [operand for inner, operand in zip(body.inputs, operands, strict=True) if inner.index in left]
+    return symbol.with_operands([Call(shorter, tuple(_chosen(numbers, places))), *given])
 
 
 def _places(numbers: Sequence[int], wanted: Iterable[int]) -> set[int]:
@@ -83,7 +105,3 @@ def _used(program: Program) -> set[int]:
     """Values that a program reads or returns."""
     operands = (operand for symbol in program.operations for operand in symbol.operands)
     return {operand.index for operand in (*operands, *program.outputs) if isinstance(operand, Symbol)}
-
-
-def _like(symbol: Symbol, operands: Sequence[Any]) -> Symbol:
-    return Symbol(symbol.tape, symbol.index, symbol.operation, tuple(operands), symbol.kind)

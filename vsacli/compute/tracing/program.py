@@ -1,7 +1,7 @@
 """The intermediate representation: programs of operations on values that are known only when they run.
 
-Each value is assigned once, and an operation stands after its operands. Loops and branches are operations,
-too: they hold the program of their body, and operations called "item" take their results apart.
+Each value is assigned once, and an operation stands after its operands. Loops, branches and calls are
+operations, too: they hold the program of their body, and operations called "item" take their results apart.
 """
 
 from __future__ import annotations
@@ -58,6 +58,10 @@ class Symbol:
         self.operation = operation
         self.operands = operands
         self.kind = kind
+
+    def with_operands(self, operands: Sequence[Any]) -> Symbol:
+        """The same value of an operation on other operands."""
+        return Symbol(self.tape, self.index, self.operation, tuple(operands), self.kind)
 
     def __add__(self, other: Scalar) -> Operand:
         return self.tape.emit("add", self, other)
@@ -140,6 +144,21 @@ class Branch(NamedTuple):
     numbers: tuple[int, ...]
 
 
+class Call(NamedTuple):
+    """A program that others call as well.
+
+    Attributes:
+        body: the program.
+        numbers: of its outputs among those that were traced.
+    """
+
+    body: Program
+    numbers: tuple[int, ...]
+
+
+NESTED = frozenset({"loop", "branch", "call"})
+"""Operations that hold a program."""
+
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")
 LOGICAL = {"logical_and": "and", "logical_or": "or", "logical_not": "not"}
 BITWISE = {"bitwise_and": "and", "bitwise_or": "or", "invert": "not"}
@@ -172,6 +191,24 @@ def kind_of(operand: Any) -> Kind:
     if isinstance(operand, Symbol):
         return operand.kind
     return Kind.TRUTH if isinstance(operand, bool) else Kind.REAL
+
+
+def kinds_of_operands(symbol: Symbol) -> list[Kind]:
+    """As what each operand counts, which decides on how a constant there is written."""
+    if symbol.operation == "where":
+        return [Kind.TRUTH, symbol.kind, symbol.kind]
+    if symbol.operation == "bits":
+        return [Kind.TRUTH, Kind.BITS]
+    if symbol.operation == "item":
+        return [Kind.REAL, Kind.INDEX]
+    if symbol.operation in NESTED:
+        nested = symbol.operands[0]
+        inputs = [inner.kind for inner in nested.body.inputs]
+        results = list(map(kind_of, nested.body.outputs))
+        return [Kind.REAL, *([Kind.TRUTH, *results] if symbol.operation == "branch" else []), *inputs]
+    of_constants = Kind.INDEX if symbol.operation == "take" else Kind.REAL
+    kind = next((operand.kind for operand in symbol.operands if isinstance(operand, Symbol)), of_constants)
+    return [kind] * len(symbol.operands)
 
 
 def result_kind(operation: str, operands: Sequence[Any]) -> Kind:

@@ -8,9 +8,12 @@ from typing import Any
 
 from vsacli.compute.tracing.constant_folding import folded
 from vsacli.compute.tracing.dead_code import without_dead_code
+from vsacli.compute.tracing.outlining import with_outlined_runs
 from vsacli.compute.tracing.program import (
     COMMUTATIVE,
+    NESTED,
     Branch,
+    Call,
     Kind,
     Loop,
     Operand,
@@ -20,17 +23,31 @@ from vsacli.compute.tracing.program import (
     kind_of,
     result_kind,
 )
+from vsacli.compute.tracing.shared_bodies import with_shared_bodies
+
+MOST_RECORDED = 50_000
+"""Operations of what becomes one function, a few of which no output needs: gcc takes a minute and 0.6 GB."""
+
+
+class TooLongError(NotImplementedError):
+    """More operations than may be recorded."""
 
 
 class Tape:
     """Operations in the order in which they were carried out; a common subexpression is there once.
 
     Args:
-        most: how many there may be; with one more it raises NotImplementedError.
+        most: how many there may be; with one more it raises `TooLongError`.
+        calling: whether calls are recorded as such, else what they do.
+
+    Attributes:
+        calls: what has been recorded of calls, by what tells them apart.
     """
 
-    def __init__(self, most: int = sys.maxsize) -> None:
+    def __init__(self, most: int = sys.maxsize, calling: bool = False) -> None:
         self._most = most
+        self.calling = calling
+        self.calls: dict[Hashable, Any] = {}
         self._symbols: dict[Hashable, Symbol] = {}
         self._inputs: list[Symbol] = []
 
@@ -70,6 +87,11 @@ class Tape:
         branch = Branch(body, tuple(range(len(otherwise))))
         return self._emit_nested("branch", body.outputs, (branch, truth, *otherwise, *arguments))
 
+    def emit_call(self, body: Program, arguments: Sequence[Operand]) -> list[Symbol]:
+        """What a program returns that was traced on a tape of its own."""
+        call = Call(body, tuple(range(len(body.outputs))))
+        return self._emit_nested("call", body.outputs, (call, *arguments))
+
     def _emit_nested(
         self, operation: str, outputs: Sequence[Operand], operands: tuple[Any, ...]
     ) -> list[Symbol]:
@@ -80,16 +102,17 @@ class Tape:
         if any(isinstance(operand, Symbol) and operand.tape is not self for operand in operands):
             raise ValueError("a value of another program is none of this one; pass it as an argument")
         if len(self._symbols) >= self._most:
-            raise NotImplementedError(f"a step takes more than {self._most} operations")
+            raise TooLongError(f"a step takes more than {self._most} operations")
         symbol = Symbol(self, len(self._symbols), operation, operands, kind)
-        fresh = operation in {"input", "loop", "branch"}
+        fresh = operation == "input" or operation in NESTED
         self._symbols[symbol if fresh else _key(operation, operands)] = symbol
         return symbol
 
     def program(self, outputs: Sequence[Operand]) -> Program:
-        """What computes these outputs from the inputs, without dead code."""
+        """What computes these outputs from the inputs, without dead code; calls are all there is."""
         operations = [symbol for symbol in self._symbols.values() if symbol.operation != "input"]
-        return without_dead_code(self._inputs, operations, outputs)
+        program = without_dead_code(self._inputs, operations, outputs)
+        return with_shared_bodies(with_outlined_runs(program)) if self.calling else program
 
 
 def _python_number(operand: Any) -> Any:

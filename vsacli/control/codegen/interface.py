@@ -8,9 +8,8 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
-from vsacli.compute.engine.compiled_engine import MOST_RECORDED
 from vsacli.compute.rows import RowLayout
-from vsacli.compute.tracing import Kind, Program, trace
+from vsacli.compute.tracing import MOST_RECORDED, Kind, Program, trace
 
 Rows = Sequence[Any]
 

@@ -136,6 +136,18 @@ class Scalar(Dialect):
         """As of `Dialect`."""
         return new
 
+    def from_slot(self, kind: Kind, slot: str) -> str:
+        """As of `Dialect`."""
+        return slot if kind is Kind.REAL else f"({self.types[kind]}){slot}"
+
+    def to_slot(self, kind: Kind, value: str) -> str:
+        """As of `Dialect`; floating-point numbers of either precision hold all flags and indices."""
+        return value if kind is Kind.REAL else f"({self.types[Kind.REAL]}){value}"
+
+    def from_table(self, entry: str) -> str:
+        """As of `Dialect`."""
+        return entry
+
 
 def _holds_float(value: float) -> bool:
     """Whether single precision has all digits of a number that is not below its range."""
@@ -222,7 +234,7 @@ def _definition(prefix: str, function: Function, program: Program, writer: Write
     names = {symbol.index: entry for symbol, entry in zip(program.inputs, entries, strict=True)}
     yield f"{signature(prefix, function)}\n{{"
     depth = 1
-    for line in writer.statements(program, names):
+    for line in writer.statements(program.operations, names):
         depth -= line == "}"
         yield "    " * depth + line
         depth += line.endswith("{")

@@ -55,8 +55,8 @@ def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
     ]
     for name, program in programs.items():
         lines += _function(name, program, recording.entries, writer)
-    code = Code("\n".join([*lines, ""]), sum(map(operation_count, programs.values())))
-    return code, np.array(numbers.values)
+    functions = tuple(map(operation_count, programs.values()))
+    return Code("\n".join([*lines, ""]), sum(functions), functions), np.array(numbers.values)
 
 
 def _function(name: str, program: Program, entries: int, writer: Writer) -> Iterator[str]:
@@ -68,7 +68,7 @@ def _function(name: str, program: Program, entries: int, writer: Writer) -> Iter
     names = {symbol.index: place for symbol, place in zip(program.inputs, places, strict=True)}
     yield f"static void {name}(const double *p, const double *y, const double *s, double *result)"
     yield "{"
-    yield from writer.statements(program, names)
+    yield from writer.statements(program.operations, names)
     for number, output in enumerate(program.outputs):
         yield f"result[{number}] = {writer.value(output, Kind.REAL, names)};"
     yield "}"

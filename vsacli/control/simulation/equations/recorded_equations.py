@@ -12,7 +12,7 @@ from vsacli.base.errors import InputError
 from vsacli.compute.engine.choice import check_engine
 from vsacli.compute.engine.compiler import CompilerError, system_compiler
 from vsacli.compute.engine.engines import Tell, unheard
-from vsacli.compute.engine.libraries import MOST_OPERATIONS, Worthwhile, compiling_seconds, load
+from vsacli.compute.engine.libraries import Worthwhile, load
 from vsacli.control.simulation.boundaries import Boundary
 from vsacli.control.simulation.budget import Budget
 from vsacli.control.simulation.closed_loop import ClosedLoop
@@ -130,18 +130,19 @@ class RecordedEquations(Equations):
                 self._program = NumberProgram(recording)
             seconds = TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
             begin = self.budget.used
-            if compiles and operations <= MOST_OPERATIONS:
+            code, _ = loop_code(recording)
+            if compiles and not code.takes_too_long:
                 yield begin + LOOK_SECONDS / seconds
-                self._load(recording, lambda _operations: False)
+                self._load(recording, lambda _code: False)
                 if self._compiled is None:
-                    yield begin + compiling_seconds(operations) / seconds
-                    self._load(recording, lambda _operations: True)
+                    yield begin + code.compiling_seconds / seconds
+                    self._load(recording, lambda _code: True)
 
     def _compiling(self) -> Iterator[float]:
         """The same for the engine "c"; that it cannot be had is an InputError."""
         yield 0.0
         try:
-            self._load(record(self.loop, self.boundaries), lambda _operations: True)
+            self._load(record(self.loop, self.boundaries), lambda _code: True)
         except CompilerError as error:
             raise InputError.one(f"{error}; the engine numpy needs none") from error
         except NotImplementedError as error:

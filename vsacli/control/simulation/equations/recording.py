@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from vsacli.compute.engine.compiled_engine import MOST_RECORDED
-from vsacli.compute.tracing import Program, Tape, TracedArray, cells_of
+from vsacli.compute.tracing import MOST_RECORDED, Program, Tape, TracedArray, cells_of
 from vsacli.control.simulation.boundaries import Boundary
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.table import Instant, Table

@@ -1,0 +1,160 @@
+"""C for programs that are nothing but calls: a function for each body, on values that lie in a workspace.
+
+A body may have hundreds of operations and be called hundreds of times, in each call on values in other places
+and with other constants. So a function is given the workspace, the constants of the call, and the places in
+the workspace of what it reads and writes.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from itertools import count
+from typing import NamedTuple
+
+from vsacli.compute.tracing.c_code import Dialect, Writer
+from vsacli.compute.tracing.program import Kind, Program, Symbol
+
+VALUES, CONSTANTS, PLACES = "values", "constants", "places"
+"""What a function calls the workspace, its constants, and the places of its arguments and results."""
+
+
+class _Function(NamedTuple):
+    """A function for the body of calls, and which of its arguments are constants."""
+
+    name: str
+    body: Program
+    constant: tuple[bool, ...]
+
+
+class CallingCode:
+    """The parts of C code for a program of calls.
+
+    Args:
+        program: one of nothing but calls and their items.
+        writer: writes the bodies.
+        dialect: how.
+
+    Attributes:
+        slots: how many values the workspace holds.
+        slot: place in the workspace of inputs and outputs, by index: of inputs in their order, from 0 on.
+    """
+
+    def __init__(self, program: Program, writer: Writer, dialect: Dialect) -> None:
+        self._writer = writer
+        self._dialect = dialect
+        self._number = dialect.array_type((), True)
+        self._functions: dict[int, _Function] = {}
+        self._constants: list[float] = []
+        self._places: list[int] = []
+        self._statements: list[str] = []
+        workspace = _Workspace(program)
+        for symbol in program.operations:
+            if symbol.operation == "call":
+                self._call(symbol, *workspace.places(symbol))
+        self.slot, self.slots = workspace.slot, workspace.slots
+
+    def declarations(self, qualifiers: str) -> Iterator[str]:
+        """Tables, and functions with these qualifiers."""
+        constants = ", ".join(self._dialect.entry(value, self._number) for value in self._constants) or "0"
+        yield f"static const {self._number} {CONSTANTS}_of_calls[] = {{{constants}}};"
+        yield f"static const int {PLACES}_of_calls[] = {{{', '.join(map(str, self._places))}}};"
+        for function in self._functions.values():
+            yield from self._definition(function, qualifiers)
+
+    def statements(self) -> Iterator[str]:
+        """What computes the outputs in the workspace from the inputs there."""
+        return iter(self._statements)
+
+    def value(self, symbol: Symbol, place: str | int) -> str:
+        """A value in the workspace."""
+        return self._dialect.from_slot(symbol.kind, f"{VALUES}[{place}]")
+
+    def _call(self, symbol: Symbol, taken: list[int], given: list[int]) -> None:
+        (body, _), *operands = symbol.operands
+        constant = tuple(not isinstance(operand, Symbol) for operand in operands)
+        unnamed = _Function(f"part_{len(self._functions)}", body, constant)
+        function = self._functions.setdefault(id(body), unnamed)
+        constants = f"{CONSTANTS}_of_calls + {len(self._constants)}"
+        self._statements.append(
+            f"{function.name}({VALUES}, {constants}, {PLACES}_of_calls + {len(self._places)});"
+        )
+        self._constants += [float(operand) for operand in operands if not isinstance(operand, Symbol)]
+        self._places += taken + given
+
+    def _definition(self, function: _Function, qualifiers: str) -> Iterator[str]:
+        """A function that loads what is first needed, and stores results at once: fewer values to keep."""
+        types, body = self._dialect.types, function.body
+        values, table = f"{types[Kind.REAL]} *{VALUES}", f"const {self._number} *{CONSTANTS}"
+        yield f"{qualifiers} void {function.name}({values}, {table}, const int *{PLACES})"
+        yield "{"
+        sources, names = self._sources(function), dict[int, str]()
+        results = (output.index for output in body.outputs if isinstance(output, Symbol))
+        stored = dict(zip(results, count(function.constant.count(False)), strict=False))
+        for symbol in body.operations:
+            for operand in _values(symbol):
+                if operand.index in sources and operand.index not in names:
+                    names[operand.index] = f"x{operand.index}"
+                    yield f"const {types[operand.kind]} x{operand.index} = {sources[operand.index]};"
+            yield from self._writer.statements([symbol], names)
+            if symbol.index in stored:
+                value = self._dialect.to_slot(symbol.kind, self._writer.value(symbol, symbol.kind, names))
+                yield f"{VALUES}[{PLACES}[{stored[symbol.index]}]] = {value};"
+        yield "}"
+
+    def _sources(self, function: _Function) -> dict[int, str]:
+        """Where the inputs of a body come from."""
+        sources, values, constants = {}, 0, 0
+        for symbol, constant in zip(function.body.inputs, function.constant, strict=True):
+            if constant:
+                sources[symbol.index] = self._dialect.from_table(f"{CONSTANTS}[{constants}]")
+                constants += 1
+            else:
+                sources[symbol.index] = self.value(symbol, f"{PLACES}[{values}]")
+                values += 1
+        return sources
+
+
+class _Workspace:
+    """Where values lie while they are live; results of a call never where its arguments do.
+
+    Attributes:
+        slot: place of each value, by index.
+        slots: how many there are.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.slot = {symbol.index: place for place, symbol in enumerate(program.inputs)}
+        self.slots = len(self.slot)
+        self._free: list[int] = []
+        self._items: dict[int, list[Symbol]] = defaultdict(list)
+        self._last_use: dict[int, int] = {}
+        for symbol in program.operations:
+            if symbol.operation == "item":
+                self._items[symbol.operands[0].index].append(symbol)
+            else:
+                self._last_use |= {operand.index: symbol.index for operand in _values(symbol)}
+        for output in program.outputs:
+            if isinstance(output, Symbol):
+                self._last_use.pop(output.index, None)
+
+    def places(self, call: Symbol) -> tuple[list[int], list[int]]:
+        """Those of the arguments and of the results of the next call."""
+        order = call.operands[0].numbers
+        items = sorted(self._items[call.index], key=lambda item: order.index(item.operands[1]))
+        taken = [self.slot[operand.index] for operand in _values(call)]
+        given = [self._allocated(item) for item in items]
+        dead = {operand.index for operand in _values(call) if self._last_use.get(operand.index) == call.index}
+        self._free += [self.slot[index] for index in dead]
+        return taken, given
+
+    def _allocated(self, item: Symbol) -> int:
+        if not self._free:
+            self._free.append(self.slots)
+            self.slots += 1
+        self.slot[item.index] = self._free.pop()
+        return self.slot[item.index]
+
+
+def _values(symbol: Symbol) -> Iterator[Symbol]:
+    return (operand for operand in symbol.operands if isinstance(operand, Symbol))
