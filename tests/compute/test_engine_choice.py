@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import re
+import shutil
 import stat
+import sys
 import tempfile
 from pathlib import Path
 
@@ -99,6 +102,41 @@ def test_compiler_that_does_not_work(
     assert not [path for path in own_cache.rglob("*") if path.is_file()]
 
 
+def without_cc(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    monkeypatch.setitem(sys.modules, "ziglang", None)
+    monkeypatch.setenv("PATH", str(folder))
+
+
+def test_without_a_compiler_the_message_says_how_to_get_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    without_cc(monkeypatch, tmp_path)
+    reason = "there is no C compiler 'cc' (pip install 'vsacli[compiler]' gets one)"
+    assert choose("auto", KERNEL, 10_000_000).reason == f"NumPy computes: {reason}"
+    with pytest.raises(InputError) as raised:
+        choose("c", KERNEL, 1)
+    assert str(raised.value) == f"{reason}; the engine numpy needs none"
+
+
+@needs_compiler
+def test_the_compiler_of_a_package_is_found_where_the_system_has_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """One that passes on to the system's compiler stands for the genuine package, which `.ci/run` tries."""
+    package = tmp_path / "ziglang"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "__main__.py").write_text(
+        f"import os, sys\nassert sys.argv[1] == 'cc'\nos.environ['PATH'] = {os.environ['PATH']!r}\n"
+        f"os.execv({shutil.which('cc')!r}, sys.argv[1:])\n"
+    )
+    without_cc(monkeypatch, tmp_path)
+    monkeypatch.delitem(sys.modules, "ziglang")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    chosen = choose("c", KERNEL, 1, 1)
+    assert chosen.reason.startswith("C code computes, compiled now")
+    assert re.fullmatch(r"python -m ziglang cc \S+", chosen.compiler)
+
+
 def test_link_torques_refuse_an_unknown_engine():
     with pytest.raises(InputError, match="unknown engine"):
         link_torques(vsa_3r(), *random_motion(vsa_3r(), 2, seed=1), engine="fortran")
@@ -146,8 +184,8 @@ def test_no_threads_are_refused(vsacli, motion):
 
 def test_compiling_repays_neither_for_little_work_nor_for_long_code():
     short, arm, long = (Code("", sum(functions), functions) for functions in ((200,), (4_500,), (100_000,)))
-    assert [choice._repays(code, 300_000) for code in (short, arm, long)] == [False, True, False]
-    assert choice._repays(Code("", 100_000, (500,) * 200), 300_000)
+    assert [choice._repays(code, 1_000_000) for code in (short, arm, long)] == [False, True, False]
+    assert choice._repays(Code("", 100_000, (500,) * 200), 1_000_000)
 
 
 # Environments in which "auto" computes with NumPy, and "c" says why it cannot

@@ -128,7 +128,7 @@ engine_option = click.option(
     type=click.Choice(["numpy", "c", "auto"]),
     default="auto",
     show_default=True,
-    help="What computes: NumPy, or code from the system's C compiler; auto takes what is faster.",
+    help="What computes: NumPy, or code from a C compiler; auto takes what is faster.",
 )
 
 

@@ -1,4 +1,4 @@
-"""Who carries out a computation on rows of samples: NumPy, or code from the system's C compiler."""
+"""Who carries out a computation on rows of samples: NumPy, or code from a C compiler."""
 
 from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, Settled, choose, processors, settle
 from vsacli.compute.engine.engines import Engine, Kernel, Tell, samples_per_pass, unheard

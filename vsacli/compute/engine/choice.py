@@ -15,14 +15,17 @@ if TYPE_CHECKING:
 NAMES = ("numpy", "c", "auto")
 """Engines that may be asked for."""
 
-NUMPY_SECONDS = 0.9e-9
-"""What NumPy takes for an operation on a sample."""
+NUMPY_SECONDS = 0.3e-9
+"""What NumPy takes for an operation on a sample: 0.22 to 0.31 ns in traced programs of the shipped robots,
+some more where loops run until the last sample is done."""
 
-LOOK_FROM = 20_000
-"""Samples with which it is busy for longer than it takes to see whether there is compiled code."""
+LOOK_FROM = 50_000
+"""Samples with which it is busy for longer than it takes to see whether there is compiled code: recording and
+asking the compiler for its version take 50 to 110 ms, which is what NumPy takes for 50,000 to 130,000."""
 
 TRACE_FROM = 100_000
-"""Samples from which on NumPy saves more time with a traced program than tracing it takes."""
+"""Samples from which on NumPy saves more time with a traced program than tracing takes: 83,000 to 158,000 for
+robots of one to seven joints."""
 
 NUMPY: Engine = NumPyEngine()
 

@@ -1,4 +1,4 @@
-"""The C compiler of the system, and the libraries that it makes, loaded."""
+"""The C compiler, of the system or of a package, and the libraries that it makes, loaded."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ import platform
 import re
 import shlex
 import subprocess
+import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.util import find_spec
 from itertools import pairwise
 from pathlib import Path
 
@@ -25,6 +28,9 @@ NATIVE = "-march=native"
 
 FLAGS = ("-std=gnu11", "-O2", NATIVE, "-fno-math-errno", "-ffp-contract=fast", "-fPIC", "-shared")
 """None of those that let the compiler assume away NaN, or that change the arithmetic of the whole process."""
+
+ZIG_COMPILER = (sys.executable, "-m", "ziglang", "cc")
+"""Clang with headers and linker, in a package that pip installs."""
 
 TIMEOUT = 120.0
 """Seconds that a compiler may take."""
@@ -59,7 +65,7 @@ class Compiler:
     def name(self) -> str:
         """Command and version, for the record."""
         found = re.search(r'^#define __VERSION__ "(.*)"$', self.identity, re.MULTILINE)
-        return " ".join([*self.command, *([found[1]] if found else [])])
+        return " ".join([_spoken(self.command), *([found[1]] if found else [])])
 
     def build(self, source: Path, library: Path) -> None:
         """Compile a source file to a shared library.
@@ -67,49 +73,73 @@ class Compiler:
         Raises:
             CompilerError: it could not be done.
         """
-        _output([*self.command, *FLAGS, "-o", str(library), str(source), "-lm"])
+        _output(self.command, *FLAGS, "-o", str(library), str(source), "-lm", kept=library.parent)
         if not library.exists():
-            raise CompilerError(f"the C compiler {self.command[0]!r} made no library")
+            raise CompilerError(f"the C compiler {_spoken(self.command)!r} made no library")
 
 
 def system_compiler() -> Compiler:
-    """The compiler that the environment variable CC names, else `cc`.
+    """The compiler that the environment variable CC names; else `cc`, else that of the package ziglang.
 
     Raises:
         CompilerError: there is none, or it does not work.
     """
-    wanted = os.environ.get("CC") or "cc"
+    path = os.environ.get("PATH", "")
+    if wanted := os.environ.get("CC"):
+        return _examined(_command(wanted), path)
     try:
-        command = tuple(shlex.split(wanted)) or ("cc",)
+        return _examined(("cc",), path)
+    except CompilerError as error:
+        if find_spec("ziglang") is None:
+            raise CompilerError(f"{error} (pip install 'vsacli[compiler]' gets one)") from None
+    return _examined(ZIG_COMPILER, path)
+
+
+def _command(wanted: str) -> tuple[str, ...]:
+    try:
+        return tuple(shlex.split(wanted)) or ("cc",)
     except ValueError as error:
         raise CompilerError(f"the environment variable CC is no command: {wanted!r} ({error})") from None
-    return _examined(command, os.environ.get("PATH", ""))
 
 
 @lru_cache(maxsize=4)
 def _examined(command: tuple[str, ...], _path: str) -> Compiler:
-    macros = _output([*command, NATIVE, "-dM", "-E", "-x", "c", os.devnull])
+    macros = _output(command, NATIVE, "-dM", "-E", "-x", "c", os.devnull)
     if any(f"#define {lie}\n" in f"{macros}\n" for lie in LIES):
         raise CompilerError(
-            f"{shlex.join(command)!r} asks for -ffast-math or the like, under which NaN goes unnoticed"
+            f"{_spoken(command)!r} asks for -ffast-math or the like, under which NaN goes unnoticed"
         )
     return Compiler(command, "\n".join((macros, *platform.libc_ver(), *FLAGS)))
 
 
-def _output(command: list[str]) -> str:
+def _spoken(command: tuple[str, ...]) -> str:
+    """A command in messages and for the record, where it does not matter which folder Python is in."""
+    return shlex.join("python" if part == sys.executable else part for part in command)
+
+
+def _output(compiler: tuple[str, ...], *arguments: str, kept: Path | None = None) -> str:
+    """What a compiler prints; what it keeps for another time, as zig does, goes into a folder `kept`."""
+    environment = None if kept is None else {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(kept)}
+    name = f"C compiler {_spoken(compiler)!r}"
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", timeout=TIMEOUT, check=False
+            [*compiler, *arguments],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=TIMEOUT,
+            check=False,
+            env=environment,
         )
     except FileNotFoundError:
-        raise CompilerError(f"there is no C compiler {command[0]!r}") from None
+        raise CompilerError(f"there is no {name}") from None
     except OSError as error:
-        raise CompilerError(f"the C compiler {command[0]!r} cannot be run: {error}") from None
+        raise CompilerError(f"the {name} cannot be run: {error}") from None
     except subprocess.TimeoutExpired:
-        raise CompilerError(f"the C compiler {command[0]!r} took more than {TIMEOUT:g} s") from None
+        raise CompilerError(f"the {name} took more than {TIMEOUT:g} s") from None
     if done.returncode:
         lines = done.stderr.strip().splitlines() or [f"it ended with {done.returncode} and no message"]
-        raise CompilerError(f"the C compiler {command[0]!r} fails: {lines[0]}")
+        raise CompilerError(f"the {name} fails: {lines[0]}")
     return done.stdout
 
 
@@ -126,6 +156,7 @@ class Library:
 
     def __init__(self, path: Path, outputs: int) -> None:
         self._outputs = outputs
+        _load_vector_functions()
         try:
             self._run = ctypes.CDLL(str(path)).run
         except (OSError, AttributeError) as error:
@@ -147,6 +178,13 @@ class Library:
         for part in running:
             part.result()
         return outputs
+
+
+@cache
+def _load_vector_functions() -> None:
+    """Those of glibc, to which a compiler that brings its own C library does not link; others have none."""
+    with suppress(OSError):
+        ctypes.CDLL("libmvec.so.1", mode=ctypes.RTLD_GLOBAL)
 
 
 @lru_cache(maxsize=1)

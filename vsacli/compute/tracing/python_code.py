@@ -140,6 +140,7 @@ class _RowAllocation:
             for operand in symbol.operands
             if isinstance(operand, Symbol)
         }
+        self._returned = {output.index for output in program.outputs if isinstance(output, Symbol)}
         self._output_row: dict[int, str] = {}
         for number, output in enumerate(program.outputs):
             if isinstance(output, Symbol) and output.kind is Kind.REAL and output.operation != "input":
@@ -200,9 +201,8 @@ class _RowAllocation:
 
     def _free_dead_operands(self, symbol: Symbol, number: int) -> None:
         """The rows of operands that are not needed any more, and of no output, may be used again."""
-        kept = {output.index for output in self._program.outputs if isinstance(output, Symbol)}
         for operand in dict.fromkeys(part for part in symbol.operands if isinstance(part, Symbol)):
-            dead = self._last_use[operand.index] == number and operand.index not in kept
+            dead = self._last_use[operand.index] == number and operand.index not in self._returned
             if dead and operand.operation != "input":
                 self._free[operand.kind].append(self._row[operand.index])
 
