@@ -24,6 +24,7 @@ import sensitivities
 import simulations
 import stages
 import storage
+import whole_runs
 from machine import description
 from subjects import ROOT
 
@@ -50,6 +51,7 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     runs = (stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c"))
     yield "stages", page.stage_table(*runs)
     yield "storage", page.storage_table(storage.compare(repeats))
+    yield "whole", page.whole_table(whole_runs.compare(2 * SAMPLES, repeats))
     yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats))
     yield "sensitivity", page.sensitivity_part(sensitivities.compare(3 * repeats))
     yield "simulations", page.simulation_table(simulations.compare(repeats))

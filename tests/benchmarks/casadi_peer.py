@@ -27,13 +27,13 @@ double link_torques_of_rows(const double *rows, double *torques, long samples) {
   struct timespec begin, end;
   casadi_real work[%(work)d];
   casadi_int integers[%(integers)d];
-  clock_gettime(CLOCK_MONOTONIC, &begin);
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &begin);
   for (long k = 0; k < samples; ++k) {
     const casadi_real *argument[%(arguments)d] = {rows + k * %(inputs)d};
     casadi_real *result[%(results)d] = {torques + k * %(outputs)d};
     link_torques(argument, result, integers, work, 0);
   }
-  clock_gettime(CLOCK_MONOTONIC, &end);
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &end);
   return (end.tv_sec - begin.tv_sec) + 1e-9 * (end.tv_nsec - begin.tv_nsec);
 }
 """
@@ -64,7 +64,7 @@ class CasadiPeer:
         self.operations = function.n_instructions()
 
     def __call__(self, motion: list[FloatArray]) -> tuple[float, FloatArray]:
-        """Seconds in the C loop, and the torques with two derivatives, (samples, 3 joints)."""
+        """Processor seconds in the C loop, and the torques with two derivatives, (samples, 3 joints)."""
         rows = np.ascontiguousarray(np.concatenate(motion, axis=1))
         torques = np.empty((len(rows), 3 * self._joints))
         pointers = [array.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for array in (rows, torques)]

@@ -14,6 +14,7 @@ from simulations import COMPILED, RECORDED, TEXT, Simulated
 from stages import Stages
 from storage import Stored
 from timing import Seconds
+from whole_runs import WholeRun
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -120,6 +121,18 @@ def storage_table(found: Mapping[str, Mapping[str, Stored]]) -> str:
 
 def _cell(stored: Stored) -> str:
     return f"{micro(stored.write)}, {micro(stored.read)}, {stored.size:.0f}"
+
+
+def whole_table(runs: Iterable[WholeRun]) -> str:
+    """Whole runs, against casadi's link torques."""
+    header = ("7R arm, stored", "µs of a processor a sample", "over casadi's link torques", "by two threads")
+    return table(
+        header,
+        (
+            [run.stored, micro(run.seconds), f"{run.ratio:.2g}", f"{run.faster:.2g} times as fast"]
+            for run in runs
+        ),
+    )
 
 
 def sensitivity_part(found: Sensitivities) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from samples.drives import ALIKE, joint_with, springs
+from samples.drives import ALIKE, joint_with, motion, springs
 from samples.engines import assert_agree, demands, kinds_of_steps, random_wrench
 from samples.marks import needs_compiler, slow, slow_but
 from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
@@ -23,6 +23,7 @@ from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.laws.quadratic import Quadratic
 from vsacli.actuators.laws.sinh import Sinh
+from vsacli.analysis.run import Run
 from vsacli.base.flags import Flag
 from vsacli.compute.engine import choose, compiler
 from vsacli.compute.engine.engines import Engine
@@ -192,6 +193,24 @@ def test_results_depend_neither_on_blocks_nor_on_threads():
     )
     for name, array in one.arrays().items():
         np.testing.assert_array_equal(three.arrays()[name], array)
+
+
+@pytest.mark.usefixtures("quickly")
+@pytest.mark.parametrize("stop", [False, True])
+def test_runs_depend_neither_on_blocks_nor_on_threads(stop: bool):
+    """Nor does what they sum up and report, although a thread computes ahead of it."""
+    infeasible = motion(stiffness=(850, 850, 830), end_stiffness=(850, 850, 790), duration=2)
+    runs = [
+        Run(vsa_3r(), infeasible, engine="c", threads=threads, block_samples=samples, stop_on_infeasible=stop)
+        for threads, samples in ((1, 1000), (2, 7), (3, 64))
+    ]
+    one, *others = ([block.arrays() for block in run] for run in runs)
+    assert runs[0].report().verdict == "infeasible"
+    for run, blocks in zip(runs[1:], others, strict=True):
+        assert len(blocks) > 1
+        for name, array in one[0].items():
+            np.testing.assert_array_equal(np.concatenate([block[name] for block in blocks]), array)
+        assert run.report().as_json() == runs[0].report().as_json()
 
 
 def test_link_torques_of_no_samples():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from vsacli.analysis.result import Result
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
+from vsacli.dynamics.energy import EnergyMeter, Flow
 from vsacli.dynamics.quadrature import integrals, positive_part
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -231,6 +233,23 @@ def test_nothing_depends_on_the_blocks():
         joined = np.concatenate([block.motor_energy for block in run])
         np.testing.assert_array_equal(joined, expected.motor_energy)
         assert run.report().as_json() == expected.report.as_json()
+
+
+@pytest.mark.parametrize("joints", [1, 3])
+def test_sums_do_not_depend_on_how_intervals_are_divided(joints: int):
+    rng = np.random.default_rng(3)
+    shapes = (), (joints, 2), (joints, 2), (joints,), (joints,)
+    parts = [rng.uniform(0, 1, (*shape, 1000)) for shape in shapes]
+    robot = all_rigid("R" * joints, seed=1)
+    reports, works = [], []
+    for ends in ([0, 1000], [0, 1, 9, 400, 401, 1000]):
+        meter = EnergyMeter()
+        pieces = [Flow(*(part[..., slice(*each)].copy() for part in parts)) for each in pairwise(ends)]
+        works.append(np.concatenate([meter.add(piece) for piece in pieces], axis=-1))
+        meter.add_stored(np.zeros((joints, 1)))
+        reports.append(meter.report(robot))
+    np.testing.assert_array_equal(*works)
+    assert [each.spent for each in reports[0]] == [each.spent for each in reports[1]]
 
 
 def test_work_is_unknown_from_the_first_missing_torque_on():
