@@ -1,7 +1,7 @@
 """Print whether engines agree on flags: `python tests/benchmarks/flags.py`, on a million random demands.
 
-Of every robot in `robots/`, with steps of all kinds: feasible, at the edge of the corridor, beyond it. Flags may
-differ where a step lies within rounding of a threshold. It compiles each robot, which takes minutes once.
+Of every robot in `robots/`, with steps of all kinds: feasible, at the edge of the corridor, beyond it. Flags
+may differ where a step lies within rounding of a threshold. It compiles each robot, which takes minutes once.
 """
 
 from __future__ import annotations
@@ -50,8 +50,7 @@ def _is_robot(path: Path) -> bool:
     """Whether inverse dynamics asks nothing but a motion and a stiffness of it."""
     if "vsacli-robot/" not in path.read_text(encoding="utf-8"):
         return False
-    robot = load_robot(path)
-    return not any(joint.damper_at("transmission") for joint in robot.joints)
+    return not any(joint.damper for joint in load_robot(path).joints)
 
 
 def main() -> None:
