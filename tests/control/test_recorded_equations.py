@@ -9,14 +9,17 @@ import pinocchio as pin
 import pytest
 from oracles import pinocchio
 from samples.closed_loops import MADE, SHIPPED, Loop, loop_of, made_loop, shipped_loop
+from samples.drives import joint_with, springs, with_joint
 from samples.marks import needs_compiler, slow, slow_but
 from samples.plants import all_rigid, with_actuators
 from samples.robots import vsa_3r
+from samples.shipped import shipped_run
 from samples.simulated import short_motion
 from samples.single_joint import single_joint, step_of
 from scipy.integrate import DOP853
 
 from vsacli.actuators.friction import Friction
+from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base.errors import InputError
@@ -209,6 +212,40 @@ def test_motors_that_stick_are_left_to_the_text():
     assert np.array_equal(auto.history.q_actual, plain.history.q_actual)
     with pytest.raises(InputError, match=r"motors with sharp friction stick and slide; take .* numpy"):
         simulate(robot, trajectory, engine="c")
+
+
+@dataclasses.dataclass(frozen=True)
+class _Own(Cubic):
+    """A law whose text takes what arrays of numbers have, and arrays of symbols have not."""
+
+    def torque(self, phi):
+        return super().torque(phi.clip(-3, 3))
+
+
+@dataclasses.dataclass(frozen=True)
+class _Deciding(Cubic):
+    """One that decides by a number."""
+
+    def torque(self, phi):
+        return super().torque(phi if float(np.max(phi)) < 3 else 0 * phi)
+
+
+@pytest.mark.parametrize("law", [_Own, _Deciding])
+def test_laws_that_cannot_be_recorded_are_left_to_the_text(law):
+    laws = [each(k=380.0, k_c=3500.0) for each in (law, Cubic)]
+    robot, plain = (with_joint(vsa_3r(), 1, joint_with(springs(each, each))) for each in laws)
+    own, usual = (simulate(each, short_motion(3), engine="auto") for each in (robot, plain))
+    assert own.history.q_actual == pytest.approx(usual.history.q_actual, abs=1e-8)
+    assert own.provenance == PLAIN
+    with pytest.raises(InputError, match=r"this cannot be compiled: .*; take the engine numpy"):
+        simulate(robot, short_motion(3), engine="c")
+
+
+@pytest.mark.slow
+def test_potentials_are_left_to_the_text():
+    robot, trajectory = shipped_run("sliding_anchor_1r", "sliding_anchor_1r")
+    auto, plain = (simulate(robot, trajectory, engine=engine) for engine in ("auto", "numpy"))
+    assert np.array_equal(auto.history.q_actual, plain.history.q_actual)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

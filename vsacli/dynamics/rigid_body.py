@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache, reduce
+from functools import cached_property, lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ SMALLEST_PIVOT = 1e-12
 
 
 class Chain:
-    """Programs of a chain of joints; get it from `chain_of`.
+    """Programs of a chain of joints, each recorded when it is first needed; get it from `chain_of`.
 
     Arrays are (joints,) or (samples, joints) throughout. A wrench must be given if and only if the chain was
     made for one.
@@ -42,10 +42,23 @@ class Chain:
     def __init__(self, robot: Robot, frame: str | None) -> None:
         self._names = robot.joint_names
         self._lower = np.tril_indices(len(robot.joints))
-        self._inertia = _inertia_program(robot)
-        self._bias = _torque_program(robot, frame, "tau", orders=1)
-        self._rate = _torque_program(robot, frame, "dtau", orders=2)
-        self._acceleration = _torque_program(robot, frame, "ddtau", orders=4)
+        self._robot, self._frame = robot, frame
+
+    @cached_property
+    def _inertia(self) -> StateFunction:
+        return _inertia_program(self._robot)
+
+    @cached_property
+    def _bias(self) -> StateFunction:
+        return _torque_program(self._robot, self._frame, "tau", orders=1)
+
+    @cached_property
+    def _rate(self) -> StateFunction:
+        return _torque_program(self._robot, self._frame, "dtau", orders=2)
+
+    @cached_property
+    def _acceleration(self) -> StateFunction:
+        return _torque_program(self._robot, self._frame, "ddtau", orders=4)
 
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """M(q), ([samples,] joints, joints): column k is the recursion's torque at q'' = e_k alone."""

@@ -43,9 +43,13 @@ def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
     if loop.slip is not None:
         raise NotImplementedError("motors with sharp friction stick and slide")
     tape, entries = Tape(MOST_RECORDED), loop.packing.entries
-    vector, instant = _inputs(tape, entries), Instant(lambda count: _inputs(tape, count))
-    rates = tape.program(cells_of(loop.derivative(_any(instant), vector)).tolist())
-    return Recording(rates, _distances(boundaries, entries), tuple(instant.tables))
+    instant: Any = Instant(lambda count: _inputs(tape, count))
+    vector = _inputs(tape, entries)
+    try:
+        rates = tape.program(cells_of(loop.derivative(instant, vector)).tolist())
+        return Recording(rates, _distances(boundaries, entries), tuple(instant.tables))
+    except (AttributeError, IndexError, TypeError, ValueError) as error:  # as of a law of the user's own
+        raise NotImplementedError(f"it takes more than NumPy's functions of arrays: {error}") from error
 
 
 def _distances(boundaries: Sequence[Boundary], entries: int) -> Program:
@@ -57,8 +61,3 @@ def _distances(boundaries: Sequence[Boundary], entries: int) -> Program:
 def _inputs(tape: Tape, count: int) -> Any:
     """Further inputs, in place of an array of numbers."""
     return TracedArray(tape, tape.inputs(count))
-
-
-def _any(instant: Instant) -> Any:
-    """In place of a time."""
-    return instant
