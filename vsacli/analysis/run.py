@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from itertools import starmap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -104,15 +105,9 @@ class Run:
         self._samples = 0
 
     def __iter__(self) -> Iterator[Block]:
-        for block, minima in self._between.marked(self._steps()):
-            infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
-            if self._stop_on_infeasible and infeasible.any():
-                last = int(infeasible.argmax())
-                yield self._added(
-                    block.taken(slice(last + 1)), [each.where(each.step <= last) for each in minima]
-                )
-                return
-            yield self._added(block, minima)
+        """The blocks; none is kept while the next is computed, since those of long chains are large."""
+        passed = self._between.marked(self._steps())
+        return starmap(self._added, _until_infeasible(passed) if self._stop_on_infeasible else passed)
 
     def _steps(self) -> Iterator[Block]:
         """All steps, in blocks, with what holds at them; with several threads one block is computed ahead."""
@@ -246,6 +241,19 @@ def inverse_dynamics(
         robot, trajectory, stop_on_infeasible=stop_on_infeasible, deflections=deflections, engine=engine
     )
     return Result(**_joined(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
+
+
+def _until_infeasible(
+    passed: Iterable[tuple[Block, list[Minima]]],
+) -> Iterator[tuple[Block, list[Minima]]]:
+    """Blocks with their minima up to the first infeasible step."""
+    for block, minima in passed:
+        infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
+        if infeasible.any():
+            last = int(infeasible.argmax())
+            yield block.taken(slice(last + 1)), [each.where(each.step <= last) for each in minima]
+            return
+        yield block, minima
 
 
 def _integrated(

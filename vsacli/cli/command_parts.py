@@ -204,6 +204,7 @@ def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
             if writer is not None:
                 writer.write(block)
             progress.update(len(block.time))
+            del block  # which would stay in memory while the next one is computed
         report = run.report()
         if writer is not None:
             writer.finish(report.as_json())

@@ -64,9 +64,10 @@ class IntervalEnergy(RowKernel):
         given = self.arguments.unpack(rows)
         (interval,) = given["interval"]
         friction = _by_joint(given["friction"]) if self.rubbing else [None] * len(self.inertia)
+        every = [{name: _at_end(given[name], end) for name in self.at_steps} for end in range(2)]
         works, spent, springs = [], [], []
         for joint, rubbed in enumerate(friction):
-            ends = [{name: _at_end(given[name], end)[joint] for name in self.at_steps} for end in range(2)]
+            ends = [{name: of_joints[joint] for name, of_joints in at_end.items()} for at_end in every]
             of_joint = self._work(joint, interval, ends, rubbed)
             powers = (end["motor_power"] for end in ends)
             works += of_joint
@@ -129,7 +130,7 @@ class RunEnergy:
         lost = None if self._losses is None else self._losses.add(block)
         first = _every(steps, slice(1))
         before = self._last or first
-        self._last = _every(steps, slice(-1, None))
+        self._last = {name: [row[-1:].copy() for row in rows] for name, rows in steps.items()}  # no views
         self._meter.add_stored(np.moveaxis(block.elastic_energy, 0, -1))
         works = [self._flown(before, first, lost and lost.taken(slice(1)))]
         if len(block.time) > 1:
