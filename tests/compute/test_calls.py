@@ -15,14 +15,16 @@ from samples.engines import assert_agree, demands, random_wrench
 from samples.generated_code import compile_c
 from samples.long_chains import mixed_chain, random_chain
 from samples.marks import needs_compiler
+from samples.shipped import shipped_robot
 
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.control_flow import Keyed, call, repeat
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.compiler import FLAGS, Library
-from vsacli.compute.engine.engines import Kernel, kernel_program
+from vsacli.compute.engine.engines import Kernel, TracedEngine, kernel_program
 from vsacli.compute.engine.lanes import batch_source
-from vsacli.compute.tracing import Kind, Program, trace
+from vsacli.compute.tracing import Kind, Program, array, is_of_calls, trace
+from vsacli.compute.tracing.row_calls import CallingRowFunction
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
 from vsacli.robot.model import Robot
@@ -135,9 +137,13 @@ def test_of_numpys_rows_the_function_is_called():
     assert call(x, scaled, Pair(x, 1), 2).first.tolist() == [0.0, 2.0, 4.0]
 
 
+def program_of(kernel: Kernel, *, calling: bool) -> Program:
+    return trace(kernel, [Kind.REAL] * kernel.inputs, calling=calling)
+
+
 def library(kernel: Kernel, folder: Path, *, calling: bool) -> Library:
     name = f"calling_{calling}"
-    (folder / f"{name}.c").write_text(batch_source(kernel_program(kernel, calling=calling)))
+    (folder / f"{name}.c").write_text(batch_source(program_of(kernel, calling=calling)))
     flags = [flag for flag in FLAGS if not flag.startswith(("-O", "-ffp"))]
     compile_c(folder, *flags, *EXACT, f"{name}.c", "-o", f"{name}.so", "-lm")
     return Library(folder / f"{name}.so", kernel.outputs)
@@ -180,6 +186,31 @@ def test_code_of_calls_computes_the_same_bit_for_bit(joints: int, frame: str | N
     np.testing.assert_array_equal(np.signbit(found), np.signbit(expected))
 
 
+@pytest.mark.parametrize(
+    "kernel",
+    [LinkTorques(mixed_chain(7)), InverseDynamics(shipped_robot("lwr_7r_vsa"))],
+    ids=["links", "whole"],
+)
+def test_rows_go_through_calls_as_through_the_text_bit_for_bit(kernel: LinkTorques | InverseDynamics):
+    """On some rows longer and on some shorter than those that the workspace was made for."""
+    whole = InverseDynamics(kernel.robot)
+    function = CallingRowFunction(program_of(kernel, calling=True))
+    workspace = function.workspace(60)
+    for samples in (60, 23):
+        rows = rows_of(whole, samples)[: kernel.inputs]
+        found = np.empty((kernel.outputs, samples))
+        function(rows, found, workspace)
+        np.testing.assert_array_equal(found, NUMPY.run(kernel, rows))
+
+
+def test_long_chains_are_traced_by_calls_for_rows(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(array, "MOST_UNROLLED", 500)
+    kernel = LinkTorques(mixed_chain(3, seed=3))
+    rows = rows_of(InverseDynamics(kernel.robot), 5)[: kernel.inputs]
+    assert is_of_calls(kernel_program(kernel))
+    np.testing.assert_array_equal(TracedEngine().run(kernel, rows), NUMPY.run(kernel, rows))
+
+
 @needs_compiler
 @pytest.mark.slow
 def test_long_chain_agrees_with_numpy():
@@ -203,5 +234,5 @@ def test_joints_with_other_constants_need_no_other_code():
         ]
         return replace(chain, joints=tuple(joints))
 
-    twice, thrice = (bodies(kernel_program(LinkTorques(repeated(times)), calling=True)) for times in (2, 3))
+    twice, thrice = (bodies(program_of(LinkTorques(repeated(times)), calling=True)) for times in (2, 3))
     assert len(twice) == len(thrice)

@@ -10,15 +10,11 @@ from vsacli.compute.engine.compiler import Compiler, Library
 from vsacli.compute.engine.engines import Kernel, Tell, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.engine.libraries import Code, Loaded, Worthwhile, load
-from vsacli.compute.tracing import Program, Symbol, TooLongError
+from vsacli.compute.tracing import Program, Symbol
 from vsacli.compute.tracing.program import NESTED
 
 USUAL_ITERATIONS = 5
 """How often a loop is usually repeated."""
-
-MOST_UNROLLED = 8_000
-"""Operations of the longest programs that become one function, those of ten joints with cubic springs. Longer
-ones call functions, which is 6 to 9 % slower and compiled in a fraction of the time."""
 
 
 class CompiledEngine:
@@ -63,12 +59,8 @@ def kernel_code(kernel: Kernel) -> Code:
     Raises:
         NotImplementedError: it cannot be recorded.
     """
-    try:
-        program = kernel_program(kernel, MOST_UNROLLED)
-        calls = []
-    except TooLongError:
-        program = kernel_program(kernel, calling=True)
-        calls = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
+    program = kernel_program(kernel)
+    calls = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
     functions = {id(call.body): call.body for call in calls} or {id(program): program}
     carried_out = {identity: operation_count(each, USUAL_ITERATIONS) for identity, each in functions.items()}
     operations = sum(carried_out[id(call.body)] for call in calls) if calls else carried_out[id(program)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
@@ -14,7 +13,8 @@ from vsacli.compute.aligned_rows import aligned_rows
 
 if TYPE_CHECKING:
     from vsacli.compute.tracing import Program
-    from vsacli.compute.tracing.python_code import RowFunction, Workspace
+    from vsacli.compute.tracing.python_code import RowFunction, RowSpace
+    from vsacli.compute.tracing.row_calls import CallingRowFunction
 
 SAMPLES_PER_PASS = 12288
 """Samples that NumPy takes at a time: fewer waste time in the interpreter, more leave the caches."""
@@ -107,7 +107,7 @@ class TracedEngine:
     """
 
     def __init__(self) -> None:
-        self._workspaces: dict[RowFunction, Workspace] = {}
+        self._workspaces: dict[RowFunction | CallingRowFunction, RowSpace] = {}
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
         """As of `Engine`."""
@@ -123,18 +123,25 @@ class TracedEngine:
 
 
 @lru_cache(maxsize=KEPT_PROGRAMS)
-def _row_function(kernel: Kernel) -> RowFunction | None:
+def _row_function(kernel: Kernel) -> RowFunction | CallingRowFunction | None:
     """The program of a kernel on rows; None if it has loops or tables."""
+    from vsacli.compute.tracing import is_of_calls
     from vsacli.compute.tracing.python_code import RowFunction
+    from vsacli.compute.tracing.row_calls import CallingRowFunction
 
     try:
-        return RowFunction(kernel_program(kernel))
+        program = kernel_program(kernel)
+        return CallingRowFunction(program) if is_of_calls(program) else RowFunction(program)
     except NotImplementedError:
         return None
 
 
-def kernel_program(kernel: Kernel, most: int = sys.maxsize, *, calling: bool = False) -> Program:
-    """What a kernel does to one sample; arguments and errors as of `trace`."""
-    from vsacli.compute.tracing import Kind, trace
+def kernel_program(kernel: Kernel) -> Program:
+    """What a kernel does to one sample, by calls if it is long.
 
-    return trace(kernel, [Kind.REAL] * kernel.inputs, most, calling=calling)
+    Raises:
+        NotImplementedError: as of `trace`.
+    """
+    from vsacli.compute.tracing import Kind, trace_by_size
+
+    return trace_by_size(kernel, [Kind.REAL] * kernel.inputs)

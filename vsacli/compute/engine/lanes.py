@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from importlib.resources import files
 from typing import Any
 
-from vsacli.compute.tracing import Kind, Program, Symbol
+from vsacli.compute.tracing import Kind, Program, Symbol, is_of_calls
 from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations
 from vsacli.compute.tracing.c_functions import VALUES, CallingCode
 from vsacli.compute.tracing.c_tables import Place, Tables
@@ -94,8 +94,7 @@ def batch_source(program: Program) -> str:
     """A translation unit with the function `run` over rows of samples."""
     counts = [f"#define INPUTS {len(program.inputs)}", f"#define OUTPUTS {len(program.outputs)}"]
     support = files("vsacli.compute.engine").joinpath("lanes.c").read_text(encoding="utf-8")
-    calling = any(symbol.operation == "call" for symbol in program.operations)
-    group = _calling_group(program) if calling else _group(program)
+    group = _calling_group(program) if is_of_calls(program) else _group(program)
     return "\n".join([*counts, "", support, *group, ""])
 
 

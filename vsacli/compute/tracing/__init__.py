@@ -4,8 +4,8 @@ from vsacli.compute.tracing import (  # noqa: F401  (register loops, branches an
     traced_calls,
     traced_control_flow,
 )
-from vsacli.compute.tracing.array import TracedArray, cells_of, trace
-from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol
+from vsacli.compute.tracing.array import TracedArray, cells_of, trace, trace_by_size
+from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol, is_of_calls
 from vsacli.compute.tracing.tape import MOST_RECORDED, Tape, TooLongError
 
 __all__ = [
@@ -18,5 +18,7 @@ __all__ = [
     "TooLongError",
     "TracedArray",
     "cells_of",
+    "is_of_calls",
     "trace",
+    "trace_by_size",
 ]

@@ -7,13 +7,13 @@ the workspace of what it reads and writes.
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterator
 from itertools import count
 from typing import NamedTuple
 
 from vsacli.compute.tracing.c_code import Dialect, Writer
 from vsacli.compute.tracing.program import Kind, Program, Symbol
+from vsacli.compute.tracing.workspace import Workspace, values_of
 
 VALUES, CONSTANTS, PLACES = "values", "constants", "places"
 """What a function calls the workspace, its constants, and the places of its arguments and results."""
@@ -48,11 +48,11 @@ class CallingCode:
         self._constants: list[float] = []
         self._places: list[int] = []
         self._statements: list[str] = []
-        workspace = _Workspace(program)
+        workspace = Workspace(program)
         for symbol in program.operations:
             if symbol.operation == "call":
-                self._call(symbol, *workspace.places(symbol))
-        self.slot, self.slots = workspace.slot, workspace.slots
+                self._call(symbol, [*values_of(symbol), *workspace.results(symbol)], workspace)
+        self.slot, self.slots = workspace.slot, workspace.counts[Kind.REAL]
 
     def declarations(self, qualifiers: str) -> Iterator[str]:
         """Tables, and functions with these qualifiers."""
@@ -70,7 +70,7 @@ class CallingCode:
         """A value in the workspace."""
         return self._dialect.from_slot(symbol.kind, f"{VALUES}[{place}]")
 
-    def _call(self, symbol: Symbol, taken: list[int], given: list[int]) -> None:
+    def _call(self, symbol: Symbol, values: list[Symbol], workspace: Workspace) -> None:
         (body, _), *operands = symbol.operands
         constant = tuple(not isinstance(operand, Symbol) for operand in operands)
         unnamed = _Function(f"part_{len(self._functions)}", body, constant)
@@ -80,7 +80,7 @@ class CallingCode:
             f"{function.name}({VALUES}, {constants}, {PLACES}_of_calls + {len(self._places)});"
         )
         self._constants += [float(operand) for operand in operands if not isinstance(operand, Symbol)]
-        self._places += taken + given
+        self._places += [workspace.slot[value.index] for value in values]
 
     def _definition(self, function: _Function, qualifiers: str) -> Iterator[str]:
         """A function that loads what is first needed, and stores results at once: fewer values to keep."""
@@ -92,7 +92,7 @@ class CallingCode:
         results = (output.index for output in body.outputs if isinstance(output, Symbol))
         stored = dict(zip(results, count(function.constant.count(False)), strict=False))
         for symbol in body.operations:
-            for operand in _values(symbol):
+            for operand in values_of(symbol):
                 if operand.index in sources and operand.index not in names:
                     names[operand.index] = f"x{operand.index}"
                     yield f"const {types[operand.kind]} x{operand.index} = {sources[operand.index]};"
@@ -113,48 +113,3 @@ class CallingCode:
                 sources[symbol.index] = self.value(symbol, f"{PLACES}[{values}]")
                 values += 1
         return sources
-
-
-class _Workspace:
-    """Where values lie while they are live; results of a call never where its arguments do.
-
-    Attributes:
-        slot: place of each value, by index.
-        slots: how many there are.
-    """
-
-    def __init__(self, program: Program) -> None:
-        self.slot = {symbol.index: place for place, symbol in enumerate(program.inputs)}
-        self.slots = len(self.slot)
-        self._free: list[int] = []
-        self._items: dict[int, list[Symbol]] = defaultdict(list)
-        self._last_use: dict[int, int] = {}
-        for symbol in program.operations:
-            if symbol.operation == "item":
-                self._items[symbol.operands[0].index].append(symbol)
-            else:
-                self._last_use |= {operand.index: symbol.index for operand in _values(symbol)}
-        for output in program.outputs:
-            if isinstance(output, Symbol):
-                self._last_use.pop(output.index, None)
-
-    def places(self, call: Symbol) -> tuple[list[int], list[int]]:
-        """Those of the arguments and of the results of the next call."""
-        order = call.operands[0].numbers
-        items = sorted(self._items[call.index], key=lambda item: order.index(item.operands[1]))
-        taken = [self.slot[operand.index] for operand in _values(call)]
-        given = [self._allocated(item) for item in items]
-        dead = {operand.index for operand in _values(call) if self._last_use.get(operand.index) == call.index}
-        self._free += [self.slot[index] for index in dead]
-        return taken, given
-
-    def _allocated(self, item: Symbol) -> int:
-        if not self._free:
-            self._free.append(self.slots)
-            self.slots += 1
-        self.slot[item.index] = self._free.pop()
-        return self.slot[item.index]
-
-
-def _values(symbol: Symbol) -> Iterator[Symbol]:
-    return (operand for operand in symbol.operands if isinstance(operand, Symbol))

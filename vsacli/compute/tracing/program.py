@@ -118,6 +118,11 @@ class Program(NamedTuple):
     outputs: tuple[Operand, ...]
 
 
+def is_of_calls(program: Program) -> bool:
+    """Whether a program was traced with calls, of which it then consists."""
+    return any(symbol.operation == "call" for symbol in program.operations)
+
+
 class Loop(NamedTuple):
     """A program that is repeated.
 

@@ -78,10 +78,10 @@ def _compiled(source: str) -> CodeType:
     return next(constant for constant in module.co_consts if isinstance(constant, CodeType))
 
 
-Workspace = tuple[npt.NDArray[Any], ...]
+RowSpace = tuple[npt.NDArray[Any], ...]
 """Rows for intermediate values: of real numbers, of truth values, of bits."""
 
-_DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint16}
+DTYPES: dict[Kind, type[np.generic]] = {Kind.REAL: np.float64, Kind.TRUTH: np.bool_, Kind.BITS: np.uint16}
 _LETTERS = {Kind.REAL: "r", Kind.TRUTH: "t", Kind.BITS: "b"}
 _NONE_ON_ROWS = {"loop", "branch", "item", "take"}
 _SELECTIONS = {"where": "{1}, {2}", "bits": "{1}, 0"}
@@ -96,6 +96,7 @@ class RowFunction:
 
     Attributes:
         rows: how many intermediate values of each kind are kept at most at a time.
+        run: computes, given rows of inputs, the rows of each kind that it needs, and rows for the outputs.
 
     Raises:
         NotImplementedError: the program has loops, branches or tables.
@@ -105,18 +106,18 @@ class RowFunction:
         allocation = _RowAllocation(program)
         head = "def program(inputs, workspace, outputs):"
         code = _compiled("\n".join([head, *allocation.heading(), *allocation.statements()]))
-        self._run: Callable[..., None] = FunctionType(code, {**vars(np), **allocation.constants})
+        self.run: Callable[..., None] = FunctionType(code, {**vars(np), **allocation.constants})
         self.rows = allocation.counts
 
-    def workspace(self, samples: int) -> Workspace:
+    def workspace(self, samples: int) -> RowSpace:
         """Rows for the intermediate values of at most so many samples."""
-        return tuple(aligned_rows(self.rows[kind], samples, dtype) for kind, dtype in _DTYPES.items())
+        return tuple(aligned_rows(self.rows[kind], samples, dtype) for kind, dtype in DTYPES.items())
 
-    def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, workspace: Workspace) -> None:
+    def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, workspace: RowSpace) -> None:
         """Compute outputs, (outputs, samples), in place from rows of inputs, (samples,)."""
         samples = len(rows[0])
         with np.errstate(all="ignore"):
-            self._run(rows, [values[:, :samples] for values in workspace], outputs)
+            self.run(rows, [values[:, :samples] for values in workspace], outputs)
 
 
 class _RowAllocation:
@@ -161,11 +162,11 @@ class _RowAllocation:
         yield from self._calls
         for number, output in enumerate(self._program.outputs):
             if not (isinstance(output, Symbol) and self._output_row.get(output.index) == f"o{number}"):
-                yield f" outputs[{number}] = {self._operand(output)}"
+                yield f" o{number}[:] = {self._operand(output)}"
 
     def _operation(self, number: int) -> Iterator[str]:
         symbol = self._program.operations[number]
-        if symbol.kind not in _DTYPES or symbol.operation in _NONE_ON_ROWS:
+        if symbol.kind not in DTYPES or symbol.operation in _NONE_ON_ROWS:
             raise NotImplementedError(f"{symbol.operation} has no form on rows")
         operands = [self._operand(operand, symbol.kind) for operand in symbol.operands]
         if symbol.operation in _SELECTIONS:  # written in two steps, so no operand may lie in the same row
@@ -185,7 +186,7 @@ class _RowAllocation:
             return self._row[operand.index]
         kind = _kind_of_constant(operand, kind)
         name = self._constant_names.setdefault((kind, repr(operand)), f"c{len(self._constant_names)}")
-        self.constants[name] = np.array(operand, dtype=_DTYPES[kind])
+        self.constants[name] = np.array(operand, dtype=DTYPES[kind])
         return name
 
     def _allocated(self, symbol: Symbol) -> str:

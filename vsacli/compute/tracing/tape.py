@@ -104,7 +104,7 @@ class Tape:
         if len(self._symbols) >= self._most:
             raise TooLongError(f"a step takes more than {self._most} operations")
         symbol = Symbol(self, len(self._symbols), operation, operands, kind)
-        fresh = operation == "input" or operation in NESTED
+        fresh = operation in {"input", "item"} or operation in NESTED
         self._symbols[symbol if fresh else _key(operation, operands)] = symbol
         return symbol
 
