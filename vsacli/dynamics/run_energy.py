@@ -12,9 +12,10 @@ import numpy as np
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray, contiguous_rows, over_time
 from vsacli.base.variables import VARIABLES, Block
+from vsacli.compute.control_flow import call
 from vsacli.compute.engine import Engine
 from vsacli.compute.rows import RowKernel, RowLayout
-from vsacli.dynamics.energy import EnergyMeter, Flow, JointEnergy, efforts
+from vsacli.dynamics.energy import Efforts, EnergyMeter, Flow, JointEnergy, efforts
 from vsacli.dynamics.losses import LossMeter, Lost
 from vsacli.dynamics.quadrature import integral, positive_work, work_on_each_other
 from vsacli.robot.model import Robot
@@ -65,31 +66,37 @@ class IntervalEnergy(RowKernel):
         (interval,) = given["interval"]
         friction = _by_joint(given["friction"]) if self.rubbing else [None] * len(self.inertia)
         every = [{name: _at_end(given[name], end) for name in self.at_steps} for end in range(2)]
-        works, spent, springs = [], [], []
-        for joint, rubbed in enumerate(friction):
-            ends = [{name: of_joints[joint] for name, of_joints in at_end.items()} for at_end in every]
-            of_joint = self._work(joint, interval, ends, rubbed)
-            powers = (end["motor_power"] for end in ends)
-            works += of_joint
-            spent += [positive_work(interval, *of_motor) for of_motor in zip(*powers, of_joint, strict=True)]
-            springs.append(efforts(interval, *(end["tau_spring"] for end in ends)))
-        return [*works, *spent, *(each for kind in zip(*springs, strict=True) for each in kind)]
+        found = []
+        for joint, constants in enumerate(zip(self.inertia, self.coupling, strict=True)):
+            ends = [{name: of_joints[joint] for name, of_joints in end.items()} for end in every]
+            found.append(call(interval, _joint_flow, *constants, interval, ends, friction[joint]))
+        works, spent, of_springs = zip(*found, strict=True)
+        kinds = works, spent, zip(*of_springs, strict=True)
+        return [row for kind in kinds for part in kind for row in part]
 
-    def _work(
-        self, joint: int, interval: Any, ends: Sequence[Mapping[str, Any]], friction: Sequence[Any] | None
-    ) -> list[Any]:
-        """Of both motors of a joint; NaN of one that is not there."""
-        works = [np.full_like(interval, np.nan)] * SIDES
-        for side, inertia in enumerate(self.inertia[joint]):
-            at_ends = ((each["passed_power"][side], each["passed_rate"][side]) for each in ends)
-            work = integral(interval, *at_ends)
-            before, after = (inertia / 2 * each["dtheta"][side] ** 2 for each in ends)
-            works[side] = work + (after - before)
-        if self.coupling[joint]:
-            motions = ((np.stack(each["dtheta"]), np.stack(each["ddtheta"])) for each in ends)
-            other = self.coupling[joint] * work_on_each_other(interval, *motions)
-            works = [work + of_other for work, of_other in zip(works, other, strict=True)]
-        return works if friction is None else [work + rub for work, rub in zip(works, friction, strict=True)]
+
+def _joint_flow(
+    inertia: Sequence[float],
+    coupling: float,
+    interval: FloatArray,
+    ends: Sequence[Mapping[str, Sequence[FloatArray]]],
+    friction: Sequence[FloatArray] | None,
+) -> tuple[list[FloatArray], list[FloatArray], Efforts]:
+    """Work of both motors of a joint, NaN of one that is not there, its positive part, and efforts."""
+    works = [np.full_like(interval, np.nan)] * SIDES
+    for side, of_motor in enumerate(inertia):
+        at_ends = ((each["passed_power"][side], each["passed_rate"][side]) for each in ends)
+        before, after = (of_motor / 2 * each["dtheta"][side] ** 2 for each in ends)
+        works[side] = integral(interval, *at_ends) + (after - before)
+    if coupling:
+        motions = ((np.stack(each["dtheta"]), np.stack(each["ddtheta"])) for each in ends)
+        of_other = coupling * work_on_each_other(interval, *motions)
+        works = [work + of_other[side] for side, work in enumerate(works)]
+    if friction is not None:
+        works = [work + rubbed for work, rubbed in zip(works, friction, strict=True)]
+    powers = (end["motor_power"] for end in ends)
+    spent = [positive_work(interval, *of_motor) for of_motor in zip(*powers, works, strict=True)]
+    return works, spent, efforts(interval, *(end["tau_spring"] for end in ends))
 
 
 def _by_joint(rows: Sequence[Any]) -> list[Sequence[Any]]:
