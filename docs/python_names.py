@@ -19,7 +19,7 @@ GROUPS = {
     "excitation_text optimize Optimum size_drives Sizing run_study StudySummary",
     "Links": "link_torques forward_kinematics jacobian mass_matrix",
     "Control and simulation": "State state_derivative Gains feedback_linearization FeedbackLinearization "
-    "Integral simulate perturbed InitialError Sensors GoalTolerance Tolerances",
+    "Integral simulate perturbed simulate_perturbed InitialError Sensors GoalTolerance Tolerances",
     "Errors": "InputError StorageError",
 }
 """What is exported, in the order in which one comes across it."""

@@ -23,15 +23,16 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base.errors import InputError
-from vsacli.compute.engine import compiler, unheard
+from vsacli.compute.engine import compiler
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, perturbed, simulate
 from vsacli.control.simulation.budget import Budget
 from vsacli.control.simulation.equations.equations import Equations
 from vsacli.control.simulation.equations.loop_code import loop_code
-from vsacli.control.simulation.equations.recorded_equations import RecordedEquations
+from vsacli.control.simulation.equations.recorded_equations import Computing, RecordedEquations
 from vsacli.control.simulation.equations.recording import record
 from vsacli.control.simulation.equations.stages import dop853_with_stages
+from vsacli.control.simulation.monte_carlo import simulate_perturbed
 
 AGREEMENT = 1e-11
 """Relative to the largest rate: rounding of 1e-16 times the condition of M, up to 1e4 with seven joints."""
@@ -44,7 +45,9 @@ ENGINES = ("numpy", pytest.param("c", marks=needs_compiler))
 
 def equations(case: Loop, engine: str) -> RecordedEquations:
     """Those of a loop, recorded already."""
-    made = RecordedEquations(case.loop, case.boundaries, Budget(None, np.array([0.0, 1.0])), engine, unheard)
+    made = RecordedEquations(
+        case.loop, case.boundaries, Budget(None, np.array([0.0, 1.0])), Computing(engine)
+    )
     while np.isfinite(made._due):
         made.budget.used = int(made._due) + 1
         made._improve()
@@ -188,6 +191,34 @@ def test_steps_start_from_states_that_lie_apart_in_memory():
     apart.step()
     alone.step()
     assert np.array_equal(apart.y, alone.y)
+
+
+@pytest.mark.parametrize("processes", [1, slow(2)])
+def test_runs_with_errors_of_the_model_are_those_of_one_by_one(processes):
+    robot, trajectory = vsa_3r(), short_motion(3)
+    conditions = {"gains": GAINS, "initial_error": InitialError(0.01), "engine": "numpy"}
+    reports = simulate_perturbed(robot, trajectory, 0.02, [4, 5, 6], processes=processes, **conditions)
+    for seed, report in zip([4, 5, 6], reports, strict=True):
+        alone = simulate(robot, trajectory, model=perturbed(robot, 0.02, seed), **conditions).report
+        assert report.as_json() == alone.as_json()
+    with pytest.raises(InputError, match="there must be at least 1 process, not 0"):
+        next(simulate_perturbed(robot, trajectory, 0.02, [4], processes=0))
+
+
+@needs_compiler
+def test_code_that_serves_many_runs_is_compiled_sooner(monkeypatch):
+    """Compiling takes as long as 4000 evaluations of this robot's program, more than a run has."""
+    asked = []
+
+    def load(_code, _opened, _compiler, _tell, worthwhile):
+        asked.append(worthwhile(1))
+
+    monkeypatch.setattr("vsacli.control.simulation.equations.recorded_equations.load", load)
+    alone = simulate(vsa_3r(), short_motion(3), gains=GAINS)
+    assert asked == [False]
+    simulate(vsa_3r(), short_motion(3), gains=GAINS, runs=100)
+    assert asked == [False, False, True]
+    assert alone.provenance == PLAIN
 
 
 def test_without_a_compiler_runs_go_on(monkeypatch):

@@ -12,13 +12,12 @@ from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.compute.engine import unheard
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.budget import Budget
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.controllers import LinearizingFeedback
-from vsacli.control.simulation.equations.recorded_equations import RecordedEquations
+from vsacli.control.simulation.equations.recorded_equations import Computing, RecordedEquations
 from vsacli.control.simulation.history import History, history
 from vsacli.control.simulation.integrator import Integrator, Tolerances
 from vsacli.control.simulation.reference import Reference
@@ -94,7 +93,7 @@ def linearized_run(
     start = loop.packing.pack(*loop.plant.unpacked(start_of(robot, paired, trajectory, error)))
     times = trajectory.times.block(0, trajectory.samples)
     budget = Budget(None, times)
-    equations = RecordedEquations(loop, list(boundaries(loop, start)), budget, "auto", unheard)
+    equations = RecordedEquations(loop, list(boundaries(loop, start)), budget, Computing("auto"))
     integrator = Integrator(equations, Tolerances(), lambda _: None)
     integrated = continuous(loop, integrator, times, start)
     past = history(robot, loop, integrated, 0.0)

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from vsacli.control.linearization import FeedbackLinearization, feedback_linearization
     from vsacli.control.simulation.goal_tolerance import GoalTolerance
     from vsacli.control.simulation.integrator import Tolerances
+    from vsacli.control.simulation.monte_carlo import simulate_perturbed
     from vsacli.control.simulation.perturbation import perturbed
     from vsacli.control.simulation.sensors import Sensors
     from vsacli.control.simulation.simulate import InitialError, simulate
@@ -24,5 +25,6 @@ __all__ = [
     "feedback_linearization",
     "perturbed",
     "simulate",
+    "simulate_perturbed",
 ]
 __getattr__, __dir__ = lazy_exports(__name__)

@@ -129,6 +129,7 @@ def simulate(
     budget: int | None = None,
     progress: Progress = lambda _: None,
     engine: str = "auto",
+    runs: int = 1,
     tell: Tell = unheard,
 ) -> Simulation:
     """Integrate the full model (5) of a robot under a controller.
@@ -150,6 +151,8 @@ def simulate(
         progress: called with the time reached, s.
         engine: what evaluates the equations of motion: "numpy", "c", or "auto", which compiles them
             where that saves time.
+        runs: how many such runs there will be, of robots that differ in numbers at most: what is compiled
+            serves them all, so it is worth it sooner.
         tell: learns what goes wrong with compiled code, and what will take long, before it does.
 
     Raises:
@@ -170,7 +173,7 @@ def simulate(
     def passed(time: float) -> None:
         progress(first + time)
 
-    computing = Computing(engine, tell)
+    computing = Computing(engine, tell, runs)
     integrated = _integrate(
         robot, loop, elapsed, start, measured, readings, tolerances, budget, passed, computing
     )
@@ -178,7 +181,7 @@ def simulate(
     full: SimulationReport | None = None
     if measured == "positions":
         conditions: Any = {"gains": gains, "model": model, "initial_error": initial_error}
-        integration: Any = {"tolerances": tolerances, "budget": budget, "engine": engine}
+        integration: Any = {"tolerances": tolerances, "budget": budget, "engine": engine, "runs": runs}
         full = simulate(robot, trajectory, **conditions, **integration).report
     exact = gains is None and (model is None or model is robot) and initial_error.is_zero
     report = _report(robot, trajectory, gains, past, integrated, goal_tolerance, exact, full)
@@ -298,7 +301,7 @@ def _integrate(
     reached = times if last is None else times[times <= last.time]
     budget = Budget(limit, reached)
     ends = list(boundaries(loop, vector))
-    equations = RecordedEquations(loop, ends, budget, *computing)
+    equations = RecordedEquations(loop, ends, budget, computing)
     integrator = Integrator(equations, tolerances, progress, slides)
     if measured == "state":
         integrated = continuous(loop, integrator, reached, vector)

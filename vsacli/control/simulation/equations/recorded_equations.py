@@ -12,7 +12,7 @@ from vsacli.base.errors import InputError
 from vsacli.compute.engine.choice import check_engine
 from vsacli.compute.engine.compiler import CompilerError, system_compiler
 from vsacli.compute.engine.engines import Tell, unheard
-from vsacli.compute.engine.libraries import Worthwhile, load
+from vsacli.compute.engine.libraries import Code, Worthwhile, load
 from vsacli.control.simulation.boundaries import Boundary
 from vsacli.control.simulation.budget import Budget
 from vsacli.control.simulation.closed_loop import ClosedLoop
@@ -43,10 +43,12 @@ class Computing(NamedTuple):
     Attributes:
         engine: "numpy" compiles nothing, "c" at once, "auto" where that saves time.
         tell: learns what goes wrong with compiled code, and what will take long, before it does.
+        runs: how many share what is compiled.
     """
 
     engine: str
     tell: Tell = unheard
+    runs: int = 1
 
 
 class RecordedEquations(Equations):
@@ -60,7 +62,7 @@ class RecordedEquations(Equations):
         loop: a robot under its controller.
         boundaries: at which a run ends.
         budget: of the run.
-        engine, tell: as of `Computing`.
+        computing: what evaluates.
 
     Raises:
         InputError: there is no engine of that name; at the first evaluation, it is "c" and there is no
@@ -68,15 +70,15 @@ class RecordedEquations(Equations):
     """
 
     def __init__(
-        self, loop: ClosedLoop, boundaries: Sequence[Boundary], budget: Budget, engine: str, tell: Tell
+        self, loop: ClosedLoop, boundaries: Sequence[Boundary], budget: Budget, computing: Computing
     ) -> None:
         super().__init__(loop, boundaries, budget)
-        check_engine(engine)
-        self._tell = tell
+        check_engine(computing.engine)
+        self._computing = computing
         self._program: NumberProgram | None = None
         self._compiled: CompiledLoop | None = None
         self._compiler = ""
-        self._later = self._compiling() if engine == "c" else self._improving(compiles=engine == "auto")
+        self._later = self._compiling() if computing.engine == "c" else self._improving()
         self._due = next(self._later)
 
     @property
@@ -120,42 +122,44 @@ class RecordedEquations(Equations):
         if self.budget.used >= self._due:
             self._due = next(self._later, math.inf)
 
-    def _improving(self, *, compiles: bool) -> Iterator[float]:
+    def _improving(self) -> Iterator[float]:
         """Go on to what is faster; yields after how many evaluations to be asked again."""
         yield RECORD_FROM * len(self.loop.plant.drivetrain.present)
         with suppress(NotImplementedError, CompilerError):
             recording = record(self.loop, self.boundaries)
-            operations = len(recording.rates.operations)
             with suppress(NotImplementedError):  # of loops
                 self._program = NumberProgram(recording)
-            seconds = TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
-            begin = self.budget.used
-            code, _ = loop_code(recording)
-            if compiles and not code.takes_too_long:
+            begin, seconds = self.budget.used, self._seconds(recording) * self._computing.runs
+            if self._computing.engine == "auto":
                 yield begin + LOOK_SECONDS / seconds
-                self._load(recording, lambda _code: False)
+                code, numbers = loop_code(recording)
+                self._load(recording, code, numbers, lambda _code: False)
                 if self._compiled is None:
                     yield begin + code.compiling_seconds / seconds
-                    self._load(recording, lambda _code: True)
+                    self._load(recording, code, numbers, lambda _code: True)
+
+    def _seconds(self, recording: Recording) -> float:
+        """What an evaluation takes before there is compiled code."""
+        return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * len(recording.rates.operations)
 
     def _compiling(self) -> Iterator[float]:
         """The same for the engine "c"; that it cannot be had is an InputError."""
         yield 0.0
         try:
-            self._load(record(self.loop, self.boundaries), lambda _code: True)
+            recording = record(self.loop, self.boundaries)
+            self._load(recording, *loop_code(recording), lambda _code: True)
         except CompilerError as error:
             raise InputError.one(f"{error}; the engine numpy needs none") from error
         except NotImplementedError as error:
             raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
 
-    def _load(self, recording: Recording, worthwhile: Worthwhile) -> None:
+    def _load(self, recording: Recording, code: Code, numbers: FloatArray, worthwhile: Worthwhile) -> None:
         """Load compiled code; compile it if that is worthwhile.
 
         Raises:
             CompilerError: it cannot be had.
         """
-        code, numbers = loop_code(recording)
         compiler = system_compiler()
-        loaded = load(code, open_loop, compiler, self._tell, worthwhile)
+        loaded = load(code, open_loop, compiler, self._computing.tell, worthwhile)
         if loaded is not None:
             self._compiled, self._compiler = CompiledLoop(loaded.library, numbers, recording), compiler.name
