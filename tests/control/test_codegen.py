@@ -141,9 +141,25 @@ def test_the_code_keeps_nothing_and_calls_nothing_but_the_math_library(name: str
 @pytest.mark.parametrize("name", ["3R", slow("table")])
 def test_every_loop_is_bounded_by_a_constant(name: str) -> None:
     source = project(name).files[f"{prefix_of(ROBOTS[name])}.c"]
-    assert not re.search(r"\b(goto|do|malloc|calloc|free|printf|static (?!const|inline))\b", source)
+    assert not re.search(
+        r"\b(goto|do|malloc|calloc|free|printf|static (?!const|inline|void subroutine_))\b", source
+    )
     assert all(re.search(r"_step < \d+ && ", head) for head in re.findall(r"for \(.*\)", source))
     assert set(re.findall(r"while \(.*\)", source)) <= {"while (low < high)"}, "halving of a table"
+
+
+@pytest.mark.parametrize("name", ["table", slow("four_bar")])
+def test_nothing_of_a_spring_stands_in_the_code_twice(name: str) -> None:
+    source = project(name).files[f"{prefix_of(ROBOTS[name])}.c"]
+    arrays = [entries.split(", ") for entries in re.findall(r"^static const .*\{(.*)\};$", source, re.M)]
+    assert arrays
+    for number, array in enumerate(arrays):
+        others = (" ".join(["", *other, ""]) for other in arrays[:number] + arrays[number + 1 :])
+        assert not any(" ".join(["", *array, ""]) in other for other in others)
+    subroutines = re.findall(r"^static void (subroutine_\d+)\(.*?^}$", source, re.M | re.S)
+    bodies = re.findall(r"^static void subroutine_\d+(\(.*?^})$", source, re.M | re.S)
+    assert len(set(bodies)) == len(bodies) == len(subroutines) > 0
+    assert all(len(re.findall(rf"\b{name}\(", source)) > 2 for name in subroutines), "one is the definition"
 
 
 @needs_compiler

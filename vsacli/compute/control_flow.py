@@ -56,6 +56,17 @@ def cell_of(position: FloatArray, count: int) -> IndexArray:
     return result
 
 
+def subroutine(function: Function, arguments: Values) -> Values:
+    """`function(*arguments)`, which code that must be short has once, however often it is computed.
+
+    Args:
+        function: from arrays (samples,) to as many as it likes; what it takes and returns are real numbers.
+        arguments: the arrays.
+    """
+    result: Values = subroutine_on(arguments[0], function, arguments)
+    return result
+
+
 def call(row: Any, function: Callable[..., Any], *arguments: Any) -> Any:
     """`function(*arguments)`, which may be recorded once for all calls that are alike.
 
@@ -131,6 +142,12 @@ def where_needed_on(mask: Any, function: Function, arguments: Values, otherwise:
 @singledispatch
 def call_on(_: Any, function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
     """`call` on anything but rows of symbols."""
+    return function(*arguments)
+
+
+@singledispatch
+def subroutine_on(_: Any, function: Function, arguments: Values) -> Values:
+    """`subroutine` on NumPy arrays."""
     return function(*arguments)
 
 

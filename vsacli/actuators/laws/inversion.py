@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.law import SpringLaw, state_of
 from vsacli.actuators.laws.state import SpringState
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
@@ -59,7 +59,7 @@ def _halley_step(
 
     Halley's correction of the Newton step is kept between one half and two.
     """
-    state = law.state(phi)
+    state = state_of(law, phi)
     error = state.tau - torque
     newton = error / state.sigma
     correction = newton * state.zeta / (2 * state.sigma)

@@ -10,6 +10,7 @@ from vsacli.actuators.laws.pair import Pair
 from vsacli.actuators.laws.state import SpringState
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import POSITION
+from vsacli.compute.control_flow import subroutine
 from vsacli.documents.fields import POSITIVE_OR_INFINITE, check_fields, number
 from vsacli.documents.source import Source
 
@@ -126,3 +127,8 @@ class SpringLaw(ABC):
     @abstractmethod
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Deflection phi with tau(phi) = torque: the inverse of `torque`."""
+
+
+def state_of(law: SpringLaw, phi: FloatArray) -> SpringState:
+    """State of a spring, which code that must be short has once."""
+    return SpringState(*subroutine(law.state, (phi,)))

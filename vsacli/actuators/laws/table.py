@@ -16,6 +16,7 @@ from vsacli.actuators.laws.table_curve import fit_curve
 from vsacli.actuators.laws.tendon import Mirrored
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
+from vsacli.compute.control_flow import subroutine
 from vsacli.documents.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
@@ -87,18 +88,17 @@ class MeasuredSpring(SpringLaw):
 
     def hardening(self, phi: FloatArray) -> FloatArray:
         """Relative hardening, infinite where a spring without stiffness at rest goes slack."""
-        _, stiffness, slope = self.derivatives(phi, 2)
-        slack = stiffness == 0
-        return np.where(slack, np.inf, slope / np.where(slack, 1.0, stiffness))
+        state = self.state(phi)
+        slack = state.sigma == 0
+        return np.where(slack, np.inf, state.zeta / np.where(slack, 1.0, state.sigma))
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Derivatives of the fitted curve, whose piece is looked up once."""
         return self._curve(phi, 1, order + 1)
 
-    def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
-        """Energy and state of the fitted curve, whose piece is looked up once."""
-        energy, *derivatives = self._curve(phi, 0, 4)
-        return energy, SpringState(*derivatives)
+    def state(self, phi: FloatArray) -> SpringState:
+        """State of the fitted curve, which code that must be short has once."""
+        return SpringState(*subroutine(lambda phi: self.derivatives(phi, 3), (phi,)))
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Torque of the fitted curve."""

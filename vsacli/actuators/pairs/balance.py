@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.law import SpringLaw, state_of
 from vsacli.actuators.laws.state import SpringState
 from vsacli.actuators.pairs.decoupling_matrix import Sides
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.compute.control_flow import Values
+from vsacli.compute.control_flow import Values, subroutine
 
 
 class PairState(NamedTuple):
@@ -69,6 +69,17 @@ class PairState(NamedTuple):
         )
 
 
+def under(law: SpringLaw, torque: FloatArray) -> tuple[FloatArray, SpringState]:
+    """Deflection and state of a spring under a torque, which code that must be short has once."""
+
+    def found(torque: FloatArray) -> Values:
+        phi, state = law.deflection_and_state(torque)
+        return phi, *state
+
+    phi, *state = subroutine(found, (torque,))
+    return phi, SpringState(*state)
+
+
 @dataclass(frozen=True)
 class Balance:
     """Two springs, and the preload torque t between them: tau_1 = tau_e/2 + t and tau_2 = tau_e/2 - t.
@@ -102,11 +113,17 @@ class Balance:
 
     def deflections(self, tau_1: FloatArray, tau_2: FloatArray) -> tuple[FloatArray, FloatArray]:
         """phi_1 and phi_2 under the torques of the two springs."""
-        return self.first.deflection(tau_1), self.second.deflection(tau_2)
+        state = self.state_under(tau_1, tau_2)
+        return state.phi_1, state.phi_2
+
+    def state_under(self, tau_1: FloatArray, tau_2: FloatArray) -> PairState:
+        """State of both springs under their torques."""
+        (phi_1, one), (phi_2, two) = under(self.first, tau_1), under(self.second, tau_2)
+        return PairState(phi_1, phi_2, one, two)
 
     def state(self, phi_1: FloatArray, phi_2: FloatArray) -> PairState:
         """State of both springs at deflections."""
-        return PairState(phi_1, phi_2, self.first.state(phi_1), self.second.state(phi_2))
+        return PairState(phi_1, phi_2, state_of(self.first, phi_1), state_of(self.second, phi_2))
 
     def stiffness(self, phi_1: FloatArray, phi_2: FloatArray) -> FloatArray:
         """G at deflections."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.compute.control_flow import Values, repeat
+from vsacli.compute.control_flow import Values, repeat, subroutine
 
 Function = Callable[..., FloatArray]
 """f(x, *constants) on arrays of one shape."""
@@ -33,10 +33,14 @@ def bracketed_root(
     function without using derivatives, Advances in Engineering Software 28 (1997). Arrays (samples,).
     """
 
+    def value(x: FloatArray, *constants: FloatArray) -> FloatArray:
+        (f,) = subroutine(lambda *known: (function(*known),), (x, *constants))
+        return f
+
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         share, x_1, f_1, x_2, f_2, _, _ = state
         x = x_1 + share * (x_2 - x_1)
-        f = function(x, *constants)
+        f = value(x, *constants)
         same = (f > 0) == (f_1 > 0)
         x_3, f_3 = np.where(same, x_1, x_2), np.where(same, f_1, f_2)
         x_2, f_2 = np.where(same, x_2, x_1), np.where(same, f_2, f_1)
@@ -46,7 +50,7 @@ def bracketed_root(
         share = np.clip(_next_share(x, f, x_2, f_2, x_3, f_3), least, 1 - least)
         return (share, x, f, x_2, f_2, x_3, f_3), (width <= 2 * resolution) | (f == 0)
 
-    at_low, at_high = function(low, *constants), function(high, *constants)
+    at_low, at_high = value(low, *constants), value(high, *constants)
     half = np.full_like(low, 0.5)
     start = (half, low, at_low, high, at_high, high, at_high)
     _, x_1, f_1, x_2, f_2, _, _ = repeat(step, start, constants, MAX_STEPS)

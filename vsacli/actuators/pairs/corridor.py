@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.state import SpringState
-from vsacli.actuators.pairs.balance import Balance, PairState
+from vsacli.actuators.pairs.balance import Balance, PairState, under
 from vsacli.actuators.pairs.fold_map import FoldMap
 from vsacli.actuators.pairs.folds import outermost_fold
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -116,11 +116,11 @@ def _at_end(
 
     def with_first(tau_e: FloatArray) -> Values:
         phi_1 = np.full_like(tau_e, first.domain[end])
-        phi_2, two = second.deflection_and_state(tau_e - tau_1)
+        phi_2, two = under(second, tau_e - tau_1)
         return wanted(PairState(phi_1, phi_2, _everywhere(balance.domain_ends[0][end], tau_e), two))
 
     def with_second(tau_e: FloatArray) -> Values:
-        phi_1, one = first.deflection_and_state(tau_e - tau_2)
+        phi_1, one = under(first, tau_e - tau_2)
         phi_2 = np.full_like(tau_e, second.domain[1 - end])
         return wanted(PairState(phi_1, phi_2, one, _everywhere(balance.domain_ends[1][1 - end], tau_e)))
 

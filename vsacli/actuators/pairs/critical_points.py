@@ -61,9 +61,9 @@ def bracketed_in_box(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> V
         *box: smallest and largest phi_1, smallest and largest phi_2, between which there is one.
     """
     low_1, high_1, low_2, high_2 = box
-    first, second = balance.first.torque, balance.second.torque
-    least = np.maximum(first(low_1), tau_e - second(high_2)) - tau_e / 2
-    largest = np.minimum(first(high_1), tau_e - second(low_2)) - tau_e / 2
+    at_least, at_most = balance.state(low_1, high_2), balance.state(high_1, low_2)
+    least = np.maximum(at_least.one.tau, tau_e - at_least.two.tau) - tau_e / 2
+    largest = np.minimum(at_most.one.tau, tau_e - at_most.two.tau) - tau_e / 2
 
     def slope(t: FloatArray, tau_e: FloatArray) -> FloatArray:
         return balance.stiffness_slope(*balance.deflections_at(tau_e, t))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw
+from vsacli.actuators.laws.law import SpringLaw, state_of
 from vsacli.actuators.laws.pair import Pair, PairSolution
 from vsacli.actuators.pairs.balance import Balance
 from vsacli.actuators.pairs.bracketing import bracketed_root
@@ -178,11 +178,11 @@ def _confined_step(
 
 def _bracketed(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1: FloatArray) -> Values:
     """phi_1 and phi_2 by bracketing the torque x that the preload gains from the inner end on."""
-    tau_1 = balance.first.torque(inner_1)
+    tau_1 = state_of(balance.first, inner_1).tau
     tau_2 = tau_e - tau_1
 
     def missing(x: FloatArray, tau_1: FloatArray, tau_2: FloatArray, demand: FloatArray) -> FloatArray:
-        return demand - balance.stiffness(*balance.deflections(tau_1 + x, tau_2 - x))
+        return demand - balance.state_under(tau_1 + x, tau_2 - x).stiffness
 
     least, largest = np.zeros_like(tau_e), balance.preload_range(tau_e)[1] + tau_e / 2 - tau_1
     endless = np.isinf(largest)

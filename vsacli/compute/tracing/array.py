@@ -167,6 +167,7 @@ def trace(
     most: int = sys.maxsize,
     *,
     calling: bool = False,
+    short: bool = False,
 ) -> Program:
     """The program of a function of rows of samples: what it does to one sample.
 
@@ -175,11 +176,12 @@ def trace(
         kinds: of the rows that it takes.
         most: operations that are recorded.
         calling: whether calls are recorded as such, else what they do.
+        short: whether subroutines are functions of their own.
 
     Raises:
         NotImplementedError: it has no such program, or, as `TooLongError`, one of more operations.
     """
-    tape = Tape(most, calling)
+    tape = Tape(most, calling, short)
     rows = [TracedArray(tape, [tape.input(kind)]) for kind in kinds]
     return tape.program([cells_of(result).item() for result in function(rows)])
 

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from vsacli.compute.tracing.c_subroutines import Subroutines
 from vsacli.compute.tracing.c_tables import Place, Tables
 from vsacli.compute.tracing.program import (
     BITWISE,
@@ -145,16 +146,20 @@ class Writer:
     Args:
         dialect: how to write.
         tables: where their constants are.
+        subroutines: which there are.
     """
 
-    def __init__(self, dialect: Dialect, tables: Tables) -> None:
+    def __init__(self, dialect: Dialect, tables: Tables, subroutines: Subroutines | None = None) -> None:
         self._dialect = dialect
         self._tables = tables
+        self._subroutines = subroutines or Subroutines()
 
     def statements(self, operations: Iterable[Symbol], names: Names, prefix: str = "v") -> Iterator[str]:
         """Declarations of the values of operations, in their order; names of values begin with the prefix."""
         for symbol in operations:
-            if symbol.operation in {"loop", "branch"}:
+            if symbol.operation == "subroutine":
+                yield from self._subroutine(symbol, names, prefix)
+            elif symbol.operation in {"loop", "branch"}:
                 yield from self._nested(symbol, names, prefix)
             elif symbol.operation != "item":
                 text = self._expression(symbol, names, prefix)
@@ -187,6 +192,26 @@ class Writer:
         if operation in LOGICAL:
             return dialect.logical(LOGICAL[operation], texts)
         return dialect.function(symbol.kind, C_NAMES.get(operation, operation), texts)
+
+    def function(self, body: Program) -> Iterator[str]:
+        """The function of a subroutine: its arguments, and where it puts its results."""
+        real = self._dialect.types[Kind.REAL]
+        names = {symbol.index: f"x{number}" for number, symbol in enumerate(body.inputs)}
+        arguments = [f"{real} {name}" for name in names.values()]
+        yield f"static void {self._subroutines.name(body)}({', '.join([*arguments, f'{real} *y'])})"
+        yield "{"
+        yield from self.statements(body.operations, names)
+        for number, output in enumerate(body.outputs):
+            yield f"y[{number}] = {self.value(output, Kind.REAL, names)};"
+        yield "}"
+
+    def _subroutine(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
+        """An array of the results, and what fills it."""
+        (body,), *operands = symbol.operands
+        own = _name(symbol, names, prefix)
+        arguments = [self.value(operand, Kind.REAL, names, prefix) for operand in operands]
+        yield f"{self._dialect.types[Kind.REAL]} {own}[{len(body.outputs)}];"
+        yield f"{self._subroutines.name(body)}({', '.join([*arguments, own])});"
 
     def _from_table(self, table: Table, symbol: Symbol, names: Names, prefix: str) -> str:
         place, taken = self._tables.place(table), symbol.operation == "take"
@@ -270,7 +295,8 @@ def table_declarations(tables: Tables, dialect: Dialect) -> Iterator[str]:
 def _name(symbol: Symbol, names: Names, prefix: str) -> str:
     if symbol.operation == "item":
         nested, number = symbol.operands
-        return f"{_name(nested, names, prefix)}_{number}"
+        own = _name(nested, names, prefix)
+        return f"{own}[{number}]" if nested.operation == "subroutine" else f"{own}_{number}"
     return names.get(symbol.index, f"{prefix}{symbol.index}")
 
 

@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
-from vsacli.compute.tracing.program import Branch, Call, Loop, Program, Table
+from vsacli.compute.tracing.program import Branch, Call, Loop, Program, Subroutine, Table
 
 
 class ConstantArray(NamedTuple):
@@ -97,5 +97,5 @@ def _uses(program: Program, seen: set[int]) -> Iterator[tuple[Table, str]]:
         for operand in symbol.operands:
             if isinstance(operand, Table):
                 yield operand, symbol.operation
-            elif isinstance(operand, Loop | Branch | Call):
+            elif isinstance(operand, Loop | Branch | Call | Subroutine):
                 yield from _uses(operand.body, seen)

@@ -161,7 +161,17 @@ class Call(NamedTuple):
     numbers: tuple[int, ...]
 
 
-NESTED = frozenset({"loop", "branch", "call"})
+class Subroutine(NamedTuple):
+    """A program that stands in a function of its own; its inputs and outputs are real numbers.
+
+    Attributes:
+        body: the program, whichever of its outputs are read.
+    """
+
+    body: Program
+
+
+NESTED = frozenset({"loop", "branch", "call", "subroutine"})
 """Operations that hold a program."""
 
 COMPARISONS = ("less", "less_equal", "greater", "greater_equal", "equal", "not_equal")

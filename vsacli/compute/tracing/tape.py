@@ -18,6 +18,7 @@ from vsacli.compute.tracing.program import (
     Loop,
     Operand,
     Program,
+    Subroutine,
     Symbol,
     Table,
     kind_of,
@@ -39,13 +40,15 @@ class Tape:
     Args:
         most: how many there may be; with one more it raises `TooLongError`.
         calling: whether calls are recorded as such, else what they do.
+        short: whether subroutines are functions of their own, else they are recorded where they stand.
 
     Attributes:
         calls: what has been recorded of calls, by what tells them apart.
     """
 
-    def __init__(self, most: int = sys.maxsize, calling: bool = False) -> None:
+    def __init__(self, most: int = sys.maxsize, calling: bool = False, short: bool = False) -> None:
         self._most = most
+        self.short = short
         self.calling = calling
         self.calls: dict[Hashable, Any] = {}
         self._symbols: dict[Hashable, Symbol] = {}
@@ -91,6 +94,10 @@ class Tape:
         """What a program returns that was traced on a tape of its own."""
         call = Call(body, tuple(range(len(body.outputs))))
         return self._emit_nested("call", body.outputs, (call, *arguments))
+
+    def emit_subroutine(self, body: Program, arguments: Sequence[Operand]) -> list[Symbol]:
+        """What a program returns that may be computed elsewhere, too."""
+        return self._emit_nested("subroutine", body.outputs, (Subroutine(body), *arguments))
 
     def _emit_nested(
         self, operation: str, outputs: Sequence[Operand], operands: tuple[Any, ...]

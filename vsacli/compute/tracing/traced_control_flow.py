@@ -7,12 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.compute.control_flow import cell_on, look_up_on, repeat_on, where_needed_on
+from vsacli.compute.control_flow import cell_on, look_up_on, repeat_on, subroutine_on, where_needed_on
 from vsacli.compute.tracing.array import TracedArray, cells_of, trace
 from vsacli.compute.tracing.numpy_functions import each_entry
-from vsacli.compute.tracing.program import Operand, Table, kind_of
+from vsacli.compute.tracing.program import Operand, Program, Table, kind_of
+from vsacli.compute.tracing.tape import Tape
 
 Function = Callable[..., Any]
+
+LEAST_OPERATIONS = 15
+"""Of a subroutine that makes code shorter: to pass arguments and results takes as much as some five."""
 
 
 @repeat_on.register(TracedArray)
@@ -27,7 +31,7 @@ def repeat_traced(
         return [*next_state, done]
 
     def loop(*entries: Operand) -> Sequence[Operand]:
-        program = trace(body, list(map(kind_of, entries)))
+        program = _nested(first.tape, body, entries)
         return first.tape.emit_loop(program, limit, entries[:count], entries[count:])
 
     return _for_each_entry(loop, first, [*state, *constants], count)
@@ -43,10 +47,31 @@ def where_needed_traced(
     def branch(truth: Operand, *entries: Operand) -> Sequence[Operand]:
         if truth is False:
             return entries[:count]
-        program = trace(lambda rows: function(*rows), list(map(kind_of, entries[count:])))
+        program = _nested(mask.tape, lambda rows: function(*rows), entries[count:])
         return mask.tape.emit_branch(truth, program, entries[count:], entries[:count])
 
     return _for_each_entry(branch, mask, [mask, *otherwise, *arguments], count)
+
+
+@subroutine_on.register(TracedArray)
+def subroutine_traced(first: TracedArray, function: Function, arguments: Sequence[Any]) -> tuple[Any, ...]:
+    """`vsacli.compute.control_flow.subroutine`: a function of its own if the code is to be short."""
+    if not first.tape.short:
+        return tuple(function(*arguments))
+    entries: list[Any] = [cells_of(each).flat[0] for each in arguments]
+    body = _nested(first.tape, lambda rows: function(*rows), entries)
+    if len(body.operations) < LEAST_OPERATIONS:
+        return tuple(function(*arguments))
+    return _for_each_entry(
+        lambda *entries: first.tape.emit_subroutine(body, entries), first, arguments, len(body.outputs)
+    )
+
+
+def _nested(
+    tape: Tape, function: Callable[[Sequence[Any]], Sequence[Any]], entries: Sequence[Operand]
+) -> Program:
+    """The program of a body within one on a tape."""
+    return trace(function, list(map(kind_of, entries)), short=tape.short)
 
 
 @look_up_on.register(TracedArray)

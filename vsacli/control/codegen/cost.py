@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from vsacli.compute.tracing import Program, Symbol
 from vsacli.compute.tracing.c_tables import Tables
-from vsacli.compute.tracing.program import FUNCTIONS, Branch, Loop, Table
+from vsacli.compute.tracing.program import FUNCTIONS, Branch, Loop, Subroutine, Table
 from vsacli.control.codegen.scalar import BYTES, Scalar
 
 
@@ -48,7 +48,7 @@ def _of_operation(symbol: Symbol) -> Cost:
     if isinstance(nested, Loop):
         body = worst_cost(nested.body)
         return Cost(nested.limit * body.operations, nested.limit * body.functions, 1 + body.loops)
-    if isinstance(nested, Branch):
+    if isinstance(nested, Branch | Subroutine):
         return worst_cost(nested.body)
     if symbol.operation == "item":
         return Cost(0, 0, 0)

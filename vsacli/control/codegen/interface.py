@@ -107,6 +107,6 @@ class Function:
         """
         inputs = sum(structure.layout.size for _, structure in self.arguments)
         try:
-            return trace(self.compute, [Kind.REAL] * inputs, MOST_RECORDED)
+            return trace(self.compute, [Kind.REAL] * inputs, MOST_RECORDED, short=True)
         except NotImplementedError as error:
             raise NotImplementedError(f"{self.name}: {error}") from error

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
 from vsacli.compute.tracing import Kind, Program, Symbol
 from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations
+from vsacli.compute.tracing.c_subroutines import Subroutines
 from vsacli.compute.tracing.c_tables import Place, Tables
 from vsacli.control.codegen.interface import Function, Structure, structures
 
@@ -191,8 +192,10 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
     dialect = Scalar(precision)
     programs = [function.program for function in functions]
     tables = Tables(programs, dialect.array_type)
-    writer = Writer(dialect, tables)
-    bodies = [
+    subroutines = Subroutines(programs)
+    writer = Writer(dialect, tables, subroutines)
+    bodies = ["\n".join(indented(writer.function(body))) for body in subroutines.bodies.values()]
+    bodies += [
         "\n".join(_definition(prefix, function, program, writer))
         for function, program in zip(functions, programs, strict=True)
     ]
@@ -229,15 +232,19 @@ def signature(prefix: str, function: Function) -> str:
     return "\n    ".join(lines)
 
 
+def indented(lines: Iterable[str], depth: int = 0) -> Iterator[str]:
+    """Lines of C with the blanks in front that their braces ask for."""
+    for line in lines:
+        depth -= line == "}"
+        yield "    " * depth + line
+        depth += line.endswith("{")
+
+
 def _definition(prefix: str, function: Function, program: Program, writer: Writer) -> Iterator[str]:
     entries = [f"{name}->{entry}" for name, structure in function.arguments for entry in structure.entries]
     names = {symbol.index: entry for symbol, entry in zip(program.inputs, entries, strict=True)}
     yield f"{signature(prefix, function)}\n{{"
-    depth = 1
-    for line in writer.statements(program.operations, names):
-        depth -= line == "}"
-        yield "    " * depth + line
-        depth += line.endswith("{")
+    yield from indented(writer.statements(program.operations, names), 1)
     flags = []
     outputs = iter(program.outputs)
     for array in function.result.arrays:
