@@ -1,6 +1,7 @@
 """Measure vsacli beside its peers, all in one run: `python tests/benchmarks`.
 
-Needs the extra `bench` and gcc. `--write` puts what was found into docs/performance.md and docs/codegen.md.
+Needs the extra `bench`, gcc, and the Debian packages of the tests on a Cortex-M7. `--write` puts what was
+found into docs/performance.md and docs/codegen.md.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))  # the oracles and sam
 import actuation
 import commands
 import compiled
+import controllers
 import growth
 import kernel
 import page
 import recorders
 import sensitivities
 import simulations
+import single_calls
 import stages
 import storage
 import whole_runs
@@ -45,8 +48,9 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     yield "machine", description() + "\n"
     yield "kernel", page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats))
     yield "batches", page.batch_table(compiled.batches(SAMPLES, repeats))
-    yield "calls", page.call_sentence(compiled.single_calls())
+    yield "calls", page.call_sentence(single_calls.calls_of_seven_joints())
     yield "recorders", page.recorder_table(recorders.compare(SAMPLES, repeats))
+    yield "controllers", page.controller_table(controllers.measure())
     yield "costs", page.cost_table(compiled.costs())
     runs = (stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c"))
     yield "stages", page.stage_table(*runs)

@@ -1,8 +1,7 @@
-"""Compiled code beside casadi: batches of samples, single calls, and what code of longer chains costs."""
+"""Compiled code beside casadi: batches of samples, and what code of longer chains costs."""
 
 from __future__ import annotations
 
-import ctypes
 import subprocess
 import tempfile
 import time
@@ -13,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from casadi_peer import CasadiPeer
 from kernel import CASADI
+from single_calls import SCALAR_FLAGS
 from subjects import chain, motion, seven_joints
 from timing import Seconds, medians
 
@@ -28,25 +28,6 @@ from vsacli.robot.model import Robot
 
 LINKS, WHOLE = "link torques", "whole inverse dynamics"
 JOINTS = (1, 2, 3, 5, 7, 10, 15, 20)
-CALLS = 1_000_000
-SCALAR_FLAGS = ("-std=c99", "-O2", "-march=native")
-
-CALLER = """
-#include <time.h>
-#include "{prefix}.h"
-/* Nanoseconds of each of many calls, which step through the commands. */
-void time_calls(const {prefix}_command *commands, int count, int calls, int *nanoseconds)
-{{
-    {prefix}_drive drive;
-    for (int n = 0; n < calls; n++) {{
-        struct timespec begin, end;
-        clock_gettime(CLOCK_MONOTONIC, &begin);
-        {prefix}_inverse_dynamics(&commands[n % count], &drive);
-        clock_gettime(CLOCK_MONOTONIC, &end);
-        nanoseconds[n] = (int)(1000000000L * (end.tv_sec - begin.tv_sec) + end.tv_nsec - begin.tv_nsec);
-    }}
-}}
-"""
 
 
 def batches(samples: int, repeats: int) -> Seconds:
@@ -77,39 +58,6 @@ def _in_blocks(engine: Engine, kernel: Kernel, rows: Sequence[FloatArray]) -> Ca
             engine.run(kernel, [row[part] for row in rows])
 
     return way
-
-
-class Calls(NamedTuple):
-    """Microseconds of single calls of the generated inverse dynamics."""
-
-    median: float
-    most: float
-    worst: float
-
-
-def single_calls(calls: int = CALLS) -> Calls:
-    """Time each of many calls; `most` is what 99.9 % of them stay below."""
-    robot = seven_joints()
-    prefix = prefix_of(robot)
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for file, text in generate(robot).files.items():
-            (folder / file).write_text(text, encoding="utf-8")
-        (folder / "caller.c").write_text(CALLER.format(prefix=prefix), encoding="utf-8")
-        command = ["cc", *SCALAR_FLAGS, "-D_POSIX_C_SOURCE=199309L", "-fPIC", "-shared", f"{prefix}.c"]
-        subprocess.run([*command, "caller.c", "-o", "caller.so", "-lm"], cwd=folder, check=True)
-        library = ctypes.CDLL(str(folder / "caller.so"))
-    count = 1000
-    commands = np.zeros((count, 8, 7))
-    commands[:, :5] = np.stack(motion(7, count), axis=1)
-    commands[:, 5] = 1000
-    taken = np.empty(calls, dtype=np.int32)
-    library.time_calls(
-        commands.ctypes.data_as(ctypes.c_void_p), count, calls, taken.ctypes.data_as(ctypes.c_void_p)
-    )
-    return Calls(
-        *(float(value) / 1e3 for value in (np.median(taken), np.quantile(taken, 0.999), taken.max()))
-    )
 
 
 class Cost(NamedTuple):

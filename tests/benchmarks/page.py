@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from actuation import JOINTS, Actuation
-from compiled import CALLS, SCALAR_FLAGS, Calls, Cost
+from compiled import Cost
+from controllers import Controller
 from growth import Growth
 from kernel import CASADI, Kernel
 from recorders import Recorder
 from sensitivities import INVERSE_DYNAMICS, SAMPLES, Sensitivities
 from simulations import COMPILED, RECORDED, TEXT, Simulated
+from single_calls import CALLS, SCALAR_FLAGS, Calls
 from stages import Stages
 from storage import Stored
 from timing import Seconds
@@ -61,6 +63,28 @@ def call_sentence(calls: Calls) -> str:
         f"{CALLS:,} single calls of the generated `inverse_dynamics`, 7R arm, "
         f"`{' '.join(SCALAR_FLAGS)}`: median {calls.median:.2g} µs, 99.9 % below {calls.most:.2g} µs, "
         f"the worst {calls.worst:,.0f} µs, when the operating system let something else run."
+    )
+
+
+def controller_table(found: Iterable[Controller]) -> str:
+    """Memory, operations and time of inverse dynamics on controllers."""
+    names = ("robot", "numbers", "operations at most", "flash", "stack")
+    header = (*names, "instructions a call", "the longest", "µs here")
+    return table(
+        header,
+        (
+            [
+                f"`{each.robot}`",
+                each.precision,
+                f"{each.operations:,}",
+                f"{each.flash / 1e3:.0f} kB",
+                f"{each.stack / 1e3:.1f} kB",
+                f"{each.instructions:,.0f}",
+                f"{each.most:,.0f}",
+                micro(each.seconds),
+            ]
+            for each in found
+        ),
     )
 
 

@@ -1,0 +1,129 @@
+"""What generated inverse dynamics takes on a Cortex-M7, memory and instructions, and its time here."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from samples.codegen import commands, motion_of
+from samples.cortex_m7 import COMPILER, COUNTING, PROCESSOR, link, run
+from samples.shipped import shipped_robot
+from single_calls import single_calls
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import Flag, has
+from vsacli.control.codegen.cost import worst_cost
+from vsacli.control.codegen.project import generate, prefix_of
+from vsacli.control.codegen.robot_functions import command_structure, inverse_dynamics_function
+from vsacli.dynamics.inverse import compute_block
+from vsacli.robot.model import Robot
+
+NAMES = ("vsa_3r", "lwr_7r_vsa", "measured_1r")
+PRECISIONS = ("double", "float")
+FLAGS = ("-std=c99", "-O2")
+CALLS = 100_000
+COUNTED = 20
+"""Commands whose instructions are counted, which takes no luck: they are the same each time."""
+
+INSTRUCTIONS_A_TICK = 40
+"""The timer of the board counts at 25 MHz, an instruction takes a nanosecond of its time."""
+
+COUNTER = """
+#include <stdio.h>
+#include "{prefix}.h"
+#define SYSTICK ((volatile unsigned *)0xE000E010u) /* control, reload, count down */
+enum {{ REPEATS = 100 }};
+static const {prefix}_command commands[] = {{
+{commands}
+}};
+int main(void)
+{{
+    {prefix}_drive drive;
+    SYSTICK[1] = 0xFFFFFFu;
+    for (unsigned n = 0; n < sizeof commands / sizeof commands[0]; n++) {{
+        SYSTICK[2] = 0;
+        SYSTICK[0] = 5;
+        for (int k = 0; k < REPEATS; k++)
+            {prefix}_inverse_dynamics(&commands[n], &drive);
+        printf("%u\\n", 0xFFFFFFu - SYSTICK[2]);
+        SYSTICK[0] = 0;
+    }}
+    return 0;
+}}
+"""
+REPEATS = 100
+
+
+class Controller(NamedTuple):
+    """What code of a robot takes.
+
+    Attributes:
+        robot: its name.
+        precision: of the numbers.
+        operations: of inverse dynamics, at most.
+        flash: bytes of all functions and their tables on a Cortex-M7.
+        stack: bytes, of inverse dynamics there.
+        instructions: there, median over commands.
+        most: largest number of these.
+        seconds: a call on this machine, median.
+    """
+
+    robot: str
+    precision: str
+    operations: int
+    flash: int
+    stack: int
+    instructions: float
+    most: float
+    seconds: float
+
+
+def measure() -> list[Controller]:
+    """Each robot, in double and single precision."""
+    return list(_measured())
+
+
+def _measured() -> Iterator[Controller]:
+    for name in NAMES:
+        robot = shipped_robot(name)
+        operations = worst_cost(inverse_dynamics_function(robot).program).operations
+        command = reachable(robot)
+        for precision in PRECISIONS:
+            flash, stack, instructions = _on_cortex_m7(robot, precision, command)
+            calls = single_calls(robot, command, precision, CALLS)
+            counts = float(np.median(instructions)), float(instructions.max())
+            yield Controller(name, precision, operations, flash, stack, *counts, seconds=calls.median * 1e-6)
+
+
+def reachable(robot: Robot) -> FloatArray:
+    """Commands that can be executed, (commands, signals, joints)."""
+    drawn = commands(robot, 1000, seed=1)
+    flags = compute_block(robot, motion_of(drawn)).flags
+    names = [array.name for array in command_structure(robot).arrays]
+    chosen = np.stack([drawn[name] for name in names], axis=1)
+    return chosen[~has(flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=1)]
+
+
+def _on_cortex_m7(robot: Robot, precision: str, command: FloatArray) -> tuple[int, int, FloatArray]:
+    """Bytes of code and of stack, and instructions of calls."""
+    prefix = prefix_of(robot)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, text in generate(robot, precision).files.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        compiler = [COMPILER, *PROCESSOR, *FLAGS, "-fstack-usage", "-c", f"{prefix}.c"]
+        subprocess.run(compiler, cwd=folder, check=True)
+        size = ["arm-none-eabi-size", f"{prefix}.o"]
+        listed = subprocess.run(size, cwd=folder, check=True, capture_output=True, text=True).stdout
+        stacks = (folder / f"{prefix}.su").read_text().splitlines()
+        rows = [np.array2string(row, separator=",", threshold=row.size) for row in command[:COUNTED]]
+        written = ",\n".join(row.replace("[", "{").replace("]", "}") for row in rows)
+        (folder / "counter.c").write_text(COUNTER.format(prefix=prefix, commands=written))
+        found = run(link(folder, *FLAGS, "counter.c", f"{prefix}.o"), *COUNTING)
+    stack = next(int(line.split()[-2]) for line in stacks if f"{prefix}_inverse_dynamics" in line)
+    ticks = np.array(found.stdout.split(), dtype=float)
+    return int(listed.splitlines()[1].split()[0]), stack, ticks * INSTRUCTIONS_A_TICK / REPEATS
