@@ -20,7 +20,7 @@ from samples.robots import random_motion, vsa_3r
 from vsacli.base.errors import InputError
 from vsacli.compute.engine import NUMPY, choice, choose, compiler, libraries
 from vsacli.compute.engine.cache import open_cache
-from vsacli.compute.engine.choice import LOOK_FROM
+from vsacli.compute.engine.choice import LOOK_FROM, in_usual_blocks
 from vsacli.compute.engine.compiled_engine import CompiledEngine
 from vsacli.compute.engine.libraries import Code, _loaded
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
@@ -180,6 +180,13 @@ def test_asking_for_c_without_a_compiler_is_a_mistake(vsacli, motion, monkeypatc
 
 def test_no_threads_are_refused(vsacli, motion):
     assert vsacli("invdyn", ROBOT, motion, "--threads", "0").code == 2
+
+
+def test_long_chains_are_worth_a_look_with_fewer_samples():
+    """NumPy takes short blocks of them, in which its calls count, so a sample takes longer for each joint."""
+    few, many = (in_usual_blocks(10_000, 5 * joints) for joints in (3, 1000))
+    assert few == 10_000
+    assert LOOK_FROM < many < 50 * few
 
 
 def test_compiling_repays_neither_for_little_work_nor_for_long_code():

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.compute.engine.engines import Engine, Kernel, NumPyEngine, Tell, TracedEngine, unheard
+from vsacli.compute.engine.engines import (
+    SAMPLES_PER_PASS,
+    Engine,
+    Kernel,
+    NumPyEngine,
+    Tell,
+    TracedEngine,
+    samples_per_pass,
+    unheard,
+)
 
 if TYPE_CHECKING:
     from vsacli.compute.engine.libraries import Code
@@ -19,13 +28,17 @@ NUMPY_SECONDS = 0.3e-9
 """What NumPy takes for an operation on a sample: 0.22 to 0.31 ns in traced programs of the shipped robots,
 some more where loops run until the last sample is done."""
 
+NUMPY_CALL_SAMPLES = 3_000
+"""Samples in whose time NumPy sees to a call: 0.9 us, which counts in the short blocks of long chains."""
+
 LOOK_FROM = 50_000
-"""Samples with which it is busy for longer than it takes to see whether there is compiled code: recording and
-asking the compiler for its version take 50 to 110 ms, which is what NumPy takes for 50,000 to 130,000."""
+"""Samples, in blocks of the usual size, with which it is busy for longer than it takes to see if there is
+compiled code: recording and asking the compiler for its version take 50 to 110 ms, which is what NumPy takes
+for 50,000 to 130,000."""
 
 TRACE_FROM = 100_000
-"""Samples from which on NumPy saves more time with a traced program than tracing takes: 83,000 to 158,000 for
-robots of one to seven joints."""
+"""The same from which on NumPy saves more time with a traced program than tracing takes: 83,000 to 158,000
+for robots of one to seven joints, 47,000 with 50, and 23,000 with 1000: those are 1,200 in shorter blocks."""
 
 NUMPY: Engine = NumPyEngine()
 
@@ -69,9 +82,10 @@ def choose(
             nothing that it could compile.
     """
     check_engine(name)
+    usual = in_usual_blocks(samples, kernel.inputs)
     if name == "numpy":
-        return Choice(_numpy(samples), "NumPy computes, as asked for")
-    if name == "auto" and samples < LOOK_FROM:
+        return Choice(_numpy(usual), "NumPy computes, as asked for")
+    if name == "auto" and usual < LOOK_FROM:
         return Choice(NUMPY, f"NumPy computes: {samples} samples are few")
     from vsacli.compute.engine.compiled_engine import CompiledEngine
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
@@ -80,17 +94,17 @@ def choose(
     try:
         compiler = system_compiler()
         engine = CompiledEngine(compiler, threads, tell)
-        loaded = engine.prepare(kernel, lambda code: name == "c" or _repays(code, samples))
+        loaded = engine.prepare(kernel, lambda code: name == "c" or _repays(code, usual))
     except CompilerError as error:
         if name == "c":
             raise InputError.one(f"{error}; the engine numpy needs none") from error
-        return Choice(_numpy(samples), f"NumPy computes: {error}")
+        return Choice(_numpy(usual), f"NumPy computes: {error}")
     except NotImplementedError as error:
         if name == "c":
             raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
-        return Choice(_numpy(samples), f"NumPy computes: {error}")
+        return Choice(_numpy(usual), f"NumPy computes: {error}")
     if loaded is None:
-        return Choice(_numpy(samples), f"NumPy computes: {samples} samples would not repay compiling")
+        return Choice(_numpy(usual), f"NumPy computes: {samples} samples would not repay compiling")
     when = "now" if loaded.compiled else "before"
     reason = f"C code computes, compiled {when}, in {_counted(threads)}"
     return Choice(engine, reason, compiler.name, threads)
@@ -117,14 +131,15 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
         InputError: there is no engine of that name, or it is "c" and there is no C compiler that works.
     """
     check_engine(name)
-    if name == "numpy" or (name == "auto" and samples < LOOK_FROM):
+    usual = in_usual_blocks(samples, kernel.inputs)
+    if name == "numpy" or (name == "auto" and usual < LOOK_FROM):
         return Settled("numpy")
     from vsacli.compute.engine.compiled_engine import kernel_code
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
     try:
         compiler = system_compiler()
-        repays = name == "c" or _repays(kernel_code(kernel), samples)
+        repays = name == "c" or _repays(kernel_code(kernel), usual)
     except CompilerError as error:
         if name == "c":
             raise InputError.one(f"{error}; the engine numpy needs none") from error
@@ -144,13 +159,19 @@ def check_engine(name: str) -> None:
         raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
 
 
-def _repays(code: Code, samples: int) -> bool:
+def in_usual_blocks(samples: int, inputs: int) -> float:
+    """How many samples would keep NumPy busy as long if it took as many at a time as of few inputs."""
+    calls, fewest = (NUMPY_CALL_SAMPLES / size for size in (samples_per_pass(inputs), SAMPLES_PER_PASS))
+    return samples * (1 + calls) / (1 + fewest)
+
+
+def _repays(code: Code, samples: float) -> bool:
     """Whether NumPy would be busy for longer than the compiler, which is done in time."""
     repays = code.operations * samples * NUMPY_SECONDS > code.compiling_seconds
     return repays and not code.takes_too_long
 
 
-def _numpy(samples: int) -> Engine:
+def _numpy(samples: float) -> Engine:
     return NUMPY if samples < TRACE_FROM else TracedEngine()
 
 

@@ -13,10 +13,10 @@ from vsacli.compute.engine.compiler import TIMEOUT, Compiler, CompilerError
 from vsacli.compute.engine.engines import Tell
 
 COMPILER_START_SECONDS = 0.25
-COMPILER_SECONDS_PER_OPERATION = 1e-4
-COMPILER_SECONDS_PER_SQUARE = 2e-8
+COMPILER_SECONDS_PER_OPERATION = 4.5e-5
+COMPILER_SECONDS_PER_SQUARE = 1.7e-8
 """What the compiler takes to start, for each operation, and for the square of those of one function: gcc 12
-takes 1.4 s for 7,000 in one function, 4.6 s for 15,000, 40 s for 40,000."""
+takes 0.3 s for 1,700 in one function, 0.8 s for 4,700, 1.4 s for 7,000, 4.6 s for 15,000."""
 
 LONG_SECONDS = 5.0
 """From which on the user is told before."""
