@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.drives import springs
+from samples.marks import slow_but
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.laws import SpringLaw
@@ -156,8 +157,9 @@ def test_passing_the_singular_set_is_near_singular_and_stays_on_the_branch(laws:
     assert result.report.verdict == "ok"
 
 
-@every_pair
-def test_touching_the_singular_set_loses_the_motor_torque_there_only(laws: tuple[SpringLaw, SpringLaw]):
+@pytest.mark.parametrize("pair", slow_but({"cubic, unlike", "four-bar"}, PAIRS))
+def test_touching_the_singular_set_loses_the_motor_torque_there_only(pair: str):
+    laws = PAIRS[pair]
     result, _ = dip(laws, closest=0.0)
     passing, _ = dip(laws, closest=1e-6)
     singular = has(result.flags[:, 0], Flag.SINGULAR)

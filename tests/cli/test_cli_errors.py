@@ -134,7 +134,7 @@ TO_STDOUT = {
 }
 
 
-@pytest.fixture(params=["", "1"], ids=["buffered", "unbuffered"])
+@pytest.fixture(params=["", slow("1")], ids=["buffered", "unbuffered"])
 def printing(request, tmp_path, motion, feasible_result, monkeypatch):
     """A folder in which each of `TO_STDOUT` prints something, at once or when the buffer is full."""
     monkeypatch.setenv("PYTHONUNBUFFERED", request.param)

@@ -11,6 +11,7 @@ import h5py
 import pytest
 from samples.command_line import COMMAND, ROBOT, SEVEN_JOINTS, contents, installed, seven_joint_motion
 from samples.disturbed import allow_interrupts
+from samples.marks import slow
 
 from vsacli.base.interrupts import Interrupted
 from vsacli.cli.main import vsacli as group
@@ -55,7 +56,7 @@ def temporaries(folder):
 OLD = b"old and complete"
 
 
-@pytest.fixture(params=[OLD, None], ids=["overwriting", "new"])
+@pytest.fixture(params=[OLD, slow(None)], ids=["overwriting", "new"])
 def target(request, tmp_path):
     """What stands at r.h5 before: a file or nothing."""
     if request.param is not None:
@@ -65,7 +66,7 @@ def target(request, tmp_path):
 
 @pytest.mark.parametrize(
     ("number", "target"),
-    [(signal.SIGINT, OLD), (signal.SIGTERM, OLD), (signal.SIGHUP, None)],
+    [(signal.SIGINT, OLD), slow(signal.SIGTERM, OLD), slow(signal.SIGHUP, None)],
     indirect=["target"],
 )
 def test_ended_run_leaves_the_target_and_nothing_else(tmp_path, target, writing, number):

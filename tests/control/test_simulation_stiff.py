@@ -75,7 +75,7 @@ def test_poles_of_a_million_hold_a_rigid_joint_on_its_command():
     assert np.abs(simulation.history.q_error[1:]).max() < 1e-7  # the method's order falls where it is stiff
 
 
-@pytest.mark.parametrize(("gains", "frame"), [(None, None), (GAINS, "base")])
+@pytest.mark.parametrize(("gains", "frame"), [(None, None), slow(GAINS, "base")])
 def test_both_methods_find_the_same_motion(monkeypatch, gains, frame):
     conditions = {"gains": gains, "initial_error": InitialError(0.01)}
     trajectory = short_motion(3, wrench=frame)

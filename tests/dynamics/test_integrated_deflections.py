@@ -67,7 +67,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", slow_but({"R-P", "sides differ", "tendons"}, CASES))
+@pytest.mark.parametrize("case", slow_but({"sides differ"}, CASES))
 def test_integration_stays_at_the_root(case: str):
     robot, trajectory = CASES[case]()
     root, result = inverse_dynamics(robot, trajectory), integrated(robot, trajectory)

@@ -41,8 +41,12 @@ def elsewhere(vsacli: Any, tmp_path: Path) -> Path:
     return tmp_path
 
 
+MARKS = {"integrated": pytest.mark.slow, "compiled": needs_compiler}
+
+
 @pytest.mark.parametrize(
-    "run", [pytest.param(key, marks=needs_compiler) if key == "compiled" else key for key in RUNS]
+    "run",
+    [pytest.param(key, marks=MARKS[key]) if key in MARKS else key for key in RUNS],
 )
 def test_a_result_is_computed_again_bit_for_bit(vsacli: Any, run: str) -> None:
     assert vsacli("invdyn", *RUNS[run], "-o", "r.h5", "-q").code == 0

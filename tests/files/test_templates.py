@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import yaml
 from samples.command_line import REPOSITORY, contents
+from samples.marks import slow
 
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.mechanisms import MECHANISMS
@@ -26,6 +27,8 @@ from vsacli.robot.model import OF_PLACEHOLDERS, Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT, load_trajectory
 
 ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))
+LONG = ("cam_1r", "compact_1r", "lwr_7r_vsa", "measured_1r", "panda_7r", "puma_560", "sliding_anchor_1r")
+"""Robots whose runs take longer than others."""
 
 
 def robot_of(text: str, folder: Path) -> Robot:
@@ -41,7 +44,7 @@ def report_of(robot: Robot, text: str, folder: Path) -> Any:
 
 
 @pytest.mark.parametrize("actuator", ACTUATORS)
-@pytest.mark.parametrize("joints", ["R", "P", "RRP", "prp", "RRRRRRR"])
+@pytest.mark.parametrize("joints", ["R", "P", "RRP", "prp", slow("RRRRRRR")])
 def test_a_new_robot_executes_its_new_trajectory(joints: str, actuator: str, tmp_path: Path) -> None:
     robot = robot_of(robot_template(joints, actuator), tmp_path)
     assert "".join(joint.type[0] for joint in robot.joints) == joints.lower()
@@ -74,7 +77,9 @@ def test_without_a_robot_it_suits_new_ones_with_revolute_joints(tmp_path: Path) 
         assert report_of(robot, trajectory_template(), tmp_path).verdict == "ok"
 
 
-@pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", [slow(path) if path.stem in LONG else path for path in ROBOTS], ids=lambda path: path.stem
+)
 def test_a_new_trajectory_suits_every_robot_that_comes_along(path: Path, tmp_path: Path) -> None:
     robot = load_robot(path)
     assert report_of(robot, trajectory_template(robot), tmp_path).verdict == "ok"

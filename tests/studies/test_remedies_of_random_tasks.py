@@ -33,7 +33,7 @@ INFEASIBLE = (
 them; the ten that are left out take longest, and pass likewise. At the last what keeps a torque limit at the
 steps exceeds it between them."""
 
-QUICK = (0, 9, 41, 50)
+QUICK = (0, 50)
 
 
 def fine_joints(robot, motion):

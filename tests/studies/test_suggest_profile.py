@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from samples.marks import slow
 from samples.remedies import (
     BASE,
     CUBIC,
@@ -120,7 +121,9 @@ def test_bounds_too_fast_for_any_spline_are_refused():
         nearest_spline(Bounds(time, middle - 0.1, middle + 0.1), 0.1)
 
 
-@pytest.mark.parametrize(("duration", "stiffness"), [(4.0, 790.0), (4.0, 820.0), (0.5, 850.0), (0.3, 850.0)])
+@pytest.mark.parametrize(
+    ("duration", "stiffness"), [slow(4.0, 790.0), (4.0, 820.0), (0.5, 850.0), slow(0.3, 850.0)]
+)
 def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, stiffness):
     robot, trajectory = vsa_3r(), rest_to_rest(duration, stiffness, rate=800 / duration)
     suggestions = suggest(robot, trajectory, MARGIN)

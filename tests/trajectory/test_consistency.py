@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from samples.marks import slow
 
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import FitChoice
@@ -30,7 +31,7 @@ def complaints(*given, q=None, noise=0.0, time=TIME, method=None):
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-4, 1e-2])
-@pytest.mark.parametrize("step", [1, 10, 40])
+@pytest.mark.parametrize("step", [slow(1), 10, slow(40)])
 def test_true_derivatives_follow(noise, step):
     time = TIME[::step]
     true = [columns(order, time) for order in range(1, 5)]
@@ -63,7 +64,7 @@ def test_measured_derivatives_may_be_noisy():
         (2, "2 times as large throughout"),
     ],
 )
-@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("order", [slow(1), 2, slow(4)])
 def test_another_scale_is_recognised(order, factor, said):
     given = [columns(k) for k in range(1, order + 1)]
     given[-1][:, 1] *= factor

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from samples.marks import slow
 from samples.noisy_records import MOTIONS, record
 from scipy.interpolate import make_interp_spline
 
@@ -32,7 +33,7 @@ def test_a_component_that_is_not_resolved_has_no_covariance_but_a_bound(stepwise
     assert list(bound.members) == [0]
 
 
-@pytest.mark.parametrize("rate", [250, 2000])
+@pytest.mark.parametrize("rate", [250, slow(2000)])
 def test_impulses_where_jerk_jumps_are_within_the_bound(rate):
     """Each as long as `SHORTEST_IMPULSE`: the truth is a spline through exact samples that far apart."""
     motion = MOTIONS["minimum jerk"]

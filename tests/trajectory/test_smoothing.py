@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from samples.marks import slow_but
 from samples.noisy_records import (
     COLOURS,
     FILTERED,
@@ -74,11 +75,11 @@ def test_clean_samples_are_interpolated_in_silence(motion, rate):
     assert part.smoothing is None
 
 
-@pytest.mark.parametrize("motion", MOTIONS.values())
+@pytest.mark.parametrize("motion", slow_but({"sweep to 4 Hz", "velocity steps, 50 ms"}, MOTIONS))
 @pytest.mark.parametrize("colour", FILTERED)
 def test_filtered_noise_is_found(colour, motion):
     for seed in range(2):
-        of = record(motion, colour, seed)
+        of = record(MOTIONS[motion], colour, seed)
         assert filtered_noise(of.time, of.values[None], 8).all()
 
 
