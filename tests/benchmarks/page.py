@@ -188,6 +188,7 @@ def simulation_table(found: Iterable[Simulated]) -> str:
                 *(f"{each.seconds[way]:.2g}" for way in (TEXT, RECORDED, COMPILED)),
                 f"{each.seconds[TEXT] / each.seconds[COMPILED]:.2g}",
                 micro(each.seconds[COMPILED] / each.evaluations),
+                f"{each.first:.2g}",
             ]
             for each in found
         ),

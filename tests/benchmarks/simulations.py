@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
@@ -11,6 +14,7 @@ from samples.shipped import shipped_run
 from timing import Seconds, cpu_seconds, medians
 
 from vsacli import Gains, InitialError, simulate
+from vsacli.compute.engine import libraries
 from vsacli.control.simulation import Simulation
 from vsacli.control.simulation.equations.recorded_equations import RecordedEquations
 
@@ -25,12 +29,14 @@ class Simulated(NamedTuple):
         duration: of the motion, s.
         evaluations: of the equations of motion.
         seconds: of processor time by way.
+        first: seconds of a compiled run that has to compile.
     """
 
     name: str
     duration: float
     evaluations: int
     seconds: Seconds
+    first: float
 
 
 def compare(repeats: int) -> Iterator[Simulated]:
@@ -41,8 +47,8 @@ def compare(repeats: int) -> Iterator[Simulated]:
             RECORDED: cpu_seconds(partial(run, engine="numpy")),
             COMPILED: cpu_seconds(partial(run, engine="c")),
         }
-        report = run(engine="c").report
-        yield Simulated(name, report.duration, report.evaluations, medians(ways, repeats))
+        first, report = _first(run), run(engine="c").report
+        yield Simulated(name, report.duration, report.evaluations, medians(ways, repeats), first)
 
 
 def _cases() -> dict[str, Callable[..., Simulation]]:
@@ -62,3 +68,12 @@ def _from_text(run: Callable[..., Simulation]) -> None:
     """Without anything recorded."""
     with patch.object(RecordedEquations, "_improve", lambda _self: None):
         run(engine="numpy")
+
+
+def _first(run: Callable[..., Simulation]) -> float:
+    """Seconds of a run that finds no compiled code."""
+    with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, XDG_CACHE_HOME=folder):
+        libraries._loaded.clear()
+        begin = time.perf_counter()
+        run(engine="c")
+        return time.perf_counter() - begin
