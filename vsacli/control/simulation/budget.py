@@ -10,8 +10,8 @@ from vsacli.base.errors import InputError
 from vsacli.control.simulation.ending import INCOMPLETE, Ending
 
 LEAST_DEFAULT = 200_000
-"""Evaluations: a second for an arm of three joints, half a minute without a program. Runs of the shipped files
-take 20,000 at most."""
+"""Evaluations: a second for an arm of three joints, half a minute without a program. Runs of the shipped
+files take 20,000 at most."""
 
 DEFAULT_PER_STEP = 100
 """Evaluations for each step of a trajectory, where that is more: sampled control takes 17."""
