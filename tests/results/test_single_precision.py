@@ -8,7 +8,6 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-import xarray
 from samples.command_line import ROBOT, rest_to_rest
 from samples.results import STORED, random_block, write_result
 
@@ -33,9 +32,6 @@ def test_values_are_rounded_but_times_and_flags_are_not(tmp_path: Path) -> None:
         assert theta.dtype == np.float64
         np.testing.assert_allclose(theta, block.theta, rtol=HALF_AN_ULP, atol=0)
         np.testing.assert_array_equal(result.read("flags"), block.flags, strict=True)
-    with xarray.open_dataset(path, engine="h5netcdf") as data:
-        np.testing.assert_array_equal(data.time, block.time)
-        np.testing.assert_array_equal(data.theta, theta)
 
 
 def test_double_precision_is_not_marked(tmp_path: Path) -> None:

@@ -194,6 +194,13 @@ def test_xarray_opens_it_with_named_coordinates_and_no_warning(path, block):
     assert one.joint_type == "prismatic"
 
 
+def test_xarray_opens_single_precision(tmp_path, block):
+    path = write_result(tmp_path / "r.h5", block, precision="single")
+    with xarray.open_dataset(path, engine="h5netcdf") as data:
+        np.testing.assert_array_equal(data.time, block.time, strict=True)
+        np.testing.assert_array_equal(data.theta, block.theta.astype(np.float32), strict=True)
+
+
 def test_xarray_opens_the_groups_too(path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
