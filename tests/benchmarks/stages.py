@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from subjects import SEVEN_JOINTS, seven_joints
-from timing import medians
+from timing import cpu_seconds, medians
 
 from vsacli import load_trajectory
 from vsacli.analysis.run import Run
@@ -22,19 +22,18 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
-FEW = ("tau_motor", "flags")
+VARIABLES = ("tau_motor", "flags")
 
 
 class Stages(NamedTuple):
-    """Seconds a sample of the arm with seven joints; the last stage is all of it at once."""
+    """Processor time a sample of the arm with seven joints, s."""
 
     sampling: float
     recursion: float
     actuation: float
     bookkeeping: float
-    writing_tau_motor_and_flags: float
+    writing: float
     writing_all_variables: float
-    run_with_all_variables: float
 
 
 def trajectory_of(samples: int) -> Trajectory:
@@ -55,34 +54,40 @@ def split(samples: int, repeats: int, engine: str) -> Stages:
     whole = choose(engine, InverseDynamics(robot), samples, threads=1).engine
 
     ways = {
-        "sample": lambda: [trajectory.block(start, start + of_block) for start in starts],
-        "recur": lambda: [link_torques(robot, m.q, m.dq, m.ddq, m.d3q, m.d4q, engine=links) for m in motions],
-        "compute": lambda: [compute_block(robot, m, engine=whole) for m in motions],
+        "sample": lambda: _each(trajectory.block(start, start + of_block) for start in starts),
+        "recur": lambda: _each(
+            link_torques(robot, m.q, m.dq, m.ddq, m.d3q, m.d4q, engine=links) for m in motions
+        ),
+        "compute": lambda: _each(compute_block(robot, m, engine=whole) for m in motions),
         "run": lambda: _run(Run(robot, trajectory, engine=engine, threads=1)),
-        "write": lambda: _write(blocks, robot, trajectory, FEW),
+        "write": lambda: _write(blocks, robot, trajectory, VARIABLES),
         "write all": lambda: _write(blocks, robot, trajectory),
-        "run and write": lambda: _write(Run(robot, trajectory, engine=engine, threads=1), robot, trajectory),
     }
-    each = {name: seconds / samples for name, seconds in medians(ways, repeats).items()}
+    taken = medians({name: cpu_seconds(way) for name, way in ways.items()}, repeats)
+    each = {name: seconds / samples for name, seconds in taken.items()}
     return Stages(
         sampling=each["sample"],
         recursion=each["recur"],
         actuation=each["compute"] - each["recur"],
         bookkeeping=each["run"] - each["compute"] - each["sample"],
-        writing_tau_motor_and_flags=each["write"],
+        writing=each["write"],
         writing_all_variables=each["write all"],
-        run_with_all_variables=each["run and write"],
     )
 
 
-def _run(run: Run) -> None:
-    for _ in run:
+def _each(blocks: Iterable[object]) -> None:
+    """Have them computed, one after the other, as a run does that keeps none."""
+    for _ in blocks:
         pass
+
+
+def _run(run: Run) -> None:
+    _each(run)
     run.report()
 
 
 def _write(
-    blocks: Iterable[Block], robot: Robot, trajectory: Trajectory, variables: Sequence[str] | None = None
+    blocks: Sequence[Block], robot: Robot, trajectory: Trajectory, variables: Sequence[str] | None = None
 ) -> None:
     with (
         tempfile.TemporaryDirectory() as folder,
