@@ -9,17 +9,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from samples.codegen import commands, motion_of
-from samples.cortex_m7 import COMPILER, COUNTING, PROCESSOR, link, run
+from samples.codegen import reachable
+from samples.cortex_m7 import COMPILER, PROCESSOR
+from samples.cortex_m7.instructions import instructions
 from samples.shipped import shipped_robot
 from single_calls import single_calls
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has
 from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.project import generate, prefix_of
-from vsacli.control.codegen.robot_functions import command_structure, inverse_dynamics_function
-from vsacli.dynamics.inverse import compute_block
+from vsacli.control.codegen.robot_functions import inverse_dynamics_function
 from vsacli.robot.model import Robot
 
 NAMES = ("vsa_3r", "lwr_7r_vsa", "measured_1r")
@@ -28,34 +27,6 @@ FLAGS = ("-std=c99", "-O2")
 CALLS = 100_000
 COUNTED = 20
 """Commands whose instructions are counted, which takes no luck: they are the same each time."""
-
-INSTRUCTIONS_A_TICK = 40
-"""The timer of the board counts at 25 MHz, an instruction takes a nanosecond of its time."""
-
-COUNTER = """
-#include <stdio.h>
-#include "{prefix}.h"
-#define SYSTICK ((volatile unsigned *)0xE000E010u) /* control, reload, count down */
-enum {{ REPEATS = 100 }};
-static const {prefix}_command commands[] = {{
-{commands}
-}};
-int main(void)
-{{
-    {prefix}_drive drive;
-    SYSTICK[1] = 0xFFFFFFu;
-    for (unsigned n = 0; n < sizeof commands / sizeof commands[0]; n++) {{
-        SYSTICK[2] = 0;
-        SYSTICK[0] = 5;
-        for (int k = 0; k < REPEATS; k++)
-            {prefix}_inverse_dynamics(&commands[n], &drive);
-        printf("%u\\n", 0xFFFFFFu - SYSTICK[2]);
-        SYSTICK[0] = 0;
-    }}
-    return 0;
-}}
-"""
-REPEATS = 100
 
 
 class Controller(NamedTuple):
@@ -93,19 +64,10 @@ def _measured() -> Iterator[Controller]:
         operations = worst_cost(inverse_dynamics_function(robot).program).operations
         command = reachable(robot)
         for precision in PRECISIONS:
-            flash, stack, instructions = _on_cortex_m7(robot, precision, command)
+            flash, stack, taken = _on_cortex_m7(robot, precision, command)
             calls = single_calls(robot, command, precision, CALLS)
-            counts = float(np.median(instructions)), float(instructions.max())
+            counts = float(np.median(taken)), float(taken.max())
             yield Controller(name, precision, operations, flash, stack, *counts, seconds=calls.median * 1e-6)
-
-
-def reachable(robot: Robot) -> FloatArray:
-    """Commands that can be executed, (commands, signals, joints)."""
-    drawn = commands(robot, 1000, seed=1)
-    flags = compute_block(robot, motion_of(drawn)).flags
-    names = [array.name for array in command_structure(robot).arrays]
-    chosen = np.stack([drawn[name] for name in names], axis=1)
-    return chosen[~has(flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=1)]
 
 
 def _on_cortex_m7(robot: Robot, precision: str, command: FloatArray) -> tuple[int, int, FloatArray]:
@@ -120,10 +82,6 @@ def _on_cortex_m7(robot: Robot, precision: str, command: FloatArray) -> tuple[in
         size = ["arm-none-eabi-size", f"{prefix}.o"]
         listed = subprocess.run(size, cwd=folder, check=True, capture_output=True, text=True).stdout
         stacks = (folder / f"{prefix}.su").read_text().splitlines()
-        rows = [np.array2string(row, separator=",", threshold=row.size) for row in command[:COUNTED]]
-        written = ",\n".join(row.replace("[", "{").replace("]", "}") for row in rows)
-        (folder / "counter.c").write_text(COUNTER.format(prefix=prefix, commands=written))
-        found = run(link(folder, *FLAGS, "counter.c", f"{prefix}.o"), *COUNTING)
+        counts = instructions(folder, prefix, command[:COUNTED])
     stack = next(int(line.split()[-2]) for line in stacks if f"{prefix}_inverse_dynamics" in line)
-    ticks = np.array(found.stdout.split(), dtype=float)
-    return int(listed.splitlines()[1].split()[0]), stack, ticks * INSTRUCTIONS_A_TICK / REPEATS
+    return int(listed.splitlines()[1].split()[0]), stack, counts

@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
+from samples.codegen import reachable
 from samples.cortex_m7 import COMPILER, PROCESSOR, link, run
+from samples.cortex_m7.instructions import instructions
 from samples.generated_code import STRICT, compile_c, write_files
 from samples.marks import needs
 from samples.shipped import shipped_robot
 
 from vsacli.control.codegen.project import generate, prefix_of
+from vsacli.control.codegen.scalar import PRECISIONS
 from vsacli.robot.model import Robot
 
 pytestmark = [
@@ -29,7 +33,7 @@ ROBOTS: dict[str, Robot] = {
 WARNINGS = (*STRICT, "-Wconversion", "-Wdouble-promotion")
 
 
-@pytest.mark.parametrize("precision", ["double", "float"])
+@pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize(
     ("name", "patterns", "optimisation"),
     [
@@ -72,3 +76,17 @@ def test_single_precision_takes_nothing_from_the_library_for_doubles(tmp_path: P
         line.split()[1] for line in (tmp_path / "robot.s").read_text().splitlines() if line.startswith("\tb")
     }
     assert not [name for name in called if name.startswith(("__aeabi_d", "__aeabi_f2d"))]
+
+
+def test_loops_end_as_soon_in_single_precision(tmp_path: Path) -> None:
+    """Tolerances of double precision are out of reach there: loops would run to their bounds."""
+    robot = ROBOTS["measured"]
+    chosen = reachable(robot)[:20]
+    taken = {}
+    for precision in PRECISIONS:
+        folder = tmp_path / precision
+        folder.mkdir()
+        write_files(generate(robot, precision), folder)
+        compile_c(folder, *PROCESSOR, "-O1", "-c", "measured_1r.c", compiler=COMPILER)
+        taken[precision] = instructions(folder, "measured_1r", chosen)
+    assert np.all(taken["float"] < 1.2 * taken["double"])

@@ -12,7 +12,9 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import Flag, has
 from vsacli.base.variables import Block
+from vsacli.control.codegen.robot_functions import command_structure
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
@@ -57,6 +59,14 @@ def commands(robot: Robot, samples: int, seed: int) -> dict[str, FloatArray]:
     stiffness[2:4] = upper[2:4]
     stiffness[4:6] = lower[4:6] * 1.004
     return {**drawn, "stiffness": stiffness}
+
+
+def reachable(robot: Robot) -> FloatArray:
+    """Random commands that can be executed, (commands, signals, joints)."""
+    drawn = commands(robot, 1000, seed=1)
+    flags = compute_block(robot, motion_of(drawn)).flags
+    chosen = np.stack([drawn[array.name] for array in command_structure(robot).arrays], axis=1)
+    return chosen[~has(flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=1)]
 
 
 def motion_of(arrays: dict[str, FloatArray]) -> Motion:

@@ -16,8 +16,6 @@ BOARD = (
     "-semihosting-config",
     "enable=on,target=native",
 )
-COUNTING = ("-icount", "shift=0")
-"""A nanosecond of the board's time for each instruction, so that its timers count these."""
 
 _FILES = Path(__file__).parent
 

@@ -81,10 +81,11 @@ def _safeguarded(
         (phi, low, high, *_), (torque,) = state, constants
         halley, error, spring = _halley_step(law, torque, phi)
         low, high = np.where(error <= 0, phi, low), np.where(error >= 0, phi, high)
-        inside = (halley >= low) & (halley <= high)
-        next_phi = np.where(inside, halley, (low + high) / 2)
+        inside, middle = (halley >= low) & (halley <= high), (low + high) / 2
+        next_phi = np.where(inside, halley, middle)
         converged = inside & _converges(torque, error)
-        return (next_phi, low, high, *spring.after(next_phi - phi)), converged | ~(low < high)
+        best = (next_phi == phi) | ~((low < middle) & (middle < high))  # that numbers can be
+        return (next_phi, low, high, *spring.after(next_phi - phi)), converged | best
 
     low = np.where(np.isfinite(torque), low, np.nan)
     phi, _, _, *spring = repeat(step, (start, low, high, *[start] * 4), (torque,), MAX_HALLEY_STEPS)

@@ -8,6 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat, subroutine
+from vsacli.compute.rounding import OfRounding
 
 Function = Callable[..., FloatArray]
 """f(x, *constants) on arrays of one shape."""
@@ -15,7 +16,7 @@ Function = Callable[..., FloatArray]
 MAX_STEPS = 120
 """Twice what bisection needs between neighbouring powers of two; more only if an end lies at zero."""
 
-ROOT_RTOL = 2 * float(np.finfo(float).eps)
+ROOT_RTOL = OfRounding(2 * np.finfo(float).eps)
 """Relative width of a bracket that cannot be halved any more."""
 
 ROOT_ATOL = 1e-300

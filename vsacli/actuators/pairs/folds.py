@@ -14,11 +14,12 @@ from vsacli.actuators.pairs.critical_points import bracketed_in_box, is_short, n
 from vsacli.actuators.pairs.fold_map import FoldMap
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat, where_needed
+from vsacli.compute.rounding import OfRounding
 
 MAX_NEWTON_STEPS = 12
 """Newton steps to a fold to which the map does not lead; three or four do."""
 
-NEWTON_RTOL = 1e-9
+NEWTON_RTOL = OfRounding(1e-9, power=0.5)
 """Relative size of a step after which the next would be rounding."""
 
 

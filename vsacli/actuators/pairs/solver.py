@@ -17,11 +17,12 @@ from vsacli.actuators.pairs.equal_torque import first_guess, third_order_step
 from vsacli.actuators.pairs.fold_map import FoldMap, map_folds
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat, where_needed
+from vsacli.compute.rounding import OfRounding
 
 MAX_STEPS = 30
 """Three or four do, except next to a cusp or far beyond what the springs are made for."""
 
-ERROR_RTOL = 1e-17
+ERROR_RTOL = OfRounding(1e-17)
 """Relative error after a step that is none: the estimate may be some hundred times too small."""
 
 MAX_DOUBLINGS = 1000

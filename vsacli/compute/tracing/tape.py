@@ -6,6 +6,7 @@ import sys
 from collections.abc import Hashable, Sequence
 from typing import Any
 
+from vsacli.compute.rounding import OfRounding
 from vsacli.compute.tracing.constant_folding import folded
 from vsacli.compute.tracing.dead_code import without_dead_code
 from vsacli.compute.tracing.outlining import with_outlined_runs
@@ -124,7 +125,7 @@ class Tape:
 
 def _python_number(operand: Any) -> Any:
     """Constants as Python's own numbers."""
-    return operand if isinstance(operand, Symbol | Table | int) else float(operand)
+    return operand if isinstance(operand, Symbol | Table | int | OfRounding) else float(operand)
 
 
 def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:

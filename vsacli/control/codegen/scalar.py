@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
+from vsacli.compute.rounding import OfRounding
 from vsacli.compute.tracing import Kind, Program, Symbol
 from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations
 from vsacli.compute.tracing.c_subroutines import Subroutines
@@ -72,6 +73,12 @@ class Scalar(Dialect):
         types = {Kind.REAL: precision, Kind.TRUTH: "int", Kind.BITS: "unsigned", Kind.INDEX: "int"}
         super().__init__(types)
         self._suffix = "f" if precision == "float" else ""
+
+    def constant(self, value: float | int | bool, kind: Kind) -> str:
+        """As of `Dialect`."""
+        if self._suffix and isinstance(value, OfRounding):
+            value = value.in_single_precision()
+        return super().constant(value, kind)
 
     def real(self, number: float) -> str:
         """As of `Dialect`; NAN and INFINITY of math.h are floats."""
