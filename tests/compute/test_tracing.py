@@ -156,7 +156,7 @@ def test_what_cannot_be_recorded_is_refused_by_name(
 
 
 def test_values_of_two_programs_do_not_meet(row: TracedArray) -> None:
-    with pytest.raises(ValueError, match="a value of another program"):
+    with pytest.raises(NotImplementedError, match="a value of another program"):
         row + TracedArray(other := Tape(), other.inputs(1))
 
 

@@ -108,7 +108,8 @@ class Tape:
 
     def _new(self, operation: str, operands: tuple[Any, ...], kind: Kind) -> Symbol:
         if any(isinstance(operand, Symbol) and operand.tape is not self for operand in operands):
-            raise ValueError("a value of another program is none of this one; pass it as an argument")
+            message = "a value of another program is none of this one; pass it as an argument"
+            raise NotImplementedError(message)
         if len(self._symbols) >= self._most:
             raise TooLongError(f"a step takes more than {self._most} operations")
         symbol = Symbol(self, len(self._symbols), operation, operands, kind)
