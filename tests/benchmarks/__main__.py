@@ -25,6 +25,7 @@ import recorders
 import sensitivities
 import simulations
 import single_calls
+import small_numbers
 import stages
 import storage
 import whole_runs
@@ -48,6 +49,7 @@ def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
     yield "machine", description() + "\n"
     yield "kernel", page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats))
     yield "batches", page.batch_table(compiled.batches(SAMPLES, repeats))
+    yield "subnormals", page.subnormal_table(small_numbers.compare(SAMPLES, repeats))
     yield "calls", page.call_sentence(single_calls.calls_of_seven_joints())
     yield "recorders", page.recorder_table(recorders.compare(SAMPLES, repeats))
     yield "controllers", page.controller_table(controllers.measure())

@@ -57,6 +57,13 @@ def _way(name: str) -> list[str]:
     return [name, "1"] if name == CASADI else name.rsplit(", ", 1)
 
 
+def subnormal_table(ratios: Mapping[str, Seconds]) -> str:
+    """What small numbers cost, by engine and size."""
+    header = ("derivatives times", *ratios)
+    sizes = next(iter(ratios.values()))
+    return table(header, ([size, *(f"{taken[size]:.2f}" for taken in ratios.values())] for size in sizes))
+
+
 def call_sentence(calls: Calls) -> str:
     """How long single calls of generated code take."""
     return (

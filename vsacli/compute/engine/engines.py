@@ -10,6 +10,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.aligned_rows import aligned_rows
+from vsacli.compute.subnormals import subnormals_as_zero
 
 if TYPE_CHECKING:
     from vsacli.compute.tracing import Program
@@ -82,9 +83,10 @@ class NumPyEngine:
         """As of `Engine`."""
         keep_freed_memory()
         outputs = np.empty((kernel.outputs, len(rows[0])))
-        for part in passes(rows):
-            for output, row in zip(outputs, kernel([row[part] for row in rows]), strict=True):
-                output[part] = row
+        with subnormals_as_zero():
+            for part in passes(rows):
+                for output, row in zip(outputs, kernel([row[part] for row in rows]), strict=True):
+                    output[part] = row
         return outputs
 
 
@@ -117,8 +119,9 @@ class TracedEngine:
         if function not in self._workspaces:
             self._workspaces[function] = function.workspace(samples_per_pass(len(rows)))
         outputs = aligned_rows(kernel.outputs, len(rows[0]))
-        for part in passes(rows):
-            function([row[part] for row in rows], outputs[:, part], self._workspaces[function])
+        with subnormals_as_zero():
+            for part in passes(rows):
+                function([row[part] for row in rows], outputs[:, part], self._workspaces[function])
         return outputs
 
 

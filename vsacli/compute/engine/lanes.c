@@ -173,12 +173,31 @@ static void last_group(const double *const *in, double *const *out, int64_t at, 
         memcpy(out[row] + at, &outputs[row], sizeof(double) * (size_t)count);
 }
 
+/* Numbers below 2.2e-308, of less than 53 bits, take some processors a hundred times longer: in this thread, and until
+   it is done, they are zero, as operands and as results. */
+#ifdef __SSE2__
+#include <xmmintrin.h>
+enum { SMALL_RESULTS_ARE_ZERO = 0x8000, SMALL_OPERANDS_ARE_ZERO = 0x0040 };
+static inline unsigned without_subnormals(void)
+{
+    const unsigned mode = _mm_getcsr();
+    _mm_setcsr(mode | SMALL_RESULTS_ARE_ZERO | SMALL_OPERANDS_ARE_ZERO);
+    return mode;
+}
+static inline void restore(unsigned mode) { _mm_setcsr(mode); }
+#else
+static inline unsigned without_subnormals(void) { return 0; }
+static inline void restore(unsigned mode) { (void)mode; }
+#endif
+
 void run(int64_t start, int64_t stop, const double *const *in, double *const *out)
 {
+    const unsigned mode = without_subnormals();
     int64_t at = start;
     for (; at + LANES <= stop; at += LANES)
         group(in, out, at);
     if (at < stop)
         last_group(in, out, at, (int)(stop - at));
     finish();
+    restore(mode);
 }
