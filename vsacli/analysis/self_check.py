@@ -78,11 +78,10 @@ class SpringCheck:
     @property
     def residual(self) -> float:
         """The largest so far, scaled; NaN if a number is missing at a regular step."""
-        error, damped_error = self._error, self._damped_error
-        for excerpt in self._excerpts:
-            of_joints = [of_joint(excerpt, index) for index in range(len(self._joints))]
-            apart = spring_balances(self._joints, of_joints)
-            error = np.max(apart["spring_error"], initial=error)
-            damped_error = np.max([damped_error, *np.transpose(apart["damped_error"])], axis=0)
+        probed = {name: np.concatenate([each[name] for each in self._excerpts]) for name in self._excerpts[0]}
+        of_joints = [of_joint(probed, index) for index in range(len(self._joints))]
+        apart = spring_balances(self._joints, of_joints)
+        error = np.max(apart["spring_error"], initial=self._error)
+        damped_error = np.max([self._damped_error, *np.transpose(apart["damped_error"])], axis=0)
         size = np.maximum(self._damped_size, np.finfo(float).tiny)
         return float(np.max(damped_error / size, initial=error))

@@ -24,4 +24,4 @@ def ahead(items: Iterator[_Item]) -> Iterator[_Item]:
         coming = thread.submit(following)
         while found := coming.result():
             coming = thread.submit(following)
-            yield from found
+            yield found.pop()  # which is not kept here
