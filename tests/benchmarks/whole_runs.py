@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from casadi_peer import CasadiPeer
-from stages import FEW, trajectory_of
+from stages import VARIABLES, trajectory_of
 from subjects import motion, seven_joints
 from timing import cpu_seconds, medians
 
@@ -19,7 +19,7 @@ from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
-SELECTIONS = {"all variables": None, f"`--variables {','.join(FEW)}`": FEW}
+SELECTIONS = {"all variables": None, f"`--variables {','.join(VARIABLES)}`": VARIABLES}
 
 
 class WholeRun(NamedTuple):
