@@ -40,7 +40,7 @@ double link_torques_of_rows(const double *rows, double *torques, long samples) {
 
 
 class CasadiPeer:
-    """Compiled link torques of a robot; `__call__` times a loop over all samples."""
+    """Compiled link torques of a robot; `__call__` times a loop over all samples, in processor time."""
 
     def __init__(self, robot: Robot, folder: Path) -> None:
         function = _function(robot)

@@ -11,7 +11,7 @@ import numpy as np
 from casadi_peer import CasadiPeer
 from pinocchio_peer import link_torques as pinocchio_torques
 from subjects import motion, seven_joints
-from timing import medians
+from timing import cpu_seconds, medians
 
 from vsacli.base.arrays import FloatArray
 from vsacli.dynamics.elastic_torques import link_torques
@@ -27,7 +27,7 @@ class Kernel(NamedTuple):
 
     Attributes:
         name: of the way.
-        seconds: a sample.
+        seconds: of processor time a sample.
         differences: of the three from what vsacli finds, relative to their peaks; None for itself.
     """
 
@@ -44,9 +44,9 @@ def compare(samples: int, python_samples: int, repeats: int) -> list[Kernel]:
     with tempfile.TemporaryDirectory() as folder:
         casadi = CasadiPeer(robot, Path(folder))
         ways = {
-            OURS: lambda: link_torques(robot, *moving),
+            OURS: cpu_seconds(lambda: link_torques(robot, *moving)),
             CASADI: lambda: casadi(moving)[0],
-            PINOCCHIO: lambda: pinocchio_torques(robot, few, step),
+            PINOCCHIO: cpu_seconds(lambda: pinocchio_torques(robot, few, step)),
         }
         seconds = medians(ways, repeats)
         by_casadi = np.split(casadi(moving)[1], 3, axis=1)
