@@ -162,6 +162,21 @@ def test_controllers_that_hold_their_torques_are_recorded_too():
     assert runs[0].history.q_actual == pytest.approx(runs[1].history.q_actual, abs=1e-8)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_recorded_controllers_that_hold_their_torques_ask_for_those_of_the_text(engine):
+    case = made_loop("wrench")
+    held = 10 * np.random.default_rng(2).standard_normal(6)
+    case.loop.hold(np.zeros(6))
+    found = equations(case, engine)
+    case.loop.hold(held)
+    for time, state in case.states(5):
+        expected = case.loop.controller.torque(time, case.loop.packing.unpack(state))
+        assert np.abs(found.torques(time, state) - expected).max() < AGREEMENT * np.abs(expected).max()
+        rates = case.loop.derivative(time, state)
+        assert np.array_equal(case.loop.demand(time, state), held)
+        assert np.abs(found(time, state) - rates).max() < AGREEMENT * np.abs(rates).max()
+
+
 @needs_compiler
 def test_steps_are_those_of_scipy():
     """The same times, to rounding: who computes the stages has no part in the control of the steps."""

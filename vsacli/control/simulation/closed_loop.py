@@ -41,8 +41,10 @@ class ClosedLoop:
 
     def demand(self, time: float, vector: FloatArray) -> FloatArray:
         """Torques that the controller asks of the motors in a state."""
-        if self.held is not None:
-            return self.held(time)
+        return self.controller_torque(time, vector) if self.held is None else self.held(time)
+
+    def controller_torque(self, time: float, vector: FloatArray) -> FloatArray:
+        """The same if the controller acts in that state."""
         return self.controller.torque(time, self.packing.unpack(vector), self.slip)
 
     def hold(self, torques: FloatArray) -> None:

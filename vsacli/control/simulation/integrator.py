@@ -81,6 +81,9 @@ class Integrator:
         tolerances: of each step.
         progress: called with the time reached, s.
         sliding: of motors with sharp friction, at whose switches other equations of motion take over.
+
+    Attributes:
+        equations: the same.
     """
 
     def __init__(
@@ -90,7 +93,7 @@ class Integrator:
         progress: Progress,
         sliding: Sliding | None = None,
     ) -> None:
-        self._equations, self._sliding = equations, sliding
+        self.equations, self._sliding = equations, sliding
         self._tolerances = tolerances
         self._progress = progress
         self._budget = equations.budget
@@ -99,7 +102,7 @@ class Integrator:
     @property
     def effort(self) -> Effort:
         """Of the run so far."""
-        budget, by = self._budget, self._equations.provenance
+        budget, by = self._budget, self.equations.provenance
         return Effort(tuple(self._methods), budget.used, budget.limit, by)
 
     def over(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
@@ -117,11 +120,11 @@ class Integrator:
         return np.append(reached[:-1], later[1:]), np.concatenate((states[:-1], after[1:])), ending
 
     def _explicit(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
-        steps: dict[str, Any] = {"method": dop853_with_stages(), "stages": self._equations.stages}
+        steps: dict[str, Any] = {"method": dop853_with_stages(), "stages": self.equations.stages}
         return self._solve(times, start, self._budget.too_slow, atol=self._tolerances.atol, **steps)
 
     def _implicit(self, times: FloatArray, start: FloatArray) -> tuple[FloatArray, FloatArray, Ending | None]:
-        slope = partial(jacobian, self._equations)
+        slope = partial(jacobian, self.equations)
         floor = resolved(slope(float(times[0]), start), start, self._tolerances.rtol)
         atol = np.maximum(self._tolerances.atol, floor)
         spent = self._budget.spent
@@ -135,7 +138,7 @@ class Integrator:
         **options: Any,
     ) -> tuple[FloatArray, FloatArray, Ending | None]:
         deadline = Deadline(self._budget.limit, is_due, float(times[-1]), self._progress)
-        events = [deadline, Edge(self._equations), *(self._sliding.switches if self._sliding else ())]
+        events = [deadline, Edge(self.equations), *(self._sliding.switches if self._sliding else ())]
         if self._sliding:  # torques may be others than before
             self._sliding.settle(float(times[0]), start)
         first, at, state, parts = times[:1], float(times[0]), start, []
@@ -172,7 +175,7 @@ class Integrator:
         time, times = span
         with np.errstate(all="ignore"):  # a trial step may leave the range of a law
             return solve_ivp(
-                self._equations,
+                self.equations,
                 (time, float(times[-1])),
                 start,
                 t_eval=times,

@@ -83,13 +83,14 @@ def sampled(
     measurement = RateFilter(read(start, 0))
     reached, states, ending = [times[:1]], [start[None]], None
     demands = [loop.controller.torque(float(times[0]), measurement.phase)]
+    loop.hold(demands[0])
     for sample, interval in enumerate(np.stack((times[:-1], times[1:]), axis=1), 1):
-        loop.hold(demands[-1])
         time, after, ending = integrator.over(interval, states[-1][-1])
         reached.append(time[1:])
         states.append(after[1:])
         measurement.add(read(after[-1], sample), time[-1] - time[0])
-        demands.append(loop.controller.torque(float(time[-1]), measurement.phase))
+        demands.append(integrator.equations.torques(float(time[-1]), loop.packing.joined(measurement.phase)))
+        loop.hold(demands[-1])
         if ending is not None:
             break
     rows = (np.concatenate(reached), np.concatenate(states), np.array(demands)[: sum(map(len, reached))])

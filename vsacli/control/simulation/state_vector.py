@@ -40,7 +40,12 @@ class Packing:
 
     def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """The vector of a state at which nothing is integrated yet."""
-        return np.concatenate((q, dq, theta, dtheta, np.zeros_like(q), np.zeros_like(q)))
+        nothing = np.zeros_like(q)
+        return self.joined(Phase(q, dq, theta, dtheta, Integral(nothing, nothing)))
+
+    def joined(self, phase: Phase) -> FloatArray:
+        """The vector of a state."""
+        return np.concatenate((*phase[:4], *phase.integral))
 
     def unpack(self, vector: FloatArray) -> Phase:
         """The parts of vectors (..., entries), as views."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from ctypes import POINTER, Structure, byref, c_double, c_int64, c_void_p
 from functools import partial
 from pathlib import Path
@@ -18,6 +19,7 @@ from vsacli.control.simulation.table import Table
 
 _ARGUMENTS: dict[str, list[Any]] = {
     "derivatives": [c_double, c_int64, c_void_p, c_void_p],
+    "demand": [c_double, c_void_p, c_void_p],
     "to_boundaries": [c_void_p, c_void_p],
     "stages": [
         c_double,
@@ -49,6 +51,11 @@ class _Table(Structure):
 class _Loop(Structure):
     _fields_ = (("numbers", c_void_p), ("tables", c_int64), ("table", POINTER(_Table)))
 
+    @classmethod
+    def of(cls, numbers: FloatArray, tables: Sequence[Table]) -> _Loop:
+        row = _Table * len(tables)
+        return cls(address(numbers), len(tables), row(*map(_Table.of, tables)))
+
 
 def open_loop(path: Path) -> dict[str, Any]:
     """The functions of a compiled closed loop by name.
@@ -77,13 +84,15 @@ class CompiledLoop:
     """
 
     def __init__(self, functions: dict[str, Any], numbers: FloatArray, recording: Recording) -> None:
-        row = _Table * len(recording.tables)
-        tables = row(*map(_Table.of, recording.tables))
-        loop = _Loop(address(numbers), len(recording.tables), tables)
-        self._kept = (numbers, recording.tables, loop)  # what the code has addresses of
-        self._distances = np.empty(len(recording.distances.outputs))
-        bound = {name: partial(function, byref(loop)) for name, function in functions.items()}
-        self._derivatives, self._to_boundaries, self._stages = map(bound.__getitem__, _ARGUMENTS)
+        loops = [_Loop.of(numbers, each.tables) for each in recording]
+        self._kept = (numbers, recording, loops)  # what the code has addresses of
+        rates, torques, distances = map(byref, loops)
+        self._derivatives = partial(functions["derivatives"], rates)
+        self._stages = partial(functions["stages"], rates)
+        self._demand = partial(functions["demand"], torques)
+        self._to_boundaries = partial(functions["to_boundaries"], distances)
+        self._motors = len(recording.torques.program.outputs)
+        self._distances = np.empty(len(recording.distances.program.outputs))
 
     def derivatives(self, time: float, vectors: FloatArray) -> FloatArray:
         """Time derivatives of state vectors (..., entries) at a time."""
@@ -91,6 +100,12 @@ class CompiledLoop:
         rates = np.empty_like(given)
         self._derivatives(time, given.size // given.shape[-1], address(given), address(rates))
         return rates
+
+    def torques(self, time: float, vector: FloatArray) -> FloatArray:
+        """What a controller that holds its torques asks for, (motors,), in a state."""
+        given, asked = np.ascontiguousarray(vector), np.empty(self._motors)
+        self._demand(time, address(given), address(asked))
+        return asked
 
     def distance(self, vector: FloatArray) -> float:
         """To the nearest boundary, at most 1."""

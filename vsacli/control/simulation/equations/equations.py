@@ -34,6 +34,10 @@ class Equations:
         self.budget.used += vectors.size // vectors.shape[-1]
         return self.loop.derivative(time, vectors)
 
+    def torques(self, time: float, vector: FloatArray) -> FloatArray:
+        """What a controller that holds its torques asks for, (motors,), in a state that it takes for true."""
+        return self.loop.controller_torque(time, vector)
+
     def stages(
         self, _time: float, _step: float, _vector: FloatArray, _which: Stages, _rates: FloatArray
     ) -> FloatArray | None:

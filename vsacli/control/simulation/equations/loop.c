@@ -1,7 +1,7 @@
 /* The equations of motion of a closed loop, one state at a time. ENTRIES is the number of entries of a state,
-   COLUMNS that of the columns of all tables; rates() and distances() stand
-   below, functions of the numbers of the robot and the controller, which are data: robots that differ in these
-   alone share the code. */
+   COLUMNS the most columns that tables of a function have together; rates(), torques() and distances() stand below,
+   functions of the numbers of robot and controller, which are data: robots that differ in these alone share the
+   code. */
 
 #include <math.h>
 #include <stdint.h>
@@ -19,6 +19,7 @@ typedef struct {
 } loop;
 
 static void rates(const double *p, const double *y, const double *s, double *dy);
+static void torques(const double *p, const double *y, const double *s, double *tau);
 static void distances(const double *p, const double *y, const double *s, double *d);
 
 static int64_t cell_at(const table *of, double time)
@@ -57,6 +58,14 @@ void derivatives(const loop *of, double time, int64_t states, const double *y, d
     columns_at(of, time, s);
     for (int64_t state = 0; state < states; state++)
         rates(of->numbers, y + state * ENTRIES, s, dy + state * ENTRIES);
+}
+
+/* Torques that a controller asks for in a state. */
+void demand(const loop *of, double time, const double *y, double *tau)
+{
+    double s[COLUMNS + 1];
+    columns_at(of, time, s);
+    torques(of->numbers, y, s, tau);
 }
 
 /* Distance of a state to each boundary. */

@@ -42,20 +42,19 @@ class _Numbers(Scalar):
 
 def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
     """What to compile for a recording, and the numbers that the code is to be given."""
-    programs = {"rates": recording.rates, "distances": recording.distances}
     numbers = _Numbers()
-    tables = Tables(programs.values(), numbers.array_type)
+    tables = Tables((each.program for each in recording), numbers.array_type)
     writer = Writer(numbers, tables)
     lines = [
         f"#define ENTRIES {recording.entries}",
-        f"#define COLUMNS {sum(table.columns for table in recording.tables)}",
+        f"#define COLUMNS {max(sum(table.columns for table in each.tables) for each in recording)}",
         files("vsacli.control.simulation.equations").joinpath("loop.c").read_text(encoding="utf-8"),
         *(helper_text(name, "double") for name in HELPERS),
         *table_declarations(tables, numbers),
     ]
-    for name, program in programs.items():
-        lines += _function(name, program, recording.entries, writer)
-    functions = tuple(map(operation_count, programs.values()))
+    for name, each in recording._asdict().items():
+        lines += _function(name, each.program, recording.entries, writer)
+    functions = tuple(operation_count(each.program) for each in recording)
     return Code("\n".join([*lines, ""]), sum(functions), functions), np.array(numbers.values)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -76,6 +76,7 @@ class RecordedEquations(Equations):
         check_engine(computing.engine)
         self._computing = computing
         self._program: NumberProgram | None = None
+        self._law: NumberProgram | None = None
         self._compiled: CompiledLoop | None = None
         self._compiler = ""
         self._later = self._compiling() if computing.engine == "c" else self._improving()
@@ -91,14 +92,16 @@ class RecordedEquations(Equations):
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
         """As of `Equations`; where a number is not finite the text has its say."""
         self._improve()
-        fast = self._compiled.derivatives if self._compiled else self._program
-        if fast is not None:
-            with suppress(ArithmeticError, ValueError):  # of Python, instead of NaN and infinity
-                rates = fast(time, vectors)
-                if math.isfinite(rates.sum()):
-                    self.budget.used += vectors.size // vectors.shape[-1]
-                    return rates
-        return super().__call__(time, vectors)
+        rates = _finite(self._compiled.derivatives if self._compiled else self._program, time, vectors)
+        if rates is None:
+            return super().__call__(time, vectors)
+        self.budget.used += vectors.size // vectors.shape[-1]
+        return rates
+
+    def torques(self, time: float, vector: FloatArray) -> FloatArray:
+        """As of `Equations`."""
+        asked = _finite(self._compiled.torques if self._compiled else self._law, time, vector)
+        return super().torques(time, vector) if asked is None else asked
 
     def stages(
         self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
@@ -128,7 +131,8 @@ class RecordedEquations(Equations):
         with suppress(NotImplementedError, CompilerError):
             recording = record(self.loop, self.boundaries)
             with suppress(NotImplementedError):  # of loops
-                self._program = NumberProgram(recording)
+                self._program = NumberProgram(recording.rates)
+                self._law = NumberProgram(recording.torques)
             begin, seconds = self.budget.used, self._seconds(recording) * self._computing.runs
             if self._computing.engine == "auto":
                 yield begin + LOOK_SECONDS / seconds
@@ -140,7 +144,8 @@ class RecordedEquations(Equations):
 
     def _seconds(self, recording: Recording) -> float:
         """What an evaluation takes before there is compiled code."""
-        return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * len(recording.rates.operations)
+        operations = len(recording.rates.program.operations)
+        return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
 
     def _compiling(self) -> Iterator[float]:
         """The same for the engine "c"; that it cannot be had is an InputError."""
@@ -163,3 +168,15 @@ class RecordedEquations(Equations):
         loaded = load(code, open_loop, compiler, self._computing.tell, worthwhile)
         if loaded is not None:
             self._compiled, self._compiler = CompiledLoop(loaded.library, numbers, recording), compiler.name
+
+
+def _finite(
+    function: Callable[[float, FloatArray], FloatArray] | None, time: float, vectors: FloatArray
+) -> FloatArray | None:
+    """What a function finds in states at a time; None if there is none, or a number is not finite."""
+    if function is not None:
+        with suppress(ArithmeticError, ValueError):  # of Python, instead of NaN and infinity
+            found = function(time, vectors)
+            if math.isfinite(found.sum()):
+                return found
+    return None

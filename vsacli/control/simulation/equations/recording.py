@@ -2,39 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
 from vsacli.compute.tracing import MOST_RECORDED, Program, Tape, TracedArray, cells_of
 from vsacli.control.simulation.boundaries import Boundary
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.table import Instant, Table
 
 
+class Recorded(NamedTuple):
+    """A program of a state vector and of what tables have at a time, its inputs in this order."""
+
+    program: Program
+    tables: tuple[Table, ...]
+
+
 class Recording(NamedTuple):
     """What a closed loop does at an instant.
 
     Attributes:
-        rates: from the state vector, and what the tables have then, to its time derivative.
-        distances: from the state vector to the distance to each boundary.
-        tables: those that `rates` reads, in this order.
+        rates: time derivative of the state vector.
+        torques: that a controller which holds them asks for; none of others.
+        distances: to each boundary.
     """
 
-    rates: Program
-    distances: Program
-    tables: tuple[Table, ...]
+    rates: Recorded
+    torques: Recorded
+    distances: Recorded
 
     @property
     def entries(self) -> int:
         """Of a state vector."""
-        return len(self.rates.outputs)
+        return len(self.rates.program.outputs)
 
 
 def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
     """Record a closed loop.
 
     Args:
-        loop: a robot under its controller; torques that it holds are an input.
+        loop: a robot under its controller; torques that it holds are a table.
         boundaries: where its runs end.
 
     Raises:
@@ -42,22 +52,27 @@ def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
     """
     if loop.slip is not None:
         raise NotImplementedError("motors with sharp friction stick and slide")
-    tape, entries = Tape(MOST_RECORDED), loop.packing.entries
-    instant: Any = Instant(lambda count: _inputs(tape, count))
-    vector = _inputs(tape, entries)
+
+    def torques(time: Any, vector: FloatArray) -> FloatArray:
+        return vector[:0] if loop.held is None else loop.controller_torque(time, vector)
+
+    def distances(_time: Any, vector: FloatArray) -> FloatArray:
+        return np.concatenate([vector[:0], *(each.distance(vector).reshape(1) for each in boundaries)])
+
     try:
-        rates = tape.program(cells_of(loop.derivative(instant, vector)).tolist())
-        return Recording(rates, _distances(boundaries, entries), tuple(instant.tables))
+        parts = (_recorded(each, loop.packing.entries) for each in (loop.derivative, torques, distances))
+        return Recording(*parts)
     except (AttributeError, IndexError, TypeError, ValueError) as error:  # as of a law of the user's own
         raise NotImplementedError(f"it takes more than NumPy's functions of arrays: {error}") from error
 
 
-def _distances(boundaries: Sequence[Boundary], entries: int) -> Program:
+def _recorded(function: Callable[[Any, Any], Any], entries: int) -> Recorded:
+    """A function of a time and a state vector."""
     tape = Tape(MOST_RECORDED)
-    vector = _inputs(tape, entries)
-    return tape.program([cells_of(each.distance(vector)).item() for each in boundaries])
 
+    def inputs(count: int) -> Any:
+        return TracedArray(tape, tape.inputs(count))
 
-def _inputs(tape: Tape, count: int) -> Any:
-    """Further inputs, in place of an array of numbers."""
-    return TracedArray(tape, tape.inputs(count))
+    vector, instant = inputs(entries), Instant(inputs)
+    program = tape.program(cells_of(function(instant, vector)).tolist())
+    return Recorded(program, tuple(instant.tables))
