@@ -171,6 +171,7 @@ def simulate(
         file = outputs.file(path)
         figures = None if plot_folder is None else _figures(inputs.robot, plot_folder, path.stem, outputs)
         found = _run(partial(simulation, engine=engine, tell=talk.note), inputs.trajectory, talk)
+        talk.detail(_computed_by(**found.provenance))
         provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]]), **found.provenance}
         sensed = simulation.keywords["sensors"] is not None
         with SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance) as writer:
@@ -273,6 +274,11 @@ def _run(simulate: Callable[..., Simulation], trajectory: Trajectory, talk: Talk
             bar.update(int(PROGRESS_STEPS * (time - first) / (last - first)) - bar.pos)
 
         return simulate(progress=progress)
+
+
+def _computed_by(engine: str, compiler: str, **_further: str) -> str:
+    """What evaluated the equations of motion in the end."""
+    return f"C code computed, compiled by {compiler}" if engine == "c" else "NumPy and Python computed"
 
 
 def _show(report: SimulationReport, as_json: bool) -> Exit:
