@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from samples.codegen import reachable
 from samples.cortex_m7 import COMPILER, PROCESSOR
-from samples.cortex_m7.instructions import instructions
+from samples.cortex_m7.instructions import taken
 from samples.shipped import shipped_robot
 from single_calls import single_calls
 
@@ -37,7 +37,7 @@ class Controller(NamedTuple):
         precision: of the numbers.
         operations: of inverse dynamics, at most.
         flash: bytes of all functions and their tables on a Cortex-M7.
-        stack: bytes, of inverse dynamics there.
+        stack: bytes that a call of inverse dynamics writes to there, math.h included, at most of some.
         instructions: there, median over commands.
         most: largest number of these.
         seconds: a call on this machine, median.
@@ -64,10 +64,10 @@ def _measured() -> Iterator[Controller]:
         operations = worst_cost(inverse_dynamics_function(robot).program).operations
         command = reachable(robot)
         for precision in PRECISIONS:
-            flash, stack, taken = _on_cortex_m7(robot, precision, command)
+            flash, stack, counts = _on_cortex_m7(robot, precision, command)
             calls = single_calls(robot, command, precision, CALLS)
-            counts = float(np.median(taken)), float(taken.max())
-            yield Controller(name, precision, operations, flash, stack, *counts, seconds=calls.median * 1e-6)
+            usual, most = float(np.median(counts)), float(counts.max())
+            yield Controller(name, precision, operations, flash, stack, usual, most, calls.median * 1e-6)
 
 
 def _on_cortex_m7(robot: Robot, precision: str, command: FloatArray) -> tuple[int, int, FloatArray]:
@@ -77,11 +77,9 @@ def _on_cortex_m7(robot: Robot, precision: str, command: FloatArray) -> tuple[in
         folder = Path(name)
         for file, text in generate(robot, precision).files.items():
             (folder / file).write_text(text, encoding="utf-8")
-        compiler = [COMPILER, *PROCESSOR, *FLAGS, "-fstack-usage", "-c", f"{prefix}.c"]
+        compiler = [COMPILER, *PROCESSOR, *FLAGS, "-c", f"{prefix}.c"]
         subprocess.run(compiler, cwd=folder, check=True)
         size = ["arm-none-eabi-size", f"{prefix}.o"]
         listed = subprocess.run(size, cwd=folder, check=True, capture_output=True, text=True).stdout
-        stacks = (folder / f"{prefix}.su").read_text().splitlines()
-        counts = instructions(folder, prefix, command[:COUNTED])
-    stack = next(int(line.split()[-2]) for line in stacks if f"{prefix}_inverse_dynamics" in line)
-    return int(listed.splitlines()[1].split()[0]), stack, counts
+        counts, stack = taken(folder, prefix, command[:COUNTED])
+    return int(listed.splitlines()[1].split()[0]), int(stack.max()), counts

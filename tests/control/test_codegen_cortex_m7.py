@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from samples.codegen import reachable
 from samples.cortex_m7 import COMPILER, PROCESSOR, link, run
-from samples.cortex_m7.instructions import instructions
+from samples.cortex_m7.instructions import taken
 from samples.generated_code import STRICT, compile_c, write_files
 from samples.marks import needs
 from samples.shipped import shipped_robot
@@ -82,11 +82,11 @@ def test_loops_end_as_soon_in_single_precision(tmp_path: Path) -> None:
     """Tolerances of double precision are out of reach there: loops would run to their bounds."""
     robot = ROBOTS["measured"]
     chosen = reachable(robot)[:20]
-    taken = {}
+    counted = {}
     for precision in PRECISIONS:
         folder = tmp_path / precision
         folder.mkdir()
         write_files(generate(robot, precision), folder)
         compile_c(folder, *PROCESSOR, "-O1", "-c", "measured_1r.c", compiler=COMPILER)
-        taken[precision] = instructions(folder, "measured_1r", chosen)
-    assert np.all(taken["float"] < 1.2 * taken["double"])
+        counted[precision], _ = taken(folder, "measured_1r", chosen)
+    assert np.all(counted["float"] < 1.2 * counted["double"])

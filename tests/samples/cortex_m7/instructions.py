@@ -1,4 +1,4 @@
-"""Instructions that calls of generated inverse dynamics take on a Cortex-M7."""
+"""Instructions and stack that calls of generated inverse dynamics take on a Cortex-M7."""
 
 from __future__ import annotations
 
@@ -23,25 +23,41 @@ PROGRAM = """
 static const {prefix}_command commands[] = {{
 {commands}
 }};
+static {prefix}_drive drive;
+enum {{ PAINT = 0xA5, PAINTED = 32768, OWN = 256 }}; /* the last is for what calls */
+
+/* Bytes below the caller that a call writes to. */
+static unsigned stack_used(const {prefix}_command *command)
+{{
+    volatile unsigned char *const end = (volatile unsigned char *)__builtin_frame_address(0) - OWN;
+    int depth;
+    for (depth = 1; depth <= PAINTED; depth++)
+        end[-depth] = PAINT;
+    {prefix}_inverse_dynamics(command, &drive);
+    while (depth > 1 && end[1 - depth] == PAINT)
+        depth--;
+    return (unsigned)depth - 1 + OWN;
+}}
+
 int main(void)
 {{
-    {prefix}_drive drive;
     SYSTICK[1] = 0xFFFFFFu;
     for (unsigned n = 0; n < sizeof commands / sizeof commands[0]; n++) {{
         SYSTICK[2] = 0;
         SYSTICK[0] = 5;
         for (int k = 0; k < {repeats}; k++)
             {prefix}_inverse_dynamics(&commands[n], &drive);
-        printf("%u\\n", 0xFFFFFFu - SYSTICK[2]);
+        const unsigned ticks = 0xFFFFFFu - SYSTICK[2];
         SYSTICK[0] = 0;
+        printf("%u %u\\n", ticks, stack_used(&commands[n]));
     }}
     return 0;
 }}
 """
 
 
-def instructions(folder: Path, prefix: str, commands: FloatArray) -> FloatArray:
-    """Of a call for each command, (commands,).
+def taken(folder: Path, prefix: str, commands: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Instructions, and bytes of stack, of a call for each command, (commands,).
 
     Args:
         folder: with the header, and the object file for the processor.
@@ -53,4 +69,5 @@ def instructions(folder: Path, prefix: str, commands: FloatArray) -> FloatArray:
     program = PROGRAM.format(prefix=prefix, commands=written, repeats=REPEATS)
     (folder / "counter.c").write_text(program)
     found = run(link(folder, "-O2", "counter.c", f"{prefix}.o"), *COUNTING)
-    return np.array(found.stdout.split(), dtype=float) * A_TICK / REPEATS
+    ticks, stack = np.array(found.stdout.split(), dtype=float).reshape(-1, 2).T
+    return ticks * A_TICK / REPEATS, stack

@@ -13,6 +13,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.texts import sentence
 from vsacli.base.version import __version__
+from vsacli.compute.tracing import TooLongError
 from vsacli.control.codegen.binding import binding_text
 from vsacli.control.codegen.build_files import build_files
 from vsacli.control.codegen.cost import worst_cost
@@ -26,6 +27,11 @@ from vsacli.control.codegen.scalar import DIGEST, source_text
 from vsacli.control.codegen.self_test import Reference, self_test_text
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
+
+WITHOUT_PARAMETERS = (
+    "feedback_linearization: its mass matrix, springs and motors have the numbers of the robot file, so that "
+    "it takes none as parameters; for code of it leave out --parameters"
+)
 
 
 class Project(NamedTuple):
@@ -118,7 +124,8 @@ def _functions(
     except InputError as error:
         omitted.append(f"no feedback_linearization: {error}")
     except NotImplementedError as error:
-        omitted.append(f"no {error}")
+        short = not isinstance(error.__cause__, TooLongError)
+        omitted.append(f"no {WITHOUT_PARAMETERS if chosen and short else error}")
     return functions, omitted
 
 

@@ -38,9 +38,11 @@ At the very most, with every branch entered and every loop run to its bound:
 | --- | --- | --- | --- |
 {costs}
 
-Tables of constants take {tables} bytes. Code and stack depend on the compiler:
+{steps}Tables of constants take {tables} bytes. Code and stack depend on the compiler, which tells the
+stack of each function; a call takes that of the functions inside, too:
 
-    make size CC=arm-none-eabi-gcc SIZE=arm-none-eabi-size CFLAGS="-std=c99 -O2 -mcpu=cortex-m7 -mthumb"
+    make size CC=arm-none-eabi-gcc SIZE=arm-none-eabi-size \\
+        CFLAGS="-std=c99 -O2 -mcpu=cortex-m7 -mfpu=fpv5-d16 -mfloat-abi=hard"
 
 ## In a control loop
 
@@ -86,6 +88,9 @@ number changes, its rate has no part in the derivatives of the torques.
 """
 
 
+_STEPS = "As a rule a loop ends after a handful of steps; near double solutions it takes more.\n"
+
+
 def readme_text(
     prefix: str, robot: Robot, functions: Sequence[Function], precision: str, omitted: Sequence[str]
 ) -> str:
@@ -100,13 +105,14 @@ def readme_text(
         arguments=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
         tolerance=TOLERANCE[precision],
         functions="\n".join(
-            f"- `{' '.join(signature(prefix, function).split())}`: {function.meaning}"
+            f"- `{' '.join(signature(prefix, function).split()).replace('( ', '(')}`: {function.meaning}"
             for function in functions
         ),
         joints=for_markdown(", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names))),
         omitted="".join(f"There is {for_markdown(sentence(reason))}\n" for reason in omitted),
         numbers="".join(_numbers(prefix, each) for each in structures(functions) if each.nominal),
         costs="\n".join(_costs(functions)),
+        steps=_STEPS if any(worst_cost(function.program).loops for function in functions) else "",
         tables=table_bytes([function.program for function in functions], precision),
     )
 
