@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import platform
+import subprocess
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -83,6 +85,19 @@ def test_the_mode_ends_with_an_error() -> None:
     with pytest.raises(ValueError, match="enough"):
         fail()
     assert product_of_small_numbers() > 0
+
+
+def test_limits_that_are_asked_for_within_are_right_and_give_no_warning() -> None:
+    """In a process of its own, where NumPy, before 2.4, has not been asked yet."""
+    code = """
+import warnings; warnings.simplefilter("error")
+import numpy as np
+from vsacli.compute.subnormals import subnormals_as_zero
+with subnormals_as_zero():
+    limits = np.finfo(float), np.finfo(np.float32)
+assert all(limit.smallest_subnormal > 0 for limit in limits)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_elsewhere_nothing_changes(monkeypatch: pytest.MonkeyPatch) -> None:

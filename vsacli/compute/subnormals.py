@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 
+import numpy as np
+
 _Environment = ctypes.c_uint32 * 8
 """The floating-point environment of glibc on x86-64, fenv_t; its last word is the register MXCSR."""
 
@@ -40,7 +42,12 @@ def subnormals_as_zero() -> Iterator[None]:
 
 @cache
 def _mathematics() -> ctypes.CDLL | None:
-    """The library with the functions of fenv.h, where their data are as above."""
+    """The library with the functions of fenv.h, where their data are as above.
+
+    NumPy finds the limits of numbers when it is first asked for them: here, before the smallest are zero.
+    """
+    for kind in (np.float16, np.float32, np.float64):
+        np.finfo(kind)
     if sys.platform == "linux" and os.uname().machine == "x86_64" and sys.maxsize > 2**32:
         with suppress(OSError):  # another C library
             return ctypes.CDLL("libm.so.6")
