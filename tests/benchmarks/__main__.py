@@ -1,7 +1,8 @@
 """Measure vsacli beside its peers, all in one run: `python tests/benchmarks`.
 
 Needs the extra `bench`, gcc, and the Debian packages of the tests on a Cortex-M7. `--write` puts what was
-found into docs/performance.md and docs/codegen.md.
+found into docs/performance.md and docs/codegen.md, each part as soon as it is there; `--only growth,startup`
+measures parts.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # the oracles and samples of the tests
@@ -44,32 +45,36 @@ ACTUATION_SAMPLES = 3 * SAMPLES_PER_PASS
 LONG_RUN = 2_000_000
 
 
-def measured(repeats: int, *, figure: Path) -> Iterator[tuple[str, str]]:
-    """Name and text of each part of the page, as it is found."""
-    yield "machine", description() + "\n"
-    yield "kernel", page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats))
-    yield "batches", page.batch_table(compiled.batches(SAMPLES, repeats))
-    yield "subnormals", page.subnormal_table(small_numbers.compare(SAMPLES, repeats))
-    yield "calls", page.call_sentence(single_calls.calls_of_seven_joints())
-    yield "recorders", page.recorder_table(recorders.compare(SAMPLES, repeats))
-    yield "controllers", page.controller_table(controllers.measure())
-    yield "costs", page.cost_table(compiled.costs())
-    runs = (stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c"))
-    yield "stages", page.stage_table(*runs)
-    yield "storage", page.storage_table(storage.compare(repeats))
-    yield "whole", page.whole_table(whole_runs.compare(2 * SAMPLES, repeats))
-    yield "actuation", page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats))
-    yield "sensitivity", page.sensitivity_part(sensitivities.compare(3 * repeats))
-    yield "simulations", page.simulation_table(simulations.compare(repeats))
-    yield "startup", page.startup_table(commands.startup(3 * repeats))
-    memory = commands.peak_memory(LONG_RUN) / 1e6
-    yield (
-        "memory",
-        f"{LONG_RUN:,} samples with `--variables tau_motor,flags`: at most {memory:.0f} MB resident.",
-    )
-    found = growth.measure(repeats)
-    growth.draw(found, figure)
-    yield "growth", page.growth_sentence(found)
+def measured(repeats: int, figure: Path) -> dict[str, Callable[[], str]]:
+    """What finds the text of each part of the pages, by its name."""
+
+    def grown() -> str:
+        found = growth.measure()
+        growth.draw(found, figure)
+        return page.growth_tables(found)
+
+    def staged() -> str:
+        return page.stage_table(*(stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c")))
+
+    return {
+        "machine": lambda: description() + "\n",
+        "kernel": lambda: page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats)),
+        "batches": lambda: page.batch_table(compiled.batches(SAMPLES, repeats)),
+        "subnormals": lambda: page.subnormal_table(small_numbers.compare(SAMPLES, repeats)),
+        "calls": lambda: page.call_sentence(single_calls.calls_of_seven_joints()),
+        "recorders": lambda: page.recorder_table(recorders.compare(SAMPLES, repeats)),
+        "controllers": lambda: page.controller_table(controllers.measure()),
+        "costs": lambda: page.cost_table(compiled.costs()),
+        "stages": staged,
+        "storage": lambda: page.storage_table(storage.compare(repeats)),
+        "whole": lambda: page.whole_table(whole_runs.compare(2 * SAMPLES, repeats)),
+        "actuation": lambda: page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats)),
+        "sensitivity": lambda: page.sensitivity_part(sensitivities.compare(3 * repeats)),
+        "simulations": lambda: page.simulation_table(simulations.compare(repeats)),
+        "startup": lambda: page.startup_table(commands.startup(3 * repeats)),
+        "memory": lambda: page.memory_sentence(LONG_RUN, commands.peak_memory(LONG_RUN)),
+        "growth": grown,
+    }
 
 
 def main() -> None:
@@ -77,22 +82,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=3, help="rounds, of which the medians count")
     parser.add_argument("--write", action="store_true", help="write the results into the pages of docs")
+    parser.add_argument("--only", help="parts to measure, by name, with commas between; by default all")
     options = parser.parse_args()
 
-    parts: dict[str, str] = {}
-    for name, text in measured(options.repeats, figure=FIGURE if options.write else Path("growth.png")):
+    parts = measured(options.repeats, FIGURE if options.write else Path("growth.png"))
+    chosen = options.only.split(",") if options.only else list(parts)
+    if unknown := set(chosen) - parts.keys():
+        parser.error(f"no part is called {', '.join(sorted(unknown))}; there are {', '.join(parts)}")
+    for name in chosen:
+        text = parts[name]()
         sys.stdout.write(f"{name}\n\n{text}\n\n")
         sys.stdout.flush()
-        parts[name] = text
-    if options.write:
-        rewrite(lambda name: parts[name])
+        if options.write:
+            rewrite(name, text)
 
 
-def rewrite(part: Callable[[str], str]) -> None:
-    """Put each part into its place on the pages."""
+def rewrite(name: str, text: str) -> None:
+    """Put a part into its place on the pages."""
     for path in PAGES:
-        text = path.read_text(encoding="utf-8")
-        path.write_text(PART.sub(lambda m: f"{m[1]}\n{part(m['name'])}\n\n{m[3]}", text), encoding="utf-8")
+        before = path.read_text(encoding="utf-8")
+        after = PART.sub(lambda m: f"{m[1]}\n{text}\n\n{m[3]}" if m["name"] == name else m[0], before)
+        path.write_text(after, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -6,18 +6,52 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from subjects import PAPER, SEVEN_JOINTS
 from timing import Seconds, medians
 
 VSACLI = str(Path(sysconfig.get_path("scripts"), "vsacli"))
 
-PEAK_MEMORY = """
-import resource, subprocess, sys
-subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL, check=True)
-print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * (1 if sys.platform == "darwin" else 1024))
+DONE = (0, 3)
+"""Exit codes of commands that computed what was asked for, feasible or not."""
+
+_MEASURE = """
+import resource, subprocess, sys, time
+begin = time.perf_counter()
+code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
+elapsed = time.perf_counter() - begin
+unit = 1 if sys.platform == "darwin" else 1024
+print(elapsed, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * unit, code)
 """
+
+
+class Taken(NamedTuple):
+    """What a command took.
+
+    Attributes:
+        seconds: by the clock.
+        memory: bytes resident at most.
+    """
+
+    seconds: float
+    memory: int
+
+
+def taken(line: Sequence[str], folder: Path | None = None) -> Taken:
+    """Carry out a command line, in a process whose memory is not that of its parent.
+
+    Raises:
+        RuntimeError: it fails.
+    """
+    measured = [sys.executable, "-c", _MEASURE, *line]
+    printed = subprocess.run(measured, check=True, capture_output=True, text=True, cwd=folder)
+    seconds, memory, code = printed.stdout.split()
+    if int(code) not in DONE:
+        raise RuntimeError(f"{' '.join(line)}: exit code {code}: {printed.stderr}")
+    return Taken(float(seconds), int(memory))
 
 
 def startup(repeats: int) -> Seconds:
@@ -41,8 +75,7 @@ def peak_memory(samples: int) -> int:
         motion.write_text(trajectory.read_text().replace("rate: 1000", f"rate: {(samples - 1) / 3}"))
         options = ["--variables", "tau_motor,flags", "-q", "-o", str(Path(folder, "result.h5"))]
         line = [VSACLI, "invdyn", str(robot), str(motion), *options]
-        measured = [sys.executable, "-c", PEAK_MEMORY, *line]
-        return int(subprocess.run(measured, check=True, capture_output=True, text=True).stdout)
+        return taken(line).memory
 
 
 def _run(line: list[str]) -> None:

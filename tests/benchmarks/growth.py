@@ -1,69 +1,128 @@
-"""How the time of the recursion grows with joints and samples."""
+"""How whole runs grow with samples and joints: each a command in a process of its own, with its memory."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import json
+import tempfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
+import yaml
+from commands import VSACLI, Taken, taken
 from matplotlib.figure import Figure
-from subjects import chain, motion, seven_joints
-from timing import cpu_seconds, medians
+from subjects import SEVEN_JOINTS
 
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.model import Robot
+ENGINES = ("numpy", "c")
+SAMPLES = (10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
+STORED = ("tau_motor", "flags")
+"""Of the arm, so that ten million samples leave a file of 1.3 GB, not one of 18."""
 
 JOINTS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
-SAMPLES = (1, 10, 100, 1_000, 10_000, 100_000, 1_000_000)
-SAMPLES_OF_CHAIN = 512
-"""Samples at which the chains are compared: one block of the same size whatever their length."""
+SAMPLES_OF_CHAIN = 1_000
+MOST_COMPILED = 100
+"""Joints up to which chains are compiled: beyond, that takes minutes."""
 
 
 class Growth(NamedTuple):
-    """Seconds over joints and over samples."""
+    """What runs take, by engine and number."""
 
-    by_joints: dict[int, float]
-    by_samples: dict[int, float]
-
-    @property
-    def spread(self) -> float:
-        """Largest over smallest cost of a joint and sample, from 10 joints on, less 1."""
-        each = [seconds / joints for joints, seconds in self.by_joints.items() if joints >= 10]
-        return max(each) / min(each) - 1
+    by_samples: Mapping[str, Mapping[int, Taken]]
+    by_joints: Mapping[str, Mapping[int, Taken]]
 
 
-def measure(repeats: int) -> Growth:
-    """Time chains of each length at a fixed number of samples, and the 7R arm at each number of samples."""
-    arm = seven_joints()
-    chains = {joints: _recursion(chain(joints), SAMPLES_OF_CHAIN, max(1, 100 // joints)) for joints in JOINTS}
-    arms = {samples: _recursion(arm, samples, max(1, 2_000 // samples)) for samples in SAMPLES}
-    turns = 4 * repeats  # short ones, so that every length meets the machine's slow seconds
-    return Growth(_by_number(chains, turns), _by_number(arms, repeats))
+def measure() -> Growth:
+    """Run the arm for each number of samples, and chains of each length, whose variables are all stored."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        arm = {engine: {each: _arm(each, engine, folder) for each in SAMPLES} for engine in ENGINES}
+        chains = {
+            engine: {each: _chain(each, engine, folder) for each in _lengths(engine)} for engine in ENGINES
+        }
+    return Growth(arm, chains)
 
 
-def _recursion(robot: Robot, samples: int, rounds: int) -> Callable[[], float]:
-    moving = motion(len(robot.joints), samples)
-    return cpu_seconds(lambda: link_torques(robot, *moving), rounds)
+def _lengths(engine: str) -> Iterator[int]:
+    return (joints for joints in JOINTS if engine == "numpy" or joints <= MOST_COMPILED)
 
 
-def _by_number(ways: Mapping[int, Callable[[], float]], repeats: int) -> dict[int, float]:
-    seconds = medians({str(number): way for number, way in ways.items()}, repeats)
-    return {int(number): taken for number, taken in seconds.items()}
+def _arm(samples: int, engine: str, folder: Path) -> Taken:
+    robot, trajectory = map(_read, SEVEN_JOINTS)
+    return _run(robot, {**trajectory, "rate": (samples - 1) / trajectory["duration"]}, engine, folder, STORED)
+
+
+def _chain(joints: int, engine: str, folder: Path) -> Taken:
+    """The joints of the arm over and over again, without gravity.
+
+    The longer, the shorter is their way, since the inertia that a joint moves grows with the cube of what is
+    beyond it: so hardly a joint leaves its corridor.
+    """
+    robot, trajectory = map(_read, SEVEN_JOINTS)
+    arm = robot["joints"]
+    names = [f"joint{number + 1}" for number in range(joints)]
+    chain = [{**arm[index % len(arm)], "name": name} for index, name in enumerate(names)]
+    way = min(1.0, (len(arm) / joints) ** 3)
+    ends = [f"{way * float(angle.split()[0])} deg" for angle in trajectory["position"]["end"]]
+    stiffness = {key: list(trajectory["stiffness"][key].values()) for key in ("start", "end")}
+    moved = {
+        "rate": (SAMPLES_OF_CHAIN - 1) / trajectory["duration"],
+        "position": {**trajectory["position"], "end": _repeated(ends, joints)},
+        "stiffness": {
+            **trajectory["stiffness"],
+            **{key: _repeated(values, joints) for key, values in stiffness.items()},
+        },
+    }
+    return _run({**robot, "gravity": [0, 0, 0], "joints": chain}, {**trajectory, **moved}, engine, folder)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    document: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return document
+
+
+def _repeated(values: list[Any], count: int) -> list[Any]:
+    return [values[index % len(values)] for index in range(count)]
+
+
+def _run(
+    robot: Mapping[str, Any],
+    trajectory: Mapping[str, Any],
+    engine: str,
+    folder: Path,
+    variables: tuple[str, ...] = (),
+) -> Taken:
+    """Time and memory of `vsacli invdyn`; compiled code is there, as it is from a robot's second run on."""
+    files = {"robot.yaml": robot, "motion.yaml": trajectory}
+    for name, document in files.items():
+        (folder / name).write_text(json.dumps(document))  # which is YAML, too
+    line = [VSACLI, "invdyn", *(str(folder / name) for name in files), "-q", "--overwrite"]
+    line += ["-o", str(folder / "result.h5"), "--engine", engine]
+    if engine == "c":
+        taken([*line, "--variables", "flags", "--set", "rate=10"])
+    return taken([*line, *(["--variables", ",".join(variables)] if variables else [])])
 
 
 def draw(growth: Growth, path: Path) -> None:
-    """Both curves, as cost of a joint and sample."""
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    joints, samples = np.array(JOINTS), np.array(SAMPLES)
-    cost = np.array(list(growth.by_joints.values())) / joints / SAMPLES_OF_CHAIN
-    left.semilogx(joints, cost * 1e6, "o-")
-    left.set(xlabel="joints", ylabel="µs per joint and sample", title=f"{SAMPLES_OF_CHAIN} samples")
-    left.set_ylim(bottom=0)
-    right.loglog(samples, np.array(list(growth.by_samples.values())) / samples * 1e6, "o-")
-    right.set(xlabel="samples", ylabel="µs per sample", title="7R arm")
-    for axes in (left, right):
+    """Seconds over both, and the memory."""
+    figure = Figure(figsize=(9, 6.4), layout="constrained")
+    panels = figure.subplots(2, 2, sharex="col", sharey="row")
+    names = {"numpy": "NumPy", "c": "compiled"}
+    for column, (by_number, title, label) in enumerate(
+        (
+            (growth.by_samples, "7R arm", "samples"),
+            (growth.by_joints, f"chains, {SAMPLES_OF_CHAIN:,} samples", "joints"),
+        )
+    ):
+        above, below = panels[:, column]
+        for engine, found in by_number.items():
+            above.loglog(found, [each.seconds for each in found.values()], "o-", label=names[engine])
+            below.semilogx(found, [each.memory / 1e6 for each in found.values()], "o-")
+        above.set(title=title)
+        below.set(xlabel=label, ylim=(0, None))
+    panels[0, 0].set(ylabel="whole run, s")
+    panels[1, 0].set(ylabel="at most resident, MB")
+    panels[0, 0].legend(frameon=False)
+    for axes in panels.flat:
         axes.grid(visible=True, which="major", alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
     figure.savefig(path, dpi=150)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from actuation import JOINTS, Actuation
+from commands import Taken
 from compiled import Cost
 from controllers import Controller
-from growth import Growth
+from growth import SAMPLES_OF_CHAIN, Growth
 from kernel import CASADI, Kernel
 from recorders import Recorder
 from sensitivities import INVERSE_DYNAMICS, SAMPLES, Sensitivities
@@ -210,9 +211,23 @@ def startup_table(taken: Seconds) -> str:
     return table(("command", "ms", "ratio"), rows)
 
 
-def growth_sentence(growth: Growth) -> str:
-    """How nearly the cost is linear in the joints."""
-    return (
-        f"From 10 to {max(growth.by_joints)} joints the cost of a joint and sample varies by "
-        f"{growth.spread:.0%} at one fixed block size."
+def memory_sentence(samples: int, memory: int) -> str:
+    """What a long run takes at most."""
+    most = f"at most {memory / 1e6:.0f} MB resident"
+    return f"{samples:,} samples with `--variables tau_motor,flags`: {most}."
+
+
+def growth_tables(growth: Growth) -> str:
+    """Whole runs, over samples and over joints."""
+    header = ("NumPy", "memory", "compiled", "memory")
+    arms, chains = (
+        table((what, *header), ([f"{number:,}", *_both(found, number)] for number in found["numpy"]))
+        for what, found in (("samples, 7R arm", growth.by_samples), ("joints", growth.by_joints))
     )
+    return f"{arms}\n\nChains, {SAMPLES_OF_CHAIN:,} samples, all variables:\n\n{chains}"
+
+
+def _both(found: Mapping[str, Mapping[int, Taken]], number: int) -> Iterable[str]:
+    for by_number in found.values():
+        each = by_number.get(number)
+        yield from ("", "") if each is None else (f"{each.seconds:.2g} s", f"{each.memory / 1e6:.0f} MB")

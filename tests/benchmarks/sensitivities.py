@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from commands import PEAK_MEMORY
+from commands import taken
 from stages import trajectory_of
 from subjects import chain, seven_joints
 from timing import Seconds, cpu_seconds, medians
@@ -67,6 +66,4 @@ def _repeated(profile: RestToRest, joints: int) -> RestToRest:
 def _peak_memory(joints: int) -> int:
     """Of a process of its own."""
     line = f"import sensitivities; sensitivities.run({joints})"
-    command = [sys.executable, "-c", PEAK_MEMORY, sys.executable, "-c", line]
-    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=True)
-    return int(done.stdout)
+    return taken([sys.executable, "-c", line], Path(__file__).parent).memory

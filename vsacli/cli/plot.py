@@ -183,12 +183,14 @@ def _draw(
     variables: tuple[str, ...] | None = None,
 ) -> None:
     """Draw the figures of an open file and say which it has not the variables for."""
-    from vsacli.results.plots import drawings_of, omitted_figures, plot_stored
+    from vsacli.results.plots import draw_stored, drawings_of, omitted_figures
 
     if variables is None:
         for reason in omitted_figures(drawings_of(stored), stored.variables).values():
             talk.note(f"{path}: {reason}")
-    figures.save(plot_stored(stored, variables))
+    for name, figure in draw_stored(stored, variables):
+        figures.save({name: figure})
+        del figure  # which would stay in memory while the next one is drawn
 
 
 def _draw_comparison(

@@ -19,6 +19,7 @@ from vsacli.results.plots.drawings import drawable_figures, omitted_figures
 from vsacli.results.plots.figures import (
     RESULT_DRAWINGS,
     chosen_figures,
+    draw_stored,
     drawings_of,
     plot_stored,
     result_drawings,
@@ -51,6 +52,7 @@ __all__ = [
     "compare_files",
     "compared_studies",
     "comparison_names",
+    "draw_stored",
     "drawable_figures",
     "drawings_of",
     "measured_figure",

@@ -37,12 +37,14 @@ _AREA: dict[str, Any] = {"facecolor": "#8fc1ec", "alpha": 0.4, "linewidth": 0, "
 _EDGE: dict[str, Any] = {"color": "#6f9fc8", "linewidth": 0.9, "zorder": 1}
 
 
-def draw_corridors(place: SubplotSpec, result: StoredResult, failures: Failures) -> list[Artist]:
+def draw_corridors(
+    place: SubplotSpec, result: StoredResult, failures: Failures, most_rows: int = MOST_ROWS
+) -> list[Artist]:
     """Draw one panel per joint with a stiffness, of which there is one; returns what a legend shows."""
     bounds = [name for name in BOUNDS if set(BOUNDS) <= set(result.variables)]
     joints = compliant_joints(result.actuators)
     curves = read_curves(result, ["stiffness", *bounds])
-    panels = joint_panels(place, failures.time, np.ones((len(joints), 1), dtype=bool), MOST_ROWS)[:, 0]
+    panels = joint_panels(place, failures.time, np.ones((len(joints), 1), dtype=bool), most_rows)[:, 0]
     limits = result.limits("stiffness")
     handles: list[Artist] = []
     for joint, axes in zip(joints, panels, strict=True):

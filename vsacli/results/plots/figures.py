@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -31,8 +31,8 @@ from vsacli.results.plots.styles import house_style
 from vsacli.results.plots.variable_figures import draw_variable, drawable_variables
 from vsacli.results.store.reader import StoredResult
 
-NARROW_WIDTH = 2.5
-"""Inches: a stiffness panel where there are several columns of them."""
+NARROW_WIDTH, LOW_HEIGHT = 2.5, 1.4
+"""Inches: a stiffness panel where there are several columns of them, beside the positions."""
 
 
 def _motion(result: StoredResult, failures: Failures) -> Figure:
@@ -40,14 +40,15 @@ def _motion(result: StoredResult, failures: Failures) -> Figure:
     compliant = compliant_joints(result.actuators)
     if not compliant:
         return grouped_figure(result, failures, "q", [POSITIONS])
-    rows, folds = folding(len(compliant), MOST_ROWS)
+    left = GROUP_HEIGHT * len(panel_groups(result.joint_types))
+    most_rows = max(MOST_ROWS, int(left / LOW_HEIGHT))
+    rows, folds = folding(len(compliant), most_rows)
     widths = (PANEL_WIDTH, PANEL_WIDTH if folds == 1 else NARROW_WIDTH * folds)
-    groups = len(panel_groups(result.joint_types))
-    size = (sum(widths) + legend_width(result), max(GROUP_HEIGHT * groups, 1.4 * rows) + 1)
+    size = (sum(widths) + legend_width(result), max(left, LOW_HEIGHT * rows) + 1)
     figure = Figure(size, layout="constrained")
     grid = figure.add_gridspec(1, 2, width_ratios=widths)
     handles = draw_groups(grid[0], result, failures, "q", [POSITIONS])
-    handles += draw_corridors(grid[1], result, failures)
+    handles += draw_corridors(grid[1], result, failures, most_rows)
     return complete(figure, result_title(result), handles)
 
 
@@ -136,6 +137,22 @@ def chosen_figures(stored: StoredResult, variables: Sequence[str] | None) -> lis
     return [variable.name for variable in drawable_variables(stored, variables)]
 
 
+def draw_stored(stored: StoredResult, variables: Sequence[str] | None = None) -> Iterator[tuple[str, Figure]]:
+    """Draw what `plot_stored` does, each figure when it is asked for: those of many joints are large."""
+    names = chosen_figures(stored, variables)
+    failures = Failures.of(stored)
+    drawings = drawings_of(stored)
+    for name in names:
+        with house_style():
+            figure = (
+                drawings[name].draw(stored, failures)
+                if variables is None
+                else draw_variable(stored.declared[name], stored, failures)
+            )
+        yield name, figure
+        del figure  # before the next one is drawn
+
+
 def plot_stored(stored: StoredResult, variables: Sequence[str] | None = None) -> Figures:
     """Draw the figures of a result or a simulation by name, all but the `omitted_figures`.
 
@@ -146,10 +163,4 @@ def plot_stored(stored: StoredResult, variables: Sequence[str] | None = None) ->
     Raises:
         InputError: nothing can be drawn from what is stored, or there is no curve of one of the variables.
     """
-    names = chosen_figures(stored, variables)
-    with house_style():
-        failures = Failures.of(stored)
-        if variables is not None:
-            return {name: draw_variable(stored.declared[name], stored, failures) for name in names}
-        drawings = drawings_of(stored)
-        return {name: drawings[name].draw(stored, failures) for name in names}
+    return dict(draw_stored(stored, variables))

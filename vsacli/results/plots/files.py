@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from io import BytesIO
 from pathlib import Path
 
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 
 from vsacli.base.outputs import Outputs
 from vsacli.results.plots.styles import house_style
 
 FORMATS = ("png", "pdf", "svg")
+
+MOST_PIXELS = 24e6
+"""Of a picture: some 60 joints at the usual resolution. Matplotlib holds it twice, with 4 bytes each."""
 
 # Without dates, so that equal results give equal files.
 _METADATA: dict[str, dict[str, str | None]] = {
@@ -76,5 +81,12 @@ def save_figures(
 def _rendered(figure: Figure, file_format: str) -> bytes:
     buffer = BytesIO()
     with house_style():
-        figure.savefig(buffer, format=file_format, metadata=_METADATA[file_format])
+        resolution = _resolution(figure)
+        figure.savefig(buffer, format=file_format, dpi=resolution, metadata=_METADATA[file_format])
     return buffer.getvalue()
+
+
+def _resolution(figure: Figure) -> float:
+    """Dots an inch: as usual, but fewer of a figure that would have too many pixels."""
+    width, height = figure.get_size_inches()
+    return min(float(rcParams["savefig.dpi"]), math.sqrt(MOST_PIXELS / (width * height)))
