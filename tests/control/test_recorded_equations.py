@@ -210,10 +210,10 @@ def test_steps_start_from_states_that_lie_apart_in_memory():
 
 @pytest.mark.parametrize("processes", [1, slow(2)])
 def test_runs_with_errors_of_the_model_are_those_of_one_by_one(processes):
-    robot, trajectory = vsa_3r(), short_motion(3)
+    robot, trajectory = vsa_3r(), short_motion(3, rate=100, duration=0.2)
     conditions = {"gains": GAINS, "initial_error": InitialError(0.01), "engine": "numpy"}
-    reports = simulate_perturbed(robot, trajectory, 0.02, [4, 5, 6], processes=processes, **conditions)
-    for seed, report in zip([4, 5, 6], reports, strict=True):
+    reports = simulate_perturbed(robot, trajectory, 0.02, [4, 5], processes=processes, **conditions)
+    for seed, report in zip([4, 5], reports, strict=True):
         alone = simulate(robot, trajectory, model=perturbed(robot, 0.02, seed), **conditions).report
         assert report.as_json() == alone.as_json()
     with pytest.raises(InputError, match="there must be at least 1 process, not 0"):
