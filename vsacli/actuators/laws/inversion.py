@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from vsacli.actuators.laws.hermite import hermite, in_single
 from vsacli.actuators.laws.law import SpringLaw, state_of
 from vsacli.actuators.laws.state import SpringState
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -21,9 +22,6 @@ GUESS_RTOL = 1e-6
 MAX_HALVINGS = 20
 """Times that cells between the nodes of a first guess are halved; next to slack the deflection is a root of
 the torque, which no cubic comes close to."""
-
-LEAST_TORQUE_RISE = 1e-100
-"""Stands for the difference of two torques that rounding has made equal, N m (N)."""
 
 
 def inverse(
@@ -117,15 +115,12 @@ class FirstGuess:
     def _interpolate(self, law: SpringLaw, nodes: FloatArray) -> None:
         torque, stiffness = law.derivatives(nodes, 1)
         compliance = 1 / np.where(stiffness == 0, np.inf, stiffness)
-        rise, width = np.diff(nodes), np.maximum(np.diff(torque), LEAST_TORQUE_RISE)
-        mean, first, last = rise / width, compliance[:-1], compliance[1:]
-        quadratic, cubic = (3 * mean - 2 * first - last) / width, (first + last - 2 * mean) / width**2
-        self._torque = torque[:-1]
-        self._coefficients = nodes[:-1], first, quadratic, cubic
+        self._nodes = torque, nodes, in_single(compliance)
 
     def __call__(self, torque: FloatArray) -> FloatArray:
         """The deflection under torques within those of the nodes."""
-        cell = np.searchsorted(self._torque[1:], torque, side="right")
-        start, a, b, c, d = look_up((self._torque, *self._coefficients), cell)
-        x = torque - start
-        return a + x * (b + x * (c + x * d))
+        cell = np.searchsorted(self._nodes[0][1:-1], torque, side="right")
+        low, start, first = look_up(self._nodes, cell)
+        high, end, last = look_up(self._nodes, cell + 1)
+        width = high - low
+        return hermite((torque - low) / width, start, end, first * width, last * width)

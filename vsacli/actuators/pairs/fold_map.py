@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.laws.hermite import hermite, in_single
 from vsacli.actuators.laws.law import SpringLaw
 from vsacli.actuators.pairs.balance import Balance
 from vsacli.actuators.pairs.critical_points import SHORT_RTOL
@@ -16,7 +17,7 @@ from vsacli.compute.control_flow import Values, look_up
 MONOTONE_SLOPE_RATIO = 3.0
 """Most by which the slopes at the ends of a cubic exceed the mean so that it is monotone for sure."""
 
-GUESS_RTOL = 0.6 * SHORT_RTOL
+GUESS_RTOL = 0.9 * SHORT_RTOL
 """Relative distance to a fold that cubics between the nodes may have, so that one step is enough.
 
 It is seen to at `TESTED` points of a cubic, between which it may be a little more."""
@@ -88,8 +89,7 @@ class _Cubic(NamedTuple):
 
     def __call__(self, low: FloatArray, high: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
         """The cubic from values and slopes at both ends."""
-        x, rise, start, end = self.x, high - low, first * self.start, last * self.end
-        return low + x * (start + x * (3 * rise - 2 * start - end + x * (start + end - 2 * rise)))
+        return hermite(self.x, low, high, first * self.start, last * self.end)
 
 
 def map_folds(first: SpringLaw, second: SpringLaw) -> FoldMap:
@@ -186,7 +186,7 @@ def _map(points: FoldPoints, kept: IndexArray) -> FoldMap:
         cells = kept[joined], kept[joined + 1]
         after[side, joined], before[side, joined + 1] = _slopes(points, side, *cells)
     slope = np.where(np.isnan(before) | (np.abs(after) < np.abs(before)), after, before)
-    rounded = slope.astype(np.float32).astype(float)
+    rounded = in_single(slope)
     nodes = np.stack((points.tau_e[kept], *points.phi[:, kept], *rounded, points.cusp[kept]))
     bend = np.abs(after[:, 1:] - before[:, :-1]).sum(axis=0) / np.abs(after[:, 1:]).sum(axis=0)
     same = (nodes[:3, 1:] == nodes[:3, :-1]).all(axis=0) & (bend <= SAME_SLOPE_RTOL)
