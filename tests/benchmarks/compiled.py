@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import tempfile
 import time
@@ -17,17 +18,16 @@ from subjects import chain, motion, seven_joints
 from timing import Seconds, cpu_seconds, medians
 
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.engine.compiled_engine import CompiledEngine
+from vsacli.compute.engine.compiled_engine import CompiledEngine, kernel_code
 from vsacli.compute.engine.compiler import FLAGS, system_compiler
-from vsacli.compute.engine.engines import Engine, Kernel, kernel_program, passes
-from vsacli.compute.engine.lanes import batch_source
+from vsacli.compute.engine.engines import Engine, Kernel, passes
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.model import Robot
 
 LINKS, WHOLE = "link torques", "whole inverse dynamics"
-JOINTS = (1, 2, 3, 5, 7, 10, 15, 20)
+JOINTS = (1, 2, 3, 5, 7, 10, 20, 50, 100, 200)
 
 
 def batches(samples: int, repeats: int) -> Seconds:
@@ -67,7 +67,8 @@ def _in_blocks(engine: Engine, kernel: Kernel, rows: Sequence[FloatArray]) -> Ca
 class Cost(NamedTuple):
     """What code of inverse dynamics costs: operations, bytes of machine code and of stack, seconds.
 
-    `recording` and `compiling` are of the batch library, the rest of the generated function.
+    `recording` and `compiling` are of the batch library, the rest of the generated function and of what
+    it calls.
     """
 
     operations: int
@@ -87,8 +88,8 @@ def _cost(robot: Robot) -> Cost:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         begin = time.perf_counter()
-        program = kernel_program(InverseDynamics(robot))
-        (folder / "batch.c").write_text(batch_source(program), encoding="utf-8")
+        batch = kernel_code.__wrapped__(InverseDynamics(robot))
+        (folder / "batch.c").write_text(batch.text, encoding="utf-8")
         recorded = time.perf_counter()
         subprocess.run(["cc", *FLAGS, "batch.c", "-o", "batch.so", "-lm"], cwd=folder, check=True)
         compiled = time.perf_counter()
@@ -101,6 +102,12 @@ def _cost(robot: Robot) -> Cost:
         ).stdout.splitlines()
         stacks = (folder / f"{prefix}.su").read_text().splitlines()
     wanted = f"{prefix}_inverse_dynamics"
-    code = next(int(line.split()[1], 16) for line in symbols if line.endswith(f" {wanted}"))
-    stack = next(int(line.split()[-2]) for line in stacks if wanted in line)
-    return Cost(len(program.operations), code, stack, recorded - begin, compiled - recorded)
+    functions = re.compile(rf"{wanted}|inverse_dynamics_\d+(\.\w+)*")
+    sizes = {line.split()[-1]: int(line.split()[1], 16) for line in symbols if len(line.split()) == 4}
+    code = sum(size for function, size in sizes.items() if functions.fullmatch(function))
+    frames = {line.split()[0].split(":")[-1]: int(line.split()[-2]) for line in stacks}
+    called = [
+        size for function, size in frames.items() if functions.fullmatch(function) and function != wanted
+    ]
+    stack = frames[wanted] + max(called, default=0)
+    return Cost(batch.operations, code, stack, recorded - begin, compiled - recorded)

@@ -19,11 +19,11 @@ from samples.shipped import shipped_robot
 
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.control_flow import Keyed, call, repeat
-from vsacli.compute.engine import NUMPY, choose
+from vsacli.compute.engine import NUMPY, choose, engines
 from vsacli.compute.engine.compiler import FLAGS, Library
 from vsacli.compute.engine.engines import Kernel, TracedEngine, kernel_program
 from vsacli.compute.engine.lanes import batch_source
-from vsacli.compute.tracing import Kind, Program, array, is_of_calls, trace
+from vsacli.compute.tracing import Kind, Program, is_of_calls, trace
 from vsacli.compute.tracing.row_calls import CallingRowFunction
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
@@ -204,7 +204,7 @@ def test_rows_go_through_calls_as_through_the_text_bit_for_bit(kernel: LinkTorqu
 
 
 def test_long_chains_are_traced_by_calls_for_rows(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(array, "MOST_UNROLLED", 500)
+    monkeypatch.setattr(engines, "MOST_UNROLLED", 500)
     kernel = LinkTorques(mixed_chain(3, seed=3))
     rows = rows_of(InverseDynamics(kernel.robot), 5)[: kernel.inputs]
     assert is_of_calls(kernel_program(kernel))

@@ -120,7 +120,7 @@ def _calling_group(program: Program) -> Iterator[str]:
     """The same for a program of calls: loops copy between the rows and the workspace."""
     tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
-    code = CallingCode(program, Writer(VECTORS, tables), VECTORS)
+    code = CallingCode("part", program, Writer(VECTORS, tables), VECTORS)
     yield from code.declarations("static __attribute__((noinline))")
     yield "static void group(const double *const *in, double *const *out, int64_t at)"
     yield "{"

@@ -14,10 +14,6 @@ from vsacli.compute.tracing.numpy_functions import ARRANGING, FUNCTIONS, Cells, 
 from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol
 from vsacli.compute.tracing.tape import Tape, TooLongError
 
-MOST_UNROLLED = 8_000
-"""Operations of the longest programs that are written out, those of ten joints with cubic springs. Longer
-ones consist of calls, which is 6 to 9 % slower in C, and compiled in a fraction of the time."""
-
 
 class TracedArray(NDArrayOperatorsMixin):
     """An array whose entries are symbols or constants, by the protocols of NumPy (NEP 13 and 18).
@@ -186,13 +182,27 @@ def trace(
     return tape.program([cells_of(result).item() for result in function(rows)])
 
 
-def trace_by_size(function: Callable[[Sequence[Any]], Sequence[Any]], kinds: Sequence[Kind]) -> Program:
+def trace_by_size(
+    function: Callable[[Sequence[Any]], Sequence[Any]],
+    kinds: Sequence[Kind],
+    written_out: int,
+    most: int = sys.maxsize,
+    *,
+    short: bool = False,
+) -> Program:
     """The program of a function, as of `trace`: written out if it is short, else of calls.
 
+    Args:
+        function: as of `trace`.
+        kinds: as of `trace`.
+        written_out: operations of the longest program that is written out.
+        most: operations, calls among them, of the longest other program.
+        short: as of `trace`.
+
     Raises:
-        NotImplementedError: it has no such program.
+        NotImplementedError: as of `trace`.
     """
     try:
-        return trace(function, kinds, MOST_UNROLLED)
+        return trace(function, kinds, written_out, short=short)
     except TooLongError:
-        return trace(function, kinds, calling=True)
+        return trace(function, kinds, most, calling=True, short=short)

@@ -293,7 +293,7 @@ def table_declarations(tables: Tables, dialect: Dialect) -> Iterator[str]:
 
 
 def _name(symbol: Symbol, names: Names, prefix: str) -> str:
-    if symbol.operation == "item":
+    if symbol.operation == "item" and symbol.index not in names:
         nested, number = symbol.operands
         own = _name(nested, names, prefix)
         return f"{own}[{number}]" if nested.operation == "subroutine" else f"{own}_{number}"

@@ -31,6 +31,7 @@ class CallingCode:
     """The parts of C code for a program of calls.
 
     Args:
+        name: what the names of functions and tables begin with.
         program: one of nothing but calls and their items.
         writer: writes the bodies.
         dialect: how.
@@ -40,7 +41,8 @@ class CallingCode:
         slot: place in the workspace of inputs and outputs, by index: of inputs in their order, from 0 on.
     """
 
-    def __init__(self, program: Program, writer: Writer, dialect: Dialect) -> None:
+    def __init__(self, name: str, program: Program, writer: Writer, dialect: Dialect) -> None:
+        self._name = name
         self._writer = writer
         self._dialect = dialect
         self._number = dialect.array_type((), True)
@@ -57,8 +59,8 @@ class CallingCode:
     def declarations(self, qualifiers: str) -> Iterator[str]:
         """Tables, and functions with these qualifiers."""
         constants = ", ".join(self._dialect.entry(value, self._number) for value in self._constants) or "0"
-        yield f"static const {self._number} {CONSTANTS}_of_calls[] = {{{constants}}};"
-        yield f"static const int {PLACES}_of_calls[] = {{{', '.join(map(str, self._places))}}};"
+        yield f"static const {self._number} {self._name}_{CONSTANTS}[] = {{{constants}}};"
+        yield f"static const int {self._name}_{PLACES}[] = {{{', '.join(map(str, self._places))}}};"
         for function in self._functions.values():
             yield from self._definition(function, qualifiers)
 
@@ -73,11 +75,11 @@ class CallingCode:
     def _call(self, symbol: Symbol, values: list[Symbol], workspace: Workspace) -> None:
         (body, _), *operands = symbol.operands
         constant = tuple(not isinstance(operand, Symbol) for operand in operands)
-        unnamed = _Function(f"part_{len(self._functions)}", body, constant)
+        unnamed = _Function(f"{self._name}_{len(self._functions)}", body, constant)
         function = self._functions.setdefault(id(body), unnamed)
-        constants = f"{CONSTANTS}_of_calls + {len(self._constants)}"
+        constants = f"{self._name}_{CONSTANTS} + {len(self._constants)}"
         self._statements.append(
-            f"{function.name}({VALUES}, {constants}, {PLACES}_of_calls + {len(self._places)});"
+            f"{function.name}({VALUES}, {constants}, {self._name}_{PLACES} + {len(self._places)});"
         )
         self._constants += [float(operand) for operand in operands if not isinstance(operand, Symbol)]
         self._places += [workspace.slot[value.index] for value in values]
@@ -88,6 +90,8 @@ class CallingCode:
         values, table = f"{types[Kind.REAL]} *{VALUES}", f"const {self._number} *{CONSTANTS}"
         yield f"{qualifiers} void {function.name}({values}, {table}, const int *{PLACES})"
         yield "{"
+        if not any(function.constant):
+            yield f"(void){CONSTANTS};"
         sources, names = self._sources(function), dict[int, str]()
         results = (output.index for output in body.outputs if isinstance(output, Symbol))
         stored = dict(zip(results, count(function.constant.count(False)), strict=False))

@@ -54,10 +54,13 @@ def call_traced(row: TracedArray, function: Function, arguments: Sequence[Any]) 
         return function(*arguments)
     given: dict[Symbol, int] = {}
     form = _form(list(arguments), given)
-    key = function, form
-    if key not in tape.calls:
-        tape.calls[key] = _recorded(function, form, [symbol.kind for symbol in given])
-    called = tape.calls[key]
+    try:
+        called = tape.calls.get((function, form))
+    except TypeError:  # what cannot be hashed may hold symbols
+        return function(*arguments)
+    if called is None:
+        called = _recorded(function, form, [symbol.kind for symbol in given], short=tape.short)
+        tape.calls[function, form] = called
     arguments = list(given)
     items = iter(tape.emit_call(called.body, arguments))
     values = [next(items) if place is None else arguments[place] for place in called.returned]
@@ -78,9 +81,9 @@ class _Called(NamedTuple):
     returned: tuple[int | None, ...]
 
 
-def _recorded(function: Function, form: Any, kinds: Sequence[Kind]) -> _Called:
+def _recorded(function: Function, form: Any, kinds: Sequence[Kind], *, short: bool) -> _Called:
     """What a function does with arguments of a form."""
-    tape = Tape()
+    tape = Tape(short=short)
     inputs = {tape.input(kind): number for number, kind in enumerate(kinds)}
     found: dict[Symbol, int] = {}
     result = _form(function(*_made(form, tape, list(inputs))), found)

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 
 from vsacli.compute.tracing import Program, Symbol
 from vsacli.compute.tracing.c_tables import Tables
-from vsacli.compute.tracing.program import FUNCTIONS, Branch, Loop, Subroutine, Table
+from vsacli.compute.tracing.program import FUNCTIONS, Branch, Call, Loop, Subroutine, Table
 from vsacli.control.codegen.scalar import BYTES, Scalar
+
+BYTES_OF_PLACE = 4
+"""Of an int."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +41,20 @@ def worst_cost(program: Program) -> Cost:
 
 
 def table_bytes(programs: Iterable[Program], precision: str) -> int:
-    """Memory of the constant tables that the functions share."""
+    """Memory of all constant tables, those of which calls are given rows among them."""
+    programs = list(programs)
     tables = Tables(programs, Scalar(precision).array_type)
-    return sum(BYTES[array.type] * len(array.values) for array in tables.arrays)
+    of_calls = sum(_bytes_of_calls(program, precision) for program in programs)
+    return of_calls + sum(BYTES[array.type] * len(array.values) for array in tables.arrays)
+
+
+def _bytes_of_calls(program: Program, precision: str) -> int:
+    """Of the constants that calls are given, and of the places of what they read and write."""
+    calls = [symbol.operands for symbol in program.operations if symbol.operation == "call"]
+    places = sum(len(call.numbers) for call, *_ in calls)
+    places += sum(isinstance(operand, Symbol) for _, *given in calls for operand in given)
+    constants = sum(not isinstance(operand, Symbol) for _, *given in calls for operand in given)
+    return BYTES[precision] * constants + BYTES_OF_PLACE * places
 
 
 def _of_operation(symbol: Symbol) -> Cost:
@@ -48,7 +62,7 @@ def _of_operation(symbol: Symbol) -> Cost:
     if isinstance(nested, Loop):
         body = worst_cost(nested.body)
         return Cost(nested.limit * body.operations, nested.limit * body.functions, 1 + body.loops)
-    if isinstance(nested, Branch | Subroutine):
+    if isinstance(nested, Branch | Call | Subroutine):
         return worst_cost(nested.body)
     if symbol.operation == "item":
         return Cost(0, 0, 0)

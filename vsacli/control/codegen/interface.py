@@ -9,9 +9,15 @@ from itertools import product
 from typing import Any
 
 from vsacli.compute.rows import RowLayout
-from vsacli.compute.tracing import MOST_RECORDED, Kind, Program, trace
+from vsacli.compute.tracing import Kind, Program, trace_by_size
 
 Rows = Sequence[Any]
+
+MOST_WRITTEN_OUT = 20_000
+"""Operations of the longest functions that call no others: gcc takes 8 s for it."""
+
+MOST_OF_CALLS = 50_000
+"""Calls, their results, and operations between them, of the other functions: gcc takes a minute at most."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +111,8 @@ class Function:
         Raises:
             NotImplementedError: it has no evaluation in a bounded number of operations, or one of too many.
         """
-        inputs = sum(structure.layout.size for _, structure in self.arguments)
+        kinds = [Kind.REAL] * sum(structure.layout.size for _, structure in self.arguments)
         try:
-            return trace(self.compute, [Kind.REAL] * inputs, MOST_RECORDED, short=True)
+            return trace_by_size(self.compute, kinds, MOST_WRITTEN_OUT, MOST_OF_CALLS, short=True)
         except NotImplementedError as error:
             raise NotImplementedError(f"{self.name}: {error}") from error

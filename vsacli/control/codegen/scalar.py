@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from vsacli.compute.rounding import OfRounding
-from vsacli.compute.tracing import Kind, Program, Symbol
-from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations
+from vsacli.compute.tracing import Kind, Program, Symbol, is_of_calls
+from vsacli.compute.tracing.c_code import Dialect, Names, Writer, digits, table_declarations
+from vsacli.compute.tracing.c_functions import VALUES, CallingCode
 from vsacli.compute.tracing.c_subroutines import Subroutines
 from vsacli.compute.tracing.c_tables import Place, Tables
 from vsacli.control.codegen.interface import Function, Structure, structures
@@ -203,7 +204,7 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
     writer = Writer(dialect, tables, subroutines)
     bodies = ["\n".join(indented(writer.function(body))) for body in subroutines.bodies.values()]
     bodies += [
-        "\n".join(_definition(prefix, function, program, writer))
+        "\n".join(_definition(prefix, function, program, writer, dialect))
         for function, program in zip(functions, programs, strict=True)
     ]
     declarations = list(table_declarations(tables, dialect))
@@ -247,11 +248,27 @@ def indented(lines: Iterable[str], depth: int = 0) -> Iterator[str]:
         depth += line.endswith("{")
 
 
-def _definition(prefix: str, function: Function, program: Program, writer: Writer) -> Iterator[str]:
+def _definition(
+    prefix: str, function: Function, program: Program, writer: Writer, dialect: Dialect
+) -> Iterator[str]:
     entries = [f"{name}->{entry}" for name, structure in function.arguments for entry in structure.entries]
-    names = {symbol.index: entry for symbol, entry in zip(program.inputs, entries, strict=True)}
-    yield f"{signature(prefix, function)}\n{{"
-    yield from indented(writer.statements(program.operations, names), 1)
+    if is_of_calls(program):
+        code = CallingCode(function.name, program, writer, dialect)
+        yield from indented(code.declarations("static"))
+        yield f"{signature(prefix, function)}\n{{"
+        yield f"    {dialect.types[Kind.REAL]} {VALUES}[{code.slots}];"
+        yield from (f"    {VALUES}[{slot}] = {entry};" for slot, entry in enumerate(entries))
+        yield from (f"    {line}" for line in code.statements())
+        outputs = (output for output in program.outputs if isinstance(output, Symbol))
+        names = {output.index: code.value(output, code.slot[output.index]) for output in outputs}
+    else:
+        names = {symbol.index: entry for symbol, entry in zip(program.inputs, entries, strict=True)}
+        yield f"{signature(prefix, function)}\n{{"
+        yield from indented(writer.statements(program.operations, names), 1)
+    yield from _results(function, program, writer, names)
+
+
+def _results(function: Function, program: Program, writer: Writer, names: Names) -> Iterator[str]:
     flags = []
     outputs = iter(program.outputs)
     for array in function.result.arrays:
