@@ -18,7 +18,7 @@ SAMPLES = (10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 STORED = ("tau_motor", "flags")
 """Of the arm, so that ten million samples leave a file of 1.3 GB, not one of 18."""
 
-JOINTS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
+JOINTS = (1, 3, 10, 30, 100, 300, 1000)
 SAMPLES_OF_CHAIN = 1_000
 MOST_COMPILED = 100
 """Joints up to which chains are compiled: beyond, that takes minutes."""
@@ -115,8 +115,8 @@ def draw(growth: Growth, path: Path) -> None:
     ):
         above, below = panels[:, column]
         for engine, found in by_number.items():
-            above.loglog(found, [each.seconds for each in found.values()], "o-", label=names[engine])
-            below.semilogx(found, [each.memory / 1e6 for each in found.values()], "o-")
+            above.loglog([*found], [each.seconds for each in found.values()], "o-", label=names[engine])
+            below.semilogx([*found], [each.memory / 1e6 for each in found.values()], "o-")
         above.set(title=title)
         below.set(xlabel=label, ylim=(0, None))
     panels[0, 0].set(ylabel="whole run, s")
