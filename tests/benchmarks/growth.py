@@ -118,9 +118,9 @@ def draw(growth: Growth, path: Path) -> None:
             above.loglog([*found], [each.seconds for each in found.values()], "o-", label=names[engine])
             below.semilogx([*found], [each.memory / 1e6 for each in found.values()], "o-")
         above.set(title=title)
-        below.set(xlabel=label, ylim=(0, None))
+        below.set(xlabel=label)
     panels[0, 0].set(ylabel="whole run, s")
-    panels[1, 0].set(ylabel="at most resident, MB")
+    panels[1, 0].set(ylabel="at most resident, MB", ylim=(0, None))  # once all is drawn
     panels[0, 0].legend(frameon=False)
     for axes in panels.flat:
         axes.grid(visible=True, which="major", alpha=0.3)
