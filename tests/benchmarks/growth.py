@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,8 +20,6 @@ STORED = ("tau_motor", "flags")
 
 JOINTS = (1, 3, 10, 30, 100, 300, 1000)
 SAMPLES_OF_CHAIN = 1_000
-MOST_COMPILED = 100
-"""Joints up to which chains are compiled: beyond, that takes minutes."""
 
 
 class Growth(NamedTuple):
@@ -36,14 +34,8 @@ def measure() -> Growth:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         arm = {engine: {each: _arm(each, engine, folder) for each in SAMPLES} for engine in ENGINES}
-        chains = {
-            engine: {each: _chain(each, engine, folder) for each in _lengths(engine)} for engine in ENGINES
-        }
+        chains = {engine: {each: _chain(each, engine, folder) for each in JOINTS} for engine in ENGINES}
     return Growth(arm, chains)
-
-
-def _lengths(engine: str) -> Iterator[int]:
-    return (joints for joints in JOINTS if engine == "numpy" or joints <= MOST_COMPILED)
 
 
 def _arm(samples: int, engine: str, folder: Path) -> Taken:

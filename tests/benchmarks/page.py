@@ -229,5 +229,5 @@ def growth_tables(growth: Growth) -> str:
 
 def _both(found: Mapping[str, Mapping[int, Taken]], number: int) -> Iterable[str]:
     for by_number in found.values():
-        each = by_number.get(number)
-        yield from ("", "") if each is None else (f"{each.seconds:.2g} s", f"{each.memory / 1e6:.0f} MB")
+        each = by_number[number]
+        yield from (f"{each.seconds:.2g} s", f"{each.memory / 1e6:.0f} MB")
