@@ -17,8 +17,8 @@ from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.documents.changes import Changes, changed
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
-from vsacli.documents.plausibility import numbers
 from vsacli.documents.reading import read_document
+from vsacli.documents.record_numbers import numbers
 from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot

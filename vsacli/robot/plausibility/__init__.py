@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
-from vsacli.documents.plausibility import Entry, NumberPath, Written, findings, strange
+from vsacli.documents.plausibility import Written, findings, strange
+from vsacli.documents.record_numbers import Entry, NumberPath
 from vsacli.documents.source import Source
 from vsacli.robot.plausibility.body_rules import BODY_RULES
 from vsacli.robot.plausibility.damper_rules import DAMPER_RULES

@@ -9,7 +9,8 @@ import numpy as np
 
 from vsacli.actuators.transmission import Command
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
-from vsacli.documents.plausibility import Entry, Measured, Rule, Slip
+from vsacli.documents.plausibility import Measured, Rule, Slip
+from vsacli.documents.record_numbers import Entry
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.body_rules import SIZES
 from vsacli.robot.plausibility.facts import Facts, joint_path

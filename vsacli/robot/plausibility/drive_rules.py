@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator
 
 from vsacli.actuators.friction import Friction
-from vsacli.documents.plausibility import Entry, Measured, NumberPath, Rule, Slip
+from vsacli.documents.plausibility import Measured, Rule, Slip
+from vsacli.documents.record_numbers import Entry, NumberPath
 from vsacli.robot.plausibility.body_rules import SIZES
 from vsacli.robot.plausibility.facts import Facts, joint_path, ratio
 from vsacli.robot.plausibility.motor_rules import DEGREES_PER_SECOND, GEARS, RPM, driven_motors

@@ -9,7 +9,8 @@ from typing import NamedTuple
 from vsacli.actuators.motor import Motor
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import declared
-from vsacli.documents.plausibility import Entry, Measured, NumberPath, Rule, Slip
+from vsacli.documents.plausibility import Measured, Rule, Slip
+from vsacli.documents.record_numbers import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.body_rules import FASTEST, SIZES
 from vsacli.robot.plausibility.facts import Facts, joint_path, motors, ratio

@@ -11,7 +11,8 @@ import numpy as np
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
-from vsacli.documents.plausibility import Entry, Measured, NumberPath, Rule, Slip
+from vsacli.documents.plausibility import Measured, Rule, Slip
+from vsacli.documents.record_numbers import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.body_rules import DEGREES, SIZES, TURN
 from vsacli.robot.plausibility.facts import Facts, joint_path, ratio, written_once

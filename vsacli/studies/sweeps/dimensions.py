@@ -14,8 +14,8 @@ from vsacli.base.units import ANY_SI_UNIT
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import evaluate
-from vsacli.documents.plausibility import Entry, NumberPath
-from vsacli.documents.plausibility import Number as NumberAt
+from vsacli.documents.record_numbers import Entry, NumberPath
+from vsacli.documents.record_numbers import Number as NumberAt
 from vsacli.studies.sensitivities.tolerances import Tolerance, distribution
 from vsacli.studies.sweeps.ways import Drawn, Linked, Listed, Ranged, Spaced, Varied
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 from vsacli.base.errors import InputError
 from vsacli.documents.changes import ChangeError, changed
-from vsacli.documents.plausibility import numbers
+from vsacli.documents.record_numbers import numbers
 from vsacli.documents.source import Problems, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.file import ReadRobot

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from vsacli.actuators.laws import LAWS
 from vsacli.base import units
-from vsacli.documents.plausibility import Entry, Measured, Rule, Slip
+from vsacli.documents.plausibility import Measured, Rule, Slip
+from vsacli.documents.record_numbers import Entry
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.body_rules import SIZES
 from vsacli.robot.plausibility.facts import ratio

@@ -13,7 +13,8 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.signals import POSITION
 from vsacli.base.units import Quantity
-from vsacli.documents.plausibility import Entry, Measured, Number
+from vsacli.documents.plausibility import Measured
+from vsacli.documents.record_numbers import Entry, Number
 from vsacli.robot.model import Robot
 from vsacli.robot.plausibility.facts import BodySizes
 from vsacli.robot.plausibility.spring_rules import Corridor, corridor

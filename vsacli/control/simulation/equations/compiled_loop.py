@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.compute.aligned_rows import address
 from vsacli.compute.engine.compiler import CompilerError
 from vsacli.control.simulation.equations.recording import Recording
 from vsacli.control.simulation.equations.stages import Stages
@@ -131,9 +132,3 @@ class CompiledLoop:
             address(which.times), address(rates), address(state),
         )  # fmt: skip
         return state
-
-
-def address(array: Any) -> int:
-    """Of the first entry of an array."""
-    place: int = array.__array_interface__["data"][0]
-    return place
