@@ -31,6 +31,9 @@ pytestmark = needs_compiler
 
 SAMPLES = 150
 
+OF_STRETCHED_LINKAGES = 1e-10
+"""Relative rounding of the stiffness where a four-bar's domain ends, from that of the deflection."""
+
 
 def lossy() -> Robot:
     """The PUMA 560 with its friction, friction between its links, and windings."""
@@ -47,8 +50,11 @@ def margins(block: Block) -> FloatArray:
     return np.abs(room) / block.stiffness
 
 
-def check_inverse_dynamics(robot: Robot, folder: Path) -> Block:
-    """Values and flags of every variable; returns what the tool computes."""
+def check_inverse_dynamics(robot: Robot, folder: Path, rtol_of_upper: float = 0.0) -> Block:
+    """Values and flags of every variable; returns what the tool computes.
+
+    Relative rounding of the largest stiffness may be given, if it is more than a share of the peak.
+    """
     function, command = inverse_dynamics_function(robot), commands(robot, SAMPLES, seed=2)
     found, returned = compiled_robot(folder / "c", robot, [function], "double")(function, command)
     block = compute_block(robot, motion_of(command))
@@ -59,7 +65,10 @@ def check_inverse_dynamics(robot: Robot, folder: Path) -> Block:
         np.testing.assert_array_equal(np.isnan(values), np.isnan(expected), err_msg=name)
         chosen = clear(margins(block), expected.shape) & np.isfinite(expected)
         peak = np.abs(expected[chosen]).max(initial=0.0)
-        np.testing.assert_allclose(values[chosen], expected[chosen], rtol=0, atol=CLOSE * peak, err_msg=name)
+        rtol = rtol_of_upper if name == "stiffness_upper" else 0.0
+        np.testing.assert_allclose(
+            values[chosen], expected[chosen], rtol=rtol, atol=CLOSE * peak, err_msg=name
+        )
         infinite = np.isinf(expected)
         np.testing.assert_array_equal(values[infinite], expected[infinite])
     return block
@@ -67,7 +76,8 @@ def check_inverse_dynamics(robot: Robot, folder: Path) -> Block:
 
 @pytest.mark.parametrize("law", slow_but({"cubic", "sinh", "exponential", "quadratic"}, SPRINGS))
 def test_inverse_dynamics_with_springs_of_each_law(law: str, tmp_path: Path) -> None:
-    block = check_inverse_dynamics(with_springs(law), tmp_path)
+    rtol = OF_STRETCHED_LINKAGES if law == "four_bar" else 0.0
+    block = check_inverse_dynamics(with_springs(law), tmp_path, rtol_of_upper=rtol)
     seen = Flag(int(np.bitwise_or.reduce(block.flags, axis=None)))
     assert Flag.INFEASIBLE | Flag.POSITION_LIMIT | Flag.VELOCITY_LIMIT in seen
     assert np.count_nonzero(block.flags == 0) > 0

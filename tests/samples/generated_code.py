@@ -85,7 +85,7 @@ def compiled(
     files = {
         f"{prefix}.h": header,
         f"{prefix}.c": source_text(prefix, functions, precision, HEAD),
-        f"{prefix}.py": binding_text(prefix, functions, precision),
+        f"{prefix}.py": binding_text(prefix, functions, precision, HEAD),
         **build_files(prefix),
     }
     write_files(Project(files, [], ()), folder)

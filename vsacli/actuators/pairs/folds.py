@@ -30,20 +30,31 @@ def outermost_fold(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> tuple
         spring = SpringState(*[nowhere] * len(SpringState._fields))
         return np.zeros_like(tau_e, dtype=bool), PairState(nowhere, nowhere, spring, spring)
     exists, near, corners = folds.guess(tau_e)
+    box = (*_sorted(*corners[:2]), *_sorted(*corners[2:]))
     guess = balance.state(*near)
     rho = guess.rho
     steps = newton_step(guess, rho, tau_e)
     fold = where_needed(
         exists & ~is_short(guess, rho, steps),
         lambda *known: _safeguarded(balance, *known),
-        (tau_e, *near, *corners),
-        guess.after(*steps).values,
+        (tau_e, *near, *box),
+        guess.after(*_within(box, near, steps)).values,
     )
     return exists, PairState.of(fold)
 
 
+def _within(box: Values, near: Values, steps: Values) -> Values:
+    """Steps that do not leave the box.
+
+    Rounding of the elastic torque would, where one spring is stretched 1e16 times farther than the other.
+    """
+    low_1, high_1, low_2, high_2 = box
+    (near_1, near_2), (step_1, step_2) = near, steps
+    return np.clip(step_1, low_1 - near_1, high_1 - near_1), np.clip(step_2, low_2 - near_2, high_2 - near_2)
+
+
 def _safeguarded(
-    balance: Balance, tau_e: FloatArray, guess_1: FloatArray, guess_2: FloatArray, *corners: FloatArray
+    balance: Balance, tau_e: FloatArray, guess_1: FloatArray, guess_2: FloatArray, *box: FloatArray
 ) -> Values:
     """The fold between two corners of a box: by Newton's method from a guess, else by bracketing."""
 
@@ -55,7 +66,7 @@ def _safeguarded(
         next_point = np.clip(phi_1 + step_1, low_1, high_1), np.clip(phi_2 + step_2, low_2, high_2)
         return (*next_point, change), ~(change > NEWTON_RTOL)
 
-    low_1, high_1, low_2, high_2 = box = (*_sorted(*corners[:2]), *_sorted(*corners[2:]))
+    low_1, high_1, low_2, high_2 = box
     start = np.clip(guess_1, low_1, high_1), np.clip(guess_2, low_2, high_2)
     *found, change = repeat(step, (*start, np.zeros_like(tau_e)), (tau_e, *box), MAX_NEWTON_STEPS)
     phi_1, phi_2 = where_needed(

@@ -6,10 +6,12 @@ import textwrap
 from collections.abc import Iterator, Sequence
 
 from vsacli.base.flags import Flag
+from vsacli.base.texts import one_line
 from vsacli.control.codegen.interface import Array, Function, Structure, structures
 from vsacli.control.codegen.scalar import WIDTH
 
-_HEAD = '''"""The functions of {prefix}.c, called from Python. Importing this compiles them, by make.
+_HEAD = '''{about}
+"""The functions of {prefix}.c, called from Python. Importing this compiles them, by make.
 
     import numpy as np
     import {prefix}
@@ -59,13 +61,14 @@ _NOMINAL = """_CONSTANT = (ctypes.c_char * {type}.itemsize).in_dll(_LIBRARY, "{p
 NOMINAL_{upper} = np.frombuffer(_CONSTANT.raw, {type})[0]"""
 
 
-def binding_text(prefix: str, functions: Sequence[Function], precision: str) -> str:
-    """The module; arguments as of `vsacli.control.codegen.scalar.source_text`."""
+def binding_text(prefix: str, functions: Sequence[Function], precision: str, about: str) -> str:
+    """The module; arguments as of `vsacli.control.codegen.scalar.source_text`, and what comes first in it."""
     used = structures(functions)
     loop = next((each for each in functions if each.name == "inverse_dynamics"), functions[0])
     call = f"{loop.name}({', '.join(name for name, _ in loop.arguments)})"
+    comments = textwrap.wrap(one_line(about), WIDTH, initial_indent="# ", subsequent_indent="# ")
     parts = [
-        _HEAD.format(prefix=prefix, call=call),
+        _HEAD.format(about="\n".join(comments), prefix=prefix, call=call),
         "\n".join(_flags()),
         "\n\n".join(_data_type(each, precision) for each in used),
         *(_function(prefix, each) for each in functions),

@@ -73,7 +73,8 @@ def generate(
     """
     prefix = prefix_of(robot)
     title = f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
-    head = comment(" ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)]))
+    about = " ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)])
+    head = comment(about)
     chosen = parameters(robot, patterns) if patterns else ()
     try:
         functions, omitted = _functions(robot, wrench, chosen)
@@ -83,7 +84,7 @@ def generate(
             f"{prefix}.h": header_text(prefix, robot, functions, precision, head),
             f"{prefix}.c": source_text(prefix, functions, precision, head),
             f"{prefix}_test.c": self_test_text(prefix, functions, Reference(robot, chosen), precision, head),
-            f"{prefix}.py": binding_text(prefix, functions, precision),
+            f"{prefix}.py": binding_text(prefix, functions, precision, about),
             **build_files(prefix),
             "README.md": readme_text(prefix, robot, functions, precision, omitted),
         }
