@@ -67,7 +67,7 @@ def measured(repeats: int, figure: Path) -> dict[str, Callable[[], str]]:
         "costs": lambda: page.cost_table(compiled.costs()),
         "stages": staged,
         "storage": lambda: page.storage_table(storage.compare(repeats)),
-        "whole": lambda: page.whole_table(whole_runs.compare(2 * SAMPLES, repeats)),
+        "whole": lambda: page.whole_table(whole_runs.compare(2 * SAMPLES, 2 * repeats + 1)),
         "actuation": lambda: page.actuation_table(actuation.compare(ACTUATION_SAMPLES, 3 * repeats)),
         "sensitivity": lambda: page.sensitivity_part(sensitivities.compare(3 * repeats)),
         "simulations": lambda: page.simulation_table(simulations.compare(repeats)),

@@ -25,6 +25,7 @@ OURS = "vsacli, recorded, C"
 LOOP = """
 #include <time.h>
 #include "arm.h"
+const unsigned long torques_size = sizeof(arm_torques);
 double time_all(const arm_motion *motion, arm_torques *torques, long samples)
 {
     struct timespec begin, end;
@@ -70,9 +71,11 @@ def compare(samples: int, repeats: int) -> list[Recorder]:
         (folder / "arm.c").write_text(source_text("arm", [function], "double", "/* timed */"))
         (folder / "loop.c").write_text(LOOP)
         subprocess.run(["gcc", *FLAGS, "arm.c", "loop.c", "-o", "arm.so", "-lm"], cwd=folder, check=True)
-        run = ctypes.CDLL(str(folder / "arm.so")).time_all
+        library = ctypes.CDLL(str(folder / "arm.so"))
+        run = library.time_all
         run.restype = ctypes.c_double
-        rows, torques = np.ascontiguousarray(np.concatenate(moving, axis=1)), np.empty((samples, 21))
+        record = ctypes.c_ulong.in_dll(library, "torques_size").value
+        rows, torques = np.concatenate(moving, axis=1), np.empty((samples, record), np.uint8)
         pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in (rows, torques)]
         ways = {OURS: lambda: run(*pointers, ctypes.c_long(samples)), CASADI: lambda: casadi(moving)[0]}
         seconds = medians(ways, repeats)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -11,7 +12,7 @@ from typing import NamedTuple
 from casadi_peer import CasadiPeer
 from stages import VARIABLES, trajectory_of
 from subjects import motion, seven_joints
-from timing import cpu_seconds, medians
+from timing import medians
 
 from vsacli.analysis.run import Run
 from vsacli.base.outputs import Outputs
@@ -29,14 +30,13 @@ class WholeRun(NamedTuple):
         stored: which variables.
         seconds: processor time a sample, with one thread.
         ratio: that over peer 1.
-        longest: with two threads, that of the one that takes longest: it keeps the books and puts chunks
-            together, while others compute and write.
+        by_clock: time a sample, by the clock, of one processor and of two with as many threads.
     """
 
     stored: str
     seconds: float
     ratio: float
-    longest: float
+    by_clock: tuple[float, float]
 
 
 def compare(samples: int, repeats: int) -> list[WholeRun]:
@@ -47,35 +47,48 @@ def compare(samples: int, repeats: int) -> list[WholeRun]:
     with tempfile.TemporaryDirectory() as folder:
         peer = CasadiPeer(robot, Path(folder))
         for stored, variables in SELECTIONS.items():
-            one, two = (_run(robot, trajectory, variables, count, Path(folder)) for count in (1, 2))
-            ways = {"peer": lambda: peer(moving)[0], "one": cpu_seconds(one), "two": _caller_seconds(two)}
+            one, two = (_run(robot, trajectory, variables, threads) for threads in (1, 2))
+            ways = {
+                "peer": lambda: peer(moving)[0],
+                "processor": _timed(one, time.process_time),
+                "one": _timed(one, time.perf_counter, processors=1),
+                "two": _timed(two, time.perf_counter, processors=2),
+            }
             taken = medians(ways, repeats)
-            ratio = taken["one"] / taken["peer"]
-            found.append(WholeRun(stored, taken["one"] / samples, ratio, taken["two"] / samples))
+            by_clock = taken["one"] / samples, taken["two"] / samples
+            ratio = taken["processor"] / taken["peer"]
+            found.append(WholeRun(stored, taken["processor"] / samples, ratio, by_clock))
     return found
 
 
-def _caller_seconds(way: Callable[[], None]) -> Callable[[], float]:
-    """A way that reports seconds of processor time of the thread that calls it."""
+def _timed(
+    run: Callable[[Path], None], clock: Callable[[], float], processors: int | None = None
+) -> Callable[[], float]:
+    """A run to a file that is new, on so many processors; it reports what the clock says."""
+    every = os.sched_getaffinity(0)
 
     def timed() -> float:
-        begin = time.thread_time()
-        way()
-        return time.thread_time() - begin
+        os.sched_setaffinity(0, sorted(every)[:processors])
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                begin = clock()
+                run(Path(folder) / "result.h5")
+                return clock() - begin
+        finally:
+            os.sched_setaffinity(0, every)
 
     return timed
 
 
 def _run(
-    robot: Robot, trajectory: Trajectory, variables: Sequence[str] | None, threads: int, folder: Path
-) -> Callable[[], None]:
-    """A run with the compiled engine whose file replaces that of the one before."""
+    robot: Robot, trajectory: Trajectory, variables: Sequence[str] | None, threads: int
+) -> Callable[[Path], None]:
+    """A run with the compiled engine."""
 
-    def run() -> None:
-        with Outputs(overwrite=True) as outputs:
+    def run(path: Path) -> None:
+        with Outputs(overwrite=False) as outputs:
             steps = Run(robot, trajectory, engine="c", threads=threads)
-            file = outputs.file(folder / "result.h5")
-            with ResultWriter(file, robot, trajectory, variables) as writer:
+            with ResultWriter(outputs.file(path), robot, trajectory, variables) as writer:
                 for block in steps:
                     writer.write(block)
                 writer.finish(steps.report().as_json())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import threading
 from collections.abc import Iterable
 from pathlib import Path
@@ -20,6 +22,7 @@ from samples.results import (
     writing,
 )
 
+from vsacli.base.errors import StorageError
 from vsacli.base.variables import Block
 from vsacli.results.store import chunks, new_file
 from vsacli.results.store.chunks import ChunkFiller
@@ -38,13 +41,14 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def in_a_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Short files, too, are written in a thread."""
+    """Short files, too, are written in a thread, and stored by another."""
     monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
     monkeypatch.setattr(new_file, "BEHIND", 5000)
+    monkeypatch.setattr(new_file, "SYNCED", 3000)
 
 
 def threads() -> list[str]:
-    return [each.name for each in threading.enumerate() if each.name.startswith("vsacli-writing")]
+    return [each.name for each in threading.enumerate() if each.name.startswith("vsacli-")]
 
 
 NAMES = ["q", "theta", "flags"]
@@ -145,6 +149,23 @@ def test_an_exception_of_the_caller_ends_the_thread(tmp_path: Path) -> None:
         run()
     assert not threads()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("small_chunks", "in_a_thread")
+def test_a_disk_that_fails_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the disk says to the thread is said of the file, which gets no name."""
+    sync = os.fsync
+
+    def failing(descriptor: int) -> None:
+        if threading.current_thread().name == "vsacli-syncing":
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", failing)
+    with pytest.raises(StorageError, match=r"r\.h5.*Input/output error"):
+        write_result(tmp_path / "r.h5", random_block(10 * ROWS, 2))
+    assert list(tmp_path.iterdir()) == []
+    assert not threads()
 
 
 def test_what_waits_is_bounded() -> None:

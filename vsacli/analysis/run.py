@@ -94,7 +94,8 @@ class Run:
         inside = () if self._internal is None else self._internal.joints
         integrated = self._deflections is not None
         self._kernel = BalancedDynamics(robot, frame, near_singular, integrated, inside)
-        self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell)
+        several = trajectory.samples > self._block_samples  # one thread keeps the books of the block before
+        self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell, busy=int(several))
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
         self._energy = RunEnergy(robot, self.choice.engine)

@@ -66,7 +66,13 @@ class Choice(NamedTuple):
 
 
 def choose(
-    name: str, kernel: Kernel, samples: int, threads: int | None = None, tell: Tell = unheard
+    name: str,
+    kernel: Kernel,
+    samples: int,
+    threads: int | None = None,
+    tell: Tell = unheard,
+    *,
+    busy: int = 0,
 ) -> Choice:
     """The engine for a computation.
 
@@ -76,6 +82,7 @@ def choose(
         samples: over how many samples.
         threads: of compiled code; as many as there are processors if None.
         tell: learns what goes wrong on the way, and what will take long, before it does.
+        busy: how many of the threads do something else meanwhile, as long as one is left.
 
     Raises:
         InputError: there is no engine of that name, or it is "c" and there is no C compiler that works, or
@@ -93,7 +100,7 @@ def choose(
     threads = threads or processors()
     try:
         compiler = system_compiler()
-        engine = CompiledEngine(compiler, threads, tell)
+        engine = CompiledEngine(compiler, max(1, threads - busy), tell)
         loaded = engine.prepare(kernel, lambda code: name == "c" or _repays(code, usual))
     except CompilerError as error:
         if name == "c":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,9 @@ BEHIND_FROM = 2**24
 BEHIND = 2**25
 """Bytes that may wait to be written: some more than a block of seven joints with all variables."""
 
+SYNCED = 2**26
+"""Bytes after which the disk begins to store what was written, so that little is left of that at the end."""
+
 
 class NewFile:
     """An HDF5 file that is being written.
@@ -43,7 +47,7 @@ class NewFile:
         self._file: Any = None  # h5py has no types
         self._sink: Sink | None = None
         self._behind: WriteBehind | None = None
-        self._bytes = 0
+        self._bytes = self._synced = 0
 
     @property
     def is_open(self) -> bool:
@@ -99,6 +103,9 @@ class NewFile:
 
             self._behind = WriteBehind(BEHIND)
         self._behind.put(task, size)
+        if self._sink is not None and self._bytes - self._synced >= SYNCED:
+            self._synced = self._bytes
+            self._sink.begin_sync()
 
     def wait(self) -> None:
         """Wait until all tasks are done; within `used`."""
@@ -129,6 +136,7 @@ class Sink(io.RawIOBase):
 
     def __init__(self, file: io.FileIO) -> None:
         self._file = file
+        self._syncing: threading.Thread | None = None
         self.error: OSError | None = None
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
@@ -161,8 +169,22 @@ class Sink(io.RawIOBase):
             self.error = self.error or error
             return 0
 
+    def begin_sync(self) -> None:
+        """Have the disk store what was written, in a thread, unless it is still at that."""
+        if self._syncing is None or not self._syncing.is_alive():
+            self._syncing = threading.Thread(target=self._sync, name="vsacli-syncing")
+            self._syncing.start()
+
+    def _sync(self) -> None:
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            self.error = self.error or error
+
     def close(self) -> None:
         """Close the file, or note what the file system reports only now."""
+        if self._syncing is not None:
+            self._syncing.join()
         try:
             self._file.close()
         except OSError as error:
