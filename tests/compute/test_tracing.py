@@ -160,6 +160,15 @@ def test_values_of_two_programs_do_not_meet(row: TracedArray) -> None:
         row + TracedArray(other := Tape(), other.inputs(1))
 
 
+def test_nothing_is_added_to_a_program() -> None:
+    tape = Tape()
+    x, y = tape.inputs(2)
+    program = tape.program([x + y])
+    with pytest.raises(RuntimeError, match="its program is made"):
+        x * y
+    assert len(program.operations) == 1
+
+
 def test_constants_are_computed_at_once() -> None:
     tape = Tape()
     constant = TracedArray(tape, [2.0])

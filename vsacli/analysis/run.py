@@ -94,8 +94,9 @@ class Run:
         inside = () if self._internal is None else self._internal.joints
         integrated = self._deflections is not None
         self._kernel = BalancedDynamics(robot, frame, near_singular, integrated, inside)
-        several = trajectory.samples > self._block_samples  # one thread keeps the books of the block before
-        self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell, busy=int(several))
+        self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
+        busy = int(self._ahead)  # with the books of the block before
+        self.choice = choose(engine, self._kernel, trajectory.samples, threads, tell, busy=busy)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = [] if self._deflections is None else _drift_summaries(robot, self._deflections)
         self._energy = RunEnergy(robot, self.choice.engine)
@@ -111,12 +112,12 @@ class Run:
         return starmap(self._added, _until_infeasible(passed) if self._stop_on_infeasible else passed)
 
     def _steps(self) -> Iterator[Block]:
-        """All steps, in blocks, with what holds at them; with several threads one block is computed ahead."""
+        """All steps, in blocks, with what holds at them; of several threads all but one compute ahead."""
         starts = range(0, self.trajectory.samples, self._block_samples)
         blocks = (
             self._compute(self.trajectory.block(start, start + self._block_samples)) for start in starts
         )
-        if self.choice.threads == 1 or len(starts) == 1:
+        if self.choice.threads == 1 or not self._ahead:
             return blocks
         from vsacli.base.ahead import ahead
 
@@ -206,6 +207,11 @@ class Run:
         bound = SPRING_BOUND if self._deflections is None else DRIFT_BOUND
         error, error_bound = ladder(self.robot, self.trajectory, self.choice.engine, self._internal)
         return SelfCheck(self._springs.residual, error, bound, error_bound)
+
+
+def _is_long(robot: Robot) -> bool:
+    """Whether memory bounds the blocks of a chain, so that none is computed beside another."""
+    return usual_block(len(robot.joints)) < usual_block(1)
 
 
 def inverse_dynamics(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 SAMPLES_PER_PASS = 12288
 """Samples that NumPy takes at a time: fewer waste time in the interpreter, more leave the caches."""
 
-INPUTS_PER_PASS = 5 * 2**18
+INPUTS_PER_PASS = 9 * 2**17
 """Bound on a kernel's inputs times samples at a time: the recursion keeps about 60 bytes for each, and two
 blocks some 40 each. So a run of any chain stays below 300 MB; with twice as many it took 420 MB."""
 

@@ -54,6 +54,7 @@ class Tape:
         self.calls: dict[Hashable, Any] = {}
         self._symbols: dict[Hashable, Symbol] = {}
         self._inputs: list[Symbol] = []
+        self._ended = False
 
     def inputs(self, count: int) -> list[Symbol]:
         """New real variables, which a program receives in this order."""
@@ -110,6 +111,8 @@ class Tape:
         if any(isinstance(operand, Symbol) and operand.tape is not self for operand in operands):
             message = "a value of another program is none of this one; pass it as an argument"
             raise NotImplementedError(message)
+        if self._ended:
+            raise RuntimeError("nothing can be added to a tape once its program is made")
         if len(self._symbols) >= self._most:
             raise TooLongError(f"a step takes more than {self._most} operations")
         symbol = Symbol(self, len(self._symbols), operation, operands, kind)
@@ -118,9 +121,15 @@ class Tape:
         return symbol
 
     def program(self, outputs: Sequence[Operand]) -> Program:
-        """What computes these outputs from the inputs, without dead code; calls are all there is."""
+        """What computes these outputs from the inputs, without dead code; calls are all there is.
+
+        The tape ends with it: symbols know their tape, so whatever that keeps would stay as long as they do.
+        """
         operations = [symbol for symbol in self._symbols.values() if symbol.operation != "input"]
         program = without_dead_code(self._inputs, operations, outputs)
+        self._ended = True
+        self._symbols.clear()
+        self.calls.clear()
         return with_shared_bodies(with_outlined_runs(program)) if self.calling else program
 
 
