@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 MOST_NEAR = 3
@@ -25,5 +24,7 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
 
 def _near(word: str, options: list[str]) -> list[str]:
     """The word most like this one, or those that begin with it."""
+    import difflib  # which a command that has nothing to complain of need not load
+
     close = difflib.get_close_matches(word, options, n=1, cutoff=0.6)
     return close or [option for option in options if word and option.startswith(word)]

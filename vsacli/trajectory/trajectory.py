@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -90,6 +89,8 @@ class Trajectory:
         return f"Trajectory {self.name}: {size}{pushed}"
 
     def _repr_html_(self) -> str:
+        from html import escape  # for notebooks alone
+
         return f"<p>{escape(repr(self))}</p>"
 
     def _profiles(self) -> Iterator[tuple[Signal, Profile]]:
