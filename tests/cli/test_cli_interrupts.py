@@ -130,6 +130,28 @@ def test_interrupt_in_the_first_instants_is_quiet(tmp_path, motion, imported):
     assert not (tmp_path / "r.h5").exists()
 
 
+HALFWAY = """\
+import atexit, signal, sys
+from vsacli.__main__ import main
+register = atexit.register
+def interrupted(function, *arguments):
+    if function.__name__ == "unregister_converters":
+        signal.raise_signal(signal.SIGINT)
+    return register(function, *arguments)
+atexit.register = interrupted
+sys.argv[0] = "vsacli"
+main()
+"""
+"""A command during which Ctrl-C comes when h5py is imported by half, and HDF5 would call into it at the end."""
+
+
+def test_interrupt_while_h5py_is_imported(tmp_path, motion):
+    command = [sys.executable, "-c", HALFWAY, "invdyn", str(ROBOT), str(motion), "-o", "r.h5"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGINT, "interrupted\n")
+    assert not (tmp_path / "r.h5").exists()
+
+
 def test_a_signal_in_a_callback_of_python_comes_again() -> None:
     """There an exception is not passed on; nothing is printed about that either."""
     program = """
