@@ -142,7 +142,7 @@ atexit.register = interrupted
 sys.argv[0] = "vsacli"
 main()
 """
-"""A command during which Ctrl-C comes when h5py is imported by half, and HDF5 would call into it at the end."""
+"""A command that Ctrl-C reaches when h5py is imported by half, into which HDF5 would call at the end."""
 
 
 def test_interrupt_while_h5py_is_imported(tmp_path, motion):

@@ -114,14 +114,12 @@ class Run:
     def _steps(self) -> Iterator[Block]:
         """All steps, in blocks, with what holds at them; of several threads all but one compute ahead."""
         starts = range(0, self.trajectory.samples, self._block_samples)
-        blocks = (
-            self._compute(self.trajectory.block(start, start + self._block_samples)) for start in starts
-        )
+        motions = (self.trajectory.block(start, start + self._block_samples) for start in starts)
         if self.choice.threads == 1 or not self._ahead:
-            return blocks
+            return map(self._compute, motions)
         from vsacli.base.ahead import ahead
 
-        return ahead(blocks)
+        return ahead(self._compute, motions)
 
     def _compute(self, motion: Motion) -> Block:
         integrated = None if self._deflections is None else self._deflections.at(motion.time)

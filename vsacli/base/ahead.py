@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from itertools import islice
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
 _Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
 
 
-def ahead(items: Iterator[_Item]) -> Iterator[_Item]:
-    """The items of an iterator, each of which a thread begins when the caller takes the one before.
+def ahead(function: Callable[[_Item], _Result], items: Iterable[_Item]) -> Iterator[_Result]:
+    """What a function makes of items, of each in a thread while the caller has that of the one before.
 
-    So there is one more of them at a time. What the iterator raises comes here, in its place. Signals never
-    reach the thread: whoever is ended while it computes waits for the item that it is at.
+    The items themselves are taken in the caller's thread: two that are both busy in the interpreter would
+    wait for one another. What the function raises comes here, in its place. Signals never reach the thread:
+    whoever is ended while it computes waits for what it is at.
     """
-
-    def following() -> list[_Item]:
-        return list(islice(items, 1))
-
+    coming: deque[Future[_Result]] = deque()
     with ThreadPoolExecutor(1, "vsacli-ahead") as thread:
-        coming = thread.submit(following)
-        while found := coming.result():
-            coming = thread.submit(following)
-            yield found.pop()  # which is not kept here
+        for item in items:
+            coming.append(thread.submit(function, item))
+            if len(coming) > 1:
+                yield coming.popleft().result()
+        while coming:
+            yield coming.popleft().result()

@@ -3,5 +3,5 @@
 from vsacli.base.interrupts import interrupts_deferred
 
 with interrupts_deferred():
-    # When the process ends HDF5 calls into h5py, and crashes, if the import came no further than half its way.
+    # When a process ends HDF5 calls into h5py, and crashes, if the import came no further than half its way.
     import h5py  # noqa: F401  # the modules in here import it themselves
