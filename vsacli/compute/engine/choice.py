@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING, NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
@@ -98,17 +100,13 @@ def choose(
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
     threads = threads or processors()
+    asked = name == "c"
     try:
-        compiler = system_compiler()
-        engine = CompiledEngine(compiler, max(1, threads - busy), tell)
-        loaded = engine.prepare(kernel, lambda code: name == "c" or _repays(code, usual))
-    except CompilerError as error:
-        if name == "c":
-            raise InputError.one(f"{error}; the engine numpy needs none") from error
-        return Choice(_numpy(usual), f"NumPy computes: {error}")
-    except NotImplementedError as error:
-        if name == "c":
-            raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
+        with compiled_as_asked() if asked else nullcontext():
+            compiler = system_compiler()
+            engine = CompiledEngine(compiler, max(1, threads - busy), tell)
+            loaded = engine.prepare(kernel, lambda code: asked or _repays(code, usual))
+    except (CompilerError, NotImplementedError) as error:
         return Choice(_numpy(usual), f"NumPy computes: {error}")
     if loaded is None:
         return Choice(_numpy(usual), f"NumPy computes: {samples} samples would not repay compiling")
@@ -144,14 +142,12 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
     from vsacli.compute.engine.compiled_engine import kernel_code
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
+    asked = name == "c"
     try:
-        compiler = system_compiler()
-        repays = name == "c" or _repays(kernel_code(kernel), usual)
-    except CompilerError as error:
-        if name == "c":
-            raise InputError.one(f"{error}; the engine numpy needs none") from error
-        return Settled("numpy")
-    except NotImplementedError:
+        with compiled_as_asked() if asked else nullcontext():
+            compiler = system_compiler()
+            repays = asked or _repays(kernel_code(kernel), usual)
+    except (CompilerError, NotImplementedError):
         return Settled("numpy")
     return Settled("c", compiler.name) if repays else Settled("numpy")
 
@@ -164,6 +160,23 @@ def check_engine(name: str) -> None:
     """
     if name not in NAMES:
         raise InputError.one(f"unknown engine {name!r}{did_you_mean(name, NAMES)}")
+
+
+@contextmanager
+def compiled_as_asked() -> Iterator[None]:
+    """Around what compiles for the engine "c", where no other will do.
+
+    Raises:
+        InputError: there is no C compiler that works, or nothing that it could compile.
+    """
+    from vsacli.compute.engine.compiler import CompilerError
+
+    try:
+        yield
+    except CompilerError as error:
+        raise InputError.one(f"{error}; the engine numpy needs none") from error
+    except NotImplementedError as error:
+        raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
 
 
 def in_usual_blocks(samples: int, inputs: int) -> float:

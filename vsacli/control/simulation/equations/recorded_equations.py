@@ -8,8 +8,7 @@ from contextlib import suppress
 from typing import NamedTuple
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.compute.engine.choice import check_engine
+from vsacli.compute.engine.choice import check_engine, compiled_as_asked
 from vsacli.compute.engine.compiler import CompilerError, system_compiler
 from vsacli.compute.engine.engines import Tell, unheard
 from vsacli.compute.engine.libraries import Code, Worthwhile, load
@@ -150,13 +149,9 @@ class RecordedEquations(Equations):
     def _compiling(self) -> Iterator[float]:
         """The same for the engine "c"; that it cannot be had is an InputError."""
         yield 0.0
-        try:
+        with compiled_as_asked():
             recording = record(self.loop, self.boundaries)
             self._load(recording, *loop_code(recording), lambda _code: True)
-        except CompilerError as error:
-            raise InputError.one(f"{error}; the engine numpy needs none") from error
-        except NotImplementedError as error:
-            raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
 
     def _load(self, recording: Recording, code: Code, numbers: FloatArray, worthwhile: Worthwhile) -> None:
         """Load compiled code; compile it if that is worthwhile.
