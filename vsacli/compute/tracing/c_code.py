@@ -198,11 +198,16 @@ class Writer:
         real = self._dialect.types[Kind.REAL]
         names = {symbol.index: f"x{number}" for number, symbol in enumerate(body.inputs)}
         arguments = [f"{real} {name}" for name in names.values()]
-        yield f"static void {self._subroutines.name(body)}({', '.join([*arguments, f'{real} *y'])})"
+        head = f"static void {self._subroutines.name(body)}({', '.join([*arguments, f'{real} *y'])})"
+        yield from self.definition(head, body, names, "y")
+
+    def definition(self, head: str, program: Program, names: Names, results: str) -> Iterator[str]:
+        """A function that puts what a program computes into an array of real numbers."""
+        yield head
         yield "{"
-        yield from self.statements(body.operations, names)
-        for number, output in enumerate(body.outputs):
-            yield f"y[{number}] = {self.value(output, Kind.REAL, names)};"
+        yield from self.statements(program.operations, names)
+        for number, output in enumerate(program.outputs):
+            yield f"{results}[{number}] = {self.value(output, Kind.REAL, names)};"
         yield "}"
 
     def _subroutine(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:

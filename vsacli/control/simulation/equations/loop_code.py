@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine.compiled_engine import operation_count
 from vsacli.compute.engine.libraries import Code
-from vsacli.compute.tracing import Kind, Program
+from vsacli.compute.tracing import Program
 from vsacli.compute.tracing.c_code import Writer, digits, table_declarations
 from vsacli.compute.tracing.c_tables import Tables
 from vsacli.control.codegen.scalar import HELPERS, PRECISIONS, Scalar, helper_text
@@ -65,9 +65,5 @@ def _function(name: str, program: Program, entries: int, writer: Writer) -> Iter
         for number in range(len(program.inputs))
     )
     names = {symbol.index: place for symbol, place in zip(program.inputs, places, strict=True)}
-    yield f"static void {name}(const double *p, const double *y, const double *s, double *result)"
-    yield "{"
-    yield from writer.statements(program.operations, names)
-    for number, output in enumerate(program.outputs):
-        yield f"result[{number}] = {writer.value(output, Kind.REAL, names)};"
-    yield "}"
+    head = f"static void {name}(const double *p, const double *y, const double *s, double *result)"
+    return writer.definition(head, program, names, "result")
