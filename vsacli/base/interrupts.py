@@ -59,6 +59,11 @@ def unwinding_when_ended() -> Iterator[None]:
                 signal.signal(number, signal.SIG_DFL)
 
 
+def leave_interrupts_to_others() -> None:
+    """Ignore Ctrl-C in a process that computes for another one: it reaches all, and that one ends this."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
 def _unwind(number: int, _frame: object) -> None:
     raise Interrupted(number)
 

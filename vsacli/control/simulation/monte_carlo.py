@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from typing import Any
 
 from vsacli.base.errors import InputError
+from vsacli.base.interrupts import leave_interrupts_to_others
 from vsacli.control.simulation.perturbation import perturbed
 from vsacli.control.simulation.simulate import simulate
 from vsacli.control.simulation.simulation_report import SimulationReport
@@ -50,7 +50,7 @@ def simulate_perturbed(
         yield from map(report, seeds[1:])
         return
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(processes, context, _leave_interrupts_to_others)
+    pool = ProcessPoolExecutor(processes, context, leave_interrupts_to_others)
     try:
         yield from pool.map(report, seeds[1:])
     finally:
@@ -61,8 +61,3 @@ def _report(
     robot: Robot, trajectory: Trajectory, relative: float, conditions: dict[str, Any], seed: int
 ) -> SimulationReport:
     return simulate(robot, trajectory, model=perturbed(robot, relative, seed), **conditions).report
-
-
-def _leave_interrupts_to_others() -> None:
-    """Ctrl-C goes to all processes of a terminal: the one that waits for runs ends them."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

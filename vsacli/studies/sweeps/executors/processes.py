@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
 from vsacli.base.errors import InputError
+from vsacli.base.interrupts import leave_interrupts_to_others
 from vsacli.studies.sweeps.executors.job import Job
 from vsacli.studies.sweeps.rows import Computer, Row, lost
 from vsacli.studies.sweeps.study import Study
@@ -113,9 +114,7 @@ class Processes:
 
 def _work(connection: Connection, job: Job) -> None:
     """What a worker does: read the study, then compute what it is told to until nobody tells it."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # it goes to all processes of a terminal, and one ends the others
+    leave_interrupts_to_others()
     with suppress(EOFError, OSError):  # whoever asked has gone
         try:
             computer = Computer(job.study())
