@@ -103,6 +103,11 @@ def test_a_result_remembers_what_was_set(vsacli: Any, motion: Path) -> None:
     shown = vsacli("info", "r.h5").out
     assert all(f"  with --set {change}\n" in shown for change in changes)
     told = vsacli("info", "r.h5", "--extract", "again").err
+    twice = vsacli("info", "r.h5", "--extract", "again")
+    assert (twice.code, twice.err.partition(": ")[2]) == (
+        4,
+        "exists already; choose another name, or remove it first\n",  # there is no --overwrite
+    )
     again = shlex.split(told.partition("computed from them with ")[2])
     assert again == options
     robot, trajectory = (next(Path("again").rglob(each.name)) for each in (ROBOT, motion))
@@ -183,11 +188,11 @@ def test_sides_that_differ_need_a_word_for_one(vsacli: Any, motion: Path) -> Non
 
 
 @pytest.mark.slow
-def test_a_table_has_nothing_to_set(vsacli: Any, motion: Path) -> None:
+def test_a_table_has_nothing_to_set_but_a_rate(vsacli: Any, motion: Path) -> None:
     assert vsacli("invdyn", ROBOT, motion, "-o", "r.h5", "-q").code == 0
     assert vsacli("export", "r.h5", "--variables", "q,stiffness", "-o", "m.csv", "-q").code == 0
     refused = vsacli("check-feasibility", ROBOT, "m.csv", "--set", "duration=3")
-    assert (refused.code, "nothing can be set" in refused.err) == (2, True)
+    assert (refused.code, "only the rate can be set" in refused.err) == (2, True)
 
 
 def test_a_fixed_file_starts_from_the_files(vsacli: Any, too_soft: Path) -> None:

@@ -70,7 +70,7 @@ def test_floats_come_back_bit_for_bit(stored, block):
 def test_extreme_floats_come_back_bit_for_bit(stored, block):
     odd = np.tile([5e-324, -0.0, 1.7976931348623157e308, 0.1, np.inf, 1 / 3], SAMPLES)[: 2 * SAMPLES]
     block = Block(**{**block.arrays(), "tau_e": odd.reshape(SAMPLES, 2)})
-    text = np.array(rows(stored(block), ["tau_e"])[1:])[:, 1:]
+    text = np.array(rows(stored(block), ["tau_e"], allow_nan=True)[1:])[:, 1:]
     assert text.astype(float).tobytes() == block.tau_e.tobytes()
     assert text[1, 1] == "0.1"
 
@@ -162,11 +162,31 @@ def test_undefined_samples_are_refused_with_joint_time_and_number(stored, block)
     with pytest.raises(UndefinedSamplesError) as caught:
         export_result(result, stream, CSV)
     assert stream.getvalue() == ""
-    assert [dataclasses.astuple(gap) for gap in caught.value.gaps] == [("tau_motor", "j1", 0.03, 12)]
+    assert [dataclasses.astuple(gap) for gap in caught.value.gaps] == [
+        ("j1.tau_motor", "has no value", 0.03, 12)
+    ]
     assert str(caught.value).endswith(
         "0.h5: j1.tau_motor has no value at 12 samples, first at t = 0.030 s\n"
         "nothing was exported; mend the steps the report names, or get empty cells with --allow-nan"
     )
+
+
+def test_infinite_samples_are_refused_as_well_as_missing_ones(stored, block):
+    values = without(block, "q", (7, 1))
+    values.q[9:12, 0] = np.inf, -np.inf, np.inf
+    with pytest.raises(UndefinedSamplesError) as caught:
+        rows(stored(values), ["q"])
+    assert list(map(str, caught.value.gaps)) == [
+        "j0.q is infinite at 3 samples, first at t = 0.009 s",
+        "j1.q has no value at 1 sample, first at t = 0.007 s",
+    ]
+    assert str(caught.value).endswith(
+        "nothing was exported; mend the steps the report names, or get empty cells with --allow-nan; "
+        "export them as they are with --allow-nan"
+    )
+    lines = rows(stored(values), ["q"], allow_nan=True)[1:]
+    assert [cells[1] for cells in lines[9:12]] == ["inf", "-inf", "inf"]
+    assert lines[7][2] == ""
 
 
 def test_undefined_samples_become_empty_cells_on_request(stored, block):

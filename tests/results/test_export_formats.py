@@ -154,11 +154,21 @@ def test_variables_without_a_field_are_refused(stored, variables, match):
         exported(stored(random_block(3, 2)), "joint-trajectory", variables)
 
 
-def test_infinity_is_refused_where_json_has_no_number(stored):
+@pytest.mark.parametrize("name", FORMATS)
+def test_infinity_is_refused(stored, name):
     block = random_block(9, 2)
-    block.tau_e[7, 1] = np.inf
-    with pytest.raises(InputError, match=r"j1\.tau_e is infinite at t = 0\.007 s, which JSON cannot hold"):
-        exported(stored(block), "joint-trajectory")
+    block.q[7, 1] = np.inf
+    with pytest.raises(UndefinedSamplesError, match=r"j1\.q is infinite at 1 sample, first at t = 0\.007 s"):
+        exported(stored(block), name, ["q"])
+
+
+def test_times_beyond_the_seconds_of_a_message_are_refused(stored):
+    block = random_block(9, 2)
+    block.time[8] = 3e9
+    with pytest.raises(
+        InputError, match=r"lasts 3e\+09 s, and a JointTrajectory counts seconds up to 2147483647"
+    ):
+        exported(stored(block), "joint-trajectory", ["q"])
 
 
 @pytest.mark.parametrize("name", FORMATS)

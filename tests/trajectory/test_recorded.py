@@ -10,6 +10,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.trajectory.fits import FitChoice
+from vsacli.trajectory.recorded.columns import RATE_INSTEAD
 from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
 
 JOINTS = CommandedJoints({"base": "revolute", "elbow": "revolute"}, exempt={})
@@ -105,7 +106,7 @@ def test_all_problems_of_a_header_at_once(csv):
         (1, "unknown column 'elbow_q'; did you mean 'elbow.q'?"),
         (1, "unknown column 'bsae.dq'; did you mean 'base.dq'?"),
         (1, "unknown column 't'; did you mean 'time'?"),
-        (1, "there is no column 'time'"),
+        (1, f"there is no column 'time'; {RATE_INSTEAD}"),
         (1, "there is no column elbow.q"),
         (1, "there is no column base.ddq; ddq is given for all joints or for none"),
     ]
@@ -113,8 +114,8 @@ def test_all_problems_of_a_header_at_once(csv):
 
 def test_numbers_of_joints_start_at_one(csv):
     found = problems(csv(columns("q0", "q1", "stiffness0", "stiffness1")))
-    assert found[0][1].startswith("unknown column 'q0'; valid: q2, dq1, dq2, ddq1")
-    assert found[1][1] == "unknown column 'stiffness0'; did you mean 'stiffness2'?"
+    assert found[0][1] == "unknown column 'stiffness0'; did you mean 'stiffness2'?"
+    assert found[1][1].startswith("unknown column 'q0'; `vsacli info ")
     assert (1, "there is no column q2") in found
     assert (1, "there is no column stiffness2") in found
 

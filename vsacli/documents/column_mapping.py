@@ -101,10 +101,12 @@ class ColumnMapping:
     Attributes:
         columns: by the names that are known here; they are renamed so.
         ignore: `REST`, or columns to leave out.
+        rate: rows per second of a file without times; None if it has some.
     """
 
     columns: Mapping[str, MappedColumn] = dataclasses.field(default_factory=dict)
     ignore: str | tuple[str | int, ...] = ()
+    rate: float | None = None
 
     def __bool__(self) -> bool:
         return bool(self.columns or self.ignore)
@@ -141,7 +143,7 @@ class ColumnMapping:
                 raise InputError.one(f"columns: {name} is another column of the same file above", file, line)
         rest = REST in (self.ignore, other.ignore)
         ignore = REST if rest else tuple(dict.fromkeys((*self.ignore, *other.ignore)))
-        return ColumnMapping({**self.columns, **other.columns}, ignore)
+        return ColumnMapping({**self.columns, **other.columns}, ignore, self.rate or other.rate)
 
 
 AS_NAMED = ColumnMapping()

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 import yaml
+from yaml import MappingNode, Node, ScalarNode
 
 from vsacli.base.errors import InputError
 from vsacli.base.texts import for_yaml
+
+__all__ = ["MappingNode", "Node", "ScalarNode", "edited", "moved_files", "node_at", "root_of", "texts_at"]
 
 _Words: TypeAlias = tuple[str, ...]
 
@@ -27,7 +30,7 @@ def edited(text: str, values: Mapping[str, Any]) -> str:
     Raises:
         InputError: a path leads nowhere, or through an alias, so that its anchor would change as well.
     """
-    root = _root(text)
+    root = root_of(text)
     edits = (_edit(root, tuple(path.split(".")), value) for path, value in values.items())
     for start, end, replacement in sorted(edits, reverse=True):
         text = text[:start] + replacement + text[end:]
@@ -52,10 +55,11 @@ def node_at(root: yaml.Node, path: str) -> yaml.Node | None:
 
 def texts_at(text: str, key: str) -> Iterator[tuple[str, str]]:
     """Path and value of every text under a key, wherever in a YAML document."""
-    yield from _texts_at(_root(text), key, ())
+    yield from _texts_at(root_of(text), key, ())
 
 
-def _root(text: str) -> yaml.Node:
+def root_of(text: str) -> yaml.Node:
+    """The nodes of a document that can be read."""
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     assert root is not None, "a document that can be read"
     return root

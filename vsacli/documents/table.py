@@ -14,17 +14,15 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError
 from vsacli.base.streams import place_of
+from vsacli.documents.clocks import EXPECTED, NANOSECONDS, Clock, elapsed, read_clock
 from vsacli.documents.column_mapping import AS_NAMED, TIME, ChosenColumns, ColumnMapping
 from vsacli.documents.other_formats import recognising_other_formats, refuse_other_formats
 from vsacli.documents.source import MAX_DOCUMENT_BYTES, Source, check_input_file, decode_utf8
-from vsacli.documents.table_header import MAX_BYTES, Header, header_of, split_heading
-from vsacli.documents.table_rows import CHUNK, Rows, filled_lines, read_integers, read_numbers
+from vsacli.documents.table_header import MAX_BYTES, Header, header_of, is_number, split_heading
+from vsacli.documents.table_rows import CHUNK, NOTHING, Rows, filled_lines, read_integers, read_numbers
 
 LARGEST_EXACT = 2.0**53
 """Whole numbers beyond are not told apart in floating point; ns since 1970 are 200 times as large."""
-
-NANOSECONDS = 10**9
-"""In a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +37,10 @@ class Table:
         header_line: line of the header in the file, from 1; 0 if there is none.
         others: names of columns that were not read, since nothing here knows them.
         ignored: names of those that were not read because the mapping says so.
-        first_stamp: of times that were too large for floating point the first, which was taken off.
+        first_stamp: of times that were too large for floating point, or written as a clock shows them, the
+            first, which was taken off.
         kept: (rows,), which rows of the file these are; None if all.
+        rated: whether the file has no times, and these follow from the rate that the mapping says.
     """
 
     columns: tuple[str, ...]
@@ -49,8 +49,9 @@ class Table:
     header_line: int = 1
     others: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
-    first_stamp: int | None = None
+    first_stamp: int | str | None = None
     kept: IndexArray | None = field(repr=False, default=None)
+    rated: bool = False
 
     @cached_property
     def lines(self) -> Lines:
@@ -129,14 +130,25 @@ def read_table(
                 header = header_of(content, name, strict=not mapping, numbered=mapping.numbers)
                 digest, text = _survey(content, name)
             chosen = mapping.applied(header, known, name)
-            values, first_stamp = _values(name, header, chosen, empty_cells)
+            headings, values, first_stamp = _values(name, header, chosen, empty_cells)
+            rated = mapping.rate is not None and chosen.time is None and len(values) > 0
+            if rated:
+                headings = (*headings, TIME)
+                values = np.column_stack([values, np.arange(len(values)) / (mapping.rate or 1)])
             source = Source(name, digest, None if text is None else decode_utf8(text, name))
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
     if not chosen.places:
         refuse_other_formats(name)
     return Table(
-        chosen.headings, values, source, header.line, chosen.others, chosen.ignored, first_stamp=first_stamp
+        headings,
+        values,
+        source,
+        header.line,
+        chosen.others,
+        chosen.ignored,
+        first_stamp=first_stamp,
+        rated=rated,
     )
 
 
@@ -160,10 +172,12 @@ def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
 
 def _values(
     name: str, header: Header, chosen: ChosenColumns, empty_cells: bool
-) -> tuple[FloatArray, int | None]:
-    """The numbers of the columns, and the first stamp if that was taken off the times."""
+) -> tuple[tuple[str, ...], FloatArray, int | str | None]:
+    """Headings and numbers of the columns, and the first stamp if that was taken off the times."""
     if not chosen.places:
-        return np.empty((0, 0)), None
+        return chosen.headings, np.empty((0, 0)), None
+    if chosen.time is not None and _shows_a_clock(name, header, chosen.time):
+        return _with_clocks(name, header, chosen, empty_cells)
     values, first = read_numbers(Rows(name, header, chosen.places, empty_cells)), None
     if chosen.time is not None:
         column = chosen.places.index(chosen.time)
@@ -171,10 +185,53 @@ def _values(
         if chosen.nanoseconds is not None or np.abs(stamps).max() > LARGEST_EXACT:
             first, values[:, column] = _elapsed(name, header, chosen, stamps)
             _check_unit(first, chosen.headings[column], name, header.line)
+    return chosen.headings, _scaled(values, chosen), first
+
+
+def _scaled(values: FloatArray, chosen: ChosenColumns) -> FloatArray:
     for column, factor in enumerate(chosen.factors):
         if factor != 1:
             values[:, column] *= factor
-    return values, first
+    return values
+
+
+def _shows_a_clock(name: str, header: Header, place: int) -> bool:
+    """Whether a column of times begins with a text that is one.
+
+    Raises:
+        InputError: it begins with a text that is none.
+    """
+    first = next(iter(Rows(name, header, (place,), empty_cells=True).cells()), None)
+    if first is None or is_number(first.cell.replace(",", ".")) or first.cell.lower() in NOTHING:
+        return False
+    if read_clock(first.cell) is None:
+        message = (
+            f"column {header.columns[place] or place + 1!r}: expected {EXPECTED}, found {first.cell[:40]!r}"
+        )
+        raise InputError.one(message, name, first.line)
+    return True
+
+
+def _with_clocks(
+    name: str, header: Header, chosen: ChosenColumns, empty_cells: bool
+) -> tuple[tuple[str, ...], FloatArray, str]:
+    """The same as `_values` where times are written as a clock shows them; they become nanoseconds."""
+    assert chosen.time is not None, "see _values"
+    column = chosen.places.index(chosen.time)
+    others = [place for place in chosen.places if place != chosen.time]
+    numbers = read_numbers(Rows(name, header, others, empty_cells)) if others else None
+    cells = list(Rows(name, header, (chosen.time,), empty_cells).cells())
+    clocks: list[Clock] = []
+    for line, cell in cells:
+        clock = read_clock(cell)
+        if clock is None or clock.dated != (clocks or [clock])[0].dated:
+            raise InputError.one(f"expected a time as in the rows above, found {cell[:40]!r}", name, line)
+        clocks.append(clock)
+    times = elapsed(clocks).astype(float)
+    values = times[:, None] if numbers is None else np.insert(numbers, column, times, axis=1)
+    headings = list(chosen.headings)
+    headings[column] = f"{split_heading(headings[column])[0]} [ns]"
+    return tuple(headings), _scaled(values, chosen), cells[0].cell
 
 
 def _check_unit(first: int, heading: str, name: str, line: int) -> None:

@@ -51,10 +51,31 @@ class Rows(NamedTuple):
         """What messages call a column."""
         return repr(self.header.columns[place] or place + 1)
 
+    def cells(self) -> Iterator[Cell]:
+        """What the first column that is used holds in each row.
+
+        Raises:
+            InputError: a row has other cells than the header.
+        """
+        separator, count = self.header.separator, len(self.header.columns)
+        for number, line in self.lines():
+            cells = cells_of(line, separator)
+            if len(cells) != count:
+                message = f"expected {count} values as in the header, found {len(cells)}"
+                raise InputError.one(message, self.path, number)
+            yield Cell(number, cells[self.used[0]].strip())
+
     def lines(self) -> Iterator[tuple[int, str]]:
         """Number and content of each line below the header that has any."""
         with open(place_of(self.path), encoding="utf-8-sig", errors="replace") as file:
             yield from filled_lines(file, self.header.line)
+
+
+class Cell(NamedTuple):
+    """What stands in a column: line in the file, and text."""
+
+    line: int
+    cell: str
 
 
 def filled_lines(file: Iterable[str], header_line: int) -> Iterator[tuple[int, str]]:

@@ -15,7 +15,7 @@ from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.documents.changes import Changes, changed
+from vsacli.documents.changes import ChangeError, Changes, changed
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
 from vsacli.documents.reading import read_document
 from vsacli.documents.record_numbers import numbers
@@ -27,7 +27,7 @@ from vsacli.trajectory.devices import with_devices
 from vsacli.trajectory.plausibility import implausible
 from vsacli.trajectory.plausibility.facts import Facts
 from vsacli.trajectory.profile import Profile, WrenchProfile
-from vsacli.trajectory.times import Times, UniformTimes, uniform_times_over
+from vsacli.trajectory.times import Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class TrajectoryFile:
     rate: float | None = number(
         units.RATE,
         f"samples per second, {DEFAULT_RATE:g} by default; if anything is recorded, its times by default, and"
-        " with this key its fit at equally spaced times",
+        " with this key its fit at equally spaced times, or the rate of a recording without times",
         check=POSITIVE,
         default=None,
     )
@@ -206,10 +206,7 @@ def declared_trajectory(
     if is_table(path):
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
-        if changes:
-            reason = "is a table, in which nothing can be set; name it in a YAML trajectory and set its keys"
-            raise InputError.one(reason, os.fspath(path))
-        return recorded_trajectory(path, joints, progress)
+        return recorded_trajectory(path, joints, progress, _rate_of_table(path, changes))
     document, source = changed(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
     declared = _times(document, recordings, source.path)
@@ -235,6 +232,27 @@ def declared_trajectory(
     )
 
 
+def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | None:
+    """The samples per second that changes give to a table, in which nothing else can be set.
+
+    Raises:
+        ChangeError: something else is set, or the rate is none.
+    """
+    if changes.keys() - {"rate"}:
+        reason = (
+            "is a table, of which only the rate can be set; name it in a YAML trajectory and set its keys"
+        )
+        raise InputError.one(reason, os.fspath(path))
+    if not changes:
+        return None
+    from vsacli.documents.columns_file import checked_rate
+
+    try:
+        return checked_rate(changes["rate"])
+    except InputError as error:
+        raise ChangeError(error.problems) from None
+
+
 def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
     try:
         return with_devices(trajectory, robot)
@@ -252,7 +270,7 @@ def _read_recordings(
     from vsacli.trajectory.recorded.recording import read_recording
 
     wanted: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
-    mappings: dict[Path, ColumnMapping] = defaultdict(ColumnMapping)
+    mappings: dict[Path, ColumnMapping] = defaultdict(lambda: ColumnMapping(rate=document.rate))
     for signal, declared in document.recorded.items():
         file = folder / declared.file
         wanted[file][signal] = declared.chosen
@@ -272,11 +290,7 @@ def _read_recordings(
 
 def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str) -> Times:
     if recordings:
-        recorded = recordings[0].times
-        try:
-            return recorded if document.rate is None else uniform_times_over(recorded.span, document.rate)
-        except InputError as error:
-            raise InputError.one(f"rate: {error}", file) from None
+        return recordings[0].times_at(document.rate, file)
     assert document.lasts is not None, "see TrajectoryFile"
     return _uniform_times(document.lasts, document.rate)
 

@@ -51,6 +51,55 @@ class Profile(Protocol):
 
 
 @dataclass(frozen=True)
+class Continued:
+    """A profile at other steps than its own: at them it is what it is at any other time."""
+
+    profile: Profile
+
+    @property
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+        return self.profile.components
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why the values, or some of them, may not be what was meant."""
+        return self.profile.warnings
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How they were understood, where that is not obvious."""
+        return self.profile.notes
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """Ascending times between which the function is analytic; the first and last are its span."""
+        return self.profile.breakpoints
+
+    @property
+    def known_between(self) -> bool:
+        """True: steps are nothing special."""
+        return True
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        return self.profile.at(time)
+
+    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
+        """The same at steps, whose times are `time`."""
+        return self.profile.at(time)
+
+    def stretched(self, factor: float) -> Continued:
+        """The same profile, slower by a factor, from the same first time on."""
+        return Continued(self.profile.stretched(factor))
+
+    @property
+    def estimate(self) -> SampledProfile | None:
+        """The same if any number at the steps comes from a fit of recorded samples, else None."""
+        return self.profile.estimate
+
+
+@dataclass(frozen=True)
 class WrenchProfile:
     """What the environment exerts on the end effector, over time.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from vsacli.base.wrench import Wrench
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import Constant
 from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.profile import Profile, WrenchProfile
+from vsacli.trajectory.profile import Continued, Profile, WrenchProfile
 from vsacli.trajectory.times import Times
 
 if TYPE_CHECKING:
@@ -137,7 +138,8 @@ class Trajectory:
         """A trajectory through samples; derivatives that are given are used at the samples as they are.
 
         Those that are not come from splines: degree 7 (C6) for q, degree 5 (C4) for the stiffness and the
-        wrench. `at` evaluates these splines in any case.
+        wrench. Between the samples `at` evaluates these splines; where all derivatives are given and follow
+        from one another, the function through all that is given.
 
         Args:
             time: (samples,) in s, strictly increasing, at least 8.
@@ -218,7 +220,10 @@ class Trajectory:
         return self._motion(time, lambda profile: profile.samples(start, stop, time - self.start))
 
     def at(self, time: ArrayLike) -> Motion:
-        """The smooth functions at any times of the span, (samples,) or (); given derivatives play no part."""
+        """The smooth functions at any times of the span, (samples,) or ().
+
+        Given derivatives count where all are given and follow from one another.
+        """
         times = np.asarray(time, dtype=np.float64)
         elapsed = np.atleast_1d(times) - self.start
         motion = self._motion(np.atleast_1d(times), lambda profile: profile.at(elapsed))
@@ -267,6 +272,15 @@ class Trajectory:
             name=self.name,
             sources=self.sources,
         )
+
+    def sampled(self, times: Times) -> Trajectory:
+        """The same functions at other steps, from its first time on and not beyond its last."""
+        same = copy(self)
+        same.times = times
+        same.position = Continued(self.position)
+        same.commanded = {key: Continued(profile) for key, profile in self.commanded.items()}
+        same.wrench = self.wrench and replace(self.wrench, profile=Continued(self.wrench.profile))
+        return same
 
     def from_zero(self) -> Trajectory:
         """The same from time zero on, for what needs times between the steps as exact as can be."""

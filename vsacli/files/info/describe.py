@@ -29,24 +29,30 @@ from vsacli.trajectory.trajectory import Trajectory
 BLOCK_SAMPLES = 8192
 
 
-def describe_file(path: str, robot_path: str | None = None, progress: Progress = unseen) -> dict[str, Any]:
+def describe_file(
+    path: str, robot_path: str | None = None, progress: Progress = unseen, rate: float | None = None
+) -> dict[str, Any]:
     """What a robot, trajectory, recording, result or simulation file holds, as JSON values in SI units.
 
     Args:
         path: the file.
         robot_path: the robot that a trajectory is for, or a recording of, whose names its joints shall have.
         progress: opens a bar over the bytes of a recording that are looked at.
+        rate: rows per second of a recording without times.
 
     Raises:
-        InputError: the file is of another kind, or cannot be used.
+        InputError: the file is of another kind, or cannot be used; or it is no table, and has no such rate.
     """
-    match recognise(path):
+    kind = recognise(path)
+    if rate is not None and kind is not FileKind.TABLE:
+        raise InputError.one(f"is a {kind}; the rate is said of recordings without times", path)
+    match kind:
         case FileKind.ROBOT:
             return describe_robot(load_robot(path))
         case FileKind.TRAJECTORY:
             return _described_trajectory(path, robot_path)
         case FileKind.TABLE:
-            return _described_table(path, robot_path, progress)
+            return _described_table(path, robot_path, progress, rate)
         case FileKind.RESULT | FileKind.SIMULATION:
             with open_stored(path) as result:
                 return describe_result(result)
@@ -67,14 +73,18 @@ def described_value(description: dict[str, Any], field: str) -> Any:
     return find(json_value(description), field)
 
 
-def _described_table(path: str, robot_path: str | None, progress: Progress) -> dict[str, Any]:
+def _described_table(
+    path: str, robot_path: str | None, progress: Progress, rate: float | None
+) -> dict[str, Any]:
     """A CSV file: a trajectory if its columns have the names for it, else a recording."""
     from vsacli.files.recordings import describe_recording, is_trajectory
 
     robot = None if robot_path is None else load_robot(robot_path)
     if is_trajectory(path, robot or placeholder_robot(path).robot):
+        if rate is not None:
+            raise InputError.one("has times of its own in column 'time'; leave the rate out", path)
         return _described_trajectory(path, robot_path)
-    return describe_recording(path, robot, progress)
+    return describe_recording(path, robot, progress, rate)
 
 
 def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:
@@ -155,7 +165,7 @@ def describe_result(result: StoredResult) -> dict[str, Any]:
         "trajectory": result.trajectory_name,
         "verdict": result.verdict,
         "complete": result.complete,
-        "samples": result.samples,
+        "samples": result.time.size,
         "joints": [
             {"name": name, "type": joint_type, "actuator": actuator}
             for name, joint_type, actuator in zip(

@@ -20,18 +20,14 @@ def describe_study(path: str) -> dict[str, Any]:
         InputError: the file is damaged.
     """
     with StoredStudy(path) as table:
-        created = str(table.attributes["created"])
+        provenance = table.provenance()
         inputs = [{"path": each.path, "sha256": each.sha256} for each in table.inputs()]
         return {
             "kind": KIND,
             **StudySummary.of(table).as_json(),
             "parameters": [_parameter(table, path) for path in table.parameters],
             "columns": list(table.columns),
-            "provenance": {
-                "created": created,
-                **table.provenance(),
-                "inputs": inputs,
-            },
+            "provenance": {"created": str(table.attributes["created"]), **provenance, "inputs": inputs},
         }
 
 

@@ -8,12 +8,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice, pairwise
 
+import numpy as np
+
 from vsacli.base.errors import InputError
-from vsacli.documents.table_header import Header, cells_of, is_number, read_header
+from vsacli.documents.clocks import Clock, elapsed, read_clock
+from vsacli.documents.table_header import Header, cells_of, is_number, read_header, split_heading
 from vsacli.documents.table_rows import NOTHING, Rows
 
 FIRST_ROWS = 500
 """Enough to tell numbers from texts, and stamps from counters."""
+
+INDICES = (
+    "index",
+    "idx",
+    "row",
+    "unnamed: 0",
+    "sample",
+    "nr",
+    "no",
+    "number",
+    "count",
+    "counter",
+    "seq",
+    "id",
+)
+"""What columns are called that count rows, if they have a name."""
 
 RISING_SHARE = 0.9
 """Of the steps of stamps, how many must be positive: in a log with faults some are not."""
@@ -47,6 +66,22 @@ class FirstRows:
         cells = self.filled(place)
         return [float(cell) for cell in cells] if all(map(is_number, cells)) else []
 
+    def clocks(self, place: int) -> list[Clock]:
+        """The times of a column that is written as a clock shows them; nothing if it holds anything else."""
+        clocks = [clock for cell in self.filled(place) if (clock := read_clock(cell)) is not None]
+        return clocks if len(clocks) == len(self.filled(place)) else []
+
+    def is_index(self, place: int) -> bool:
+        """Whether a column counts the rows: nameless or called so, and larger by one from row to row."""
+        name = split_heading(self.columns[place])[0].lower()
+        named_so = (not name and self.header.line > 0) or name in INDICES
+        return named_so and self.counts_rows(place)
+
+    def counts_rows(self, place: int) -> bool:
+        """Whether the whole numbers of a column are larger by one from row to row."""
+        values = self.numbers(place)
+        return len(values) > 1 and all(after - before == 1 for before, after in pairwise(values))
+
     def text(self, place: int) -> str:
         """What each row says in a column; nothing if these are numbers, or not always the same."""
         texts = set(self.filled(place))
@@ -63,8 +98,11 @@ class FirstRows:
         return [place for place in range(len(self.columns)) if self.numbers(place)]
 
     def rises(self, place: int) -> bool:
-        """Whether the numbers of a column, two at least, nearly always increase from each to the next."""
+        """Whether the numbers or times of a column, two at least, nearly always increase from row to row."""
         cells = self.filled(place)
+        clocks = self.clocks(place)
+        if clocks:
+            return len(clocks) > 1 and bool(np.mean(np.diff(elapsed(clocks)) > 0) > RISING_SHARE)
         try:
             values: Sequence[float] = [int(cell) for cell in cells]  # floats tell no nanoseconds apart
         except ValueError:

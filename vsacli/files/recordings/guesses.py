@@ -4,32 +4,20 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from vsacli.documents.column_mapping import MappedColumn
 from vsacli.documents.fields import IDENTIFIER
 from vsacli.documents.table_header import split_heading
 from vsacli.files.recordings.first_rows import FirstRows
+from vsacli.files.recordings.names import AXES, GENERIC, POSES, QUANTITIES, WORDS, JointNames, words_of
 from vsacli.files.recordings.times import TimeColumn
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE
 
-QUANTITIES = {
-    "q": ("position", "positions", "pos", "q", "angle", "angles"),
-    "dq": ("velocity", "velocities", "vel", "dq", "qd", "speed"),
-    "tau_motor_1": ("effort", "efforts", "torque", "torques", "tau"),
-    "stiffness": ("stiffness",),
-}
-"""Words for each quantity of a joint."""
-
 TAKEN = ("q", "stiffness")
-"""Of these, what is proposed; the others stand beside it as comments."""
-
-GENERIC = (
-    *("field", "joint", "joints", "state", "states", "data", "measured", "actual", "feedback", "name", "msg"),
-    *("deg", "degree", "degrees", "rad", "mm", "m", "nm", "n"),
-)
-"""Words in names of columns that say nothing of which joint it is."""
+"""Of the quantities, what is proposed; the others stand beside it as comments."""
 
 ARRAYS = ("q", "dq", "tau_motor_1")
 """What the arrays of `sensor_msgs/JointState` hold: position, velocity, effort."""
@@ -39,7 +27,8 @@ OTHER_THAN_MEASURED = (
 )
 """Words that speak of something else than what a joint did."""
 
-WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
+_BARE = re.compile(r"(joint|axis|j)[_-]?\d+", re.IGNORECASE)
+"""A joint's name that needs no robot to be recognized."""
 
 _INDEX = re.compile(r"[\[_ ]?(\d+)")
 _SEPARATORS = re.compile(r"[./\s]")
@@ -77,13 +66,30 @@ class _Column(NamedTuple):
         place: of the column, from 0.
         quantity: what of a joint.
         before: its name before the word for the quantity.
+        words: of its name, without that for the quantity.
         entry: index in an array.
+        bare: whether its name says no quantity.
     """
 
     place: int
     quantity: str
     before: str = ""
+    words: tuple[str, ...] = ()
     entry: int | None = None
+    bare: bool = False
+
+    @property
+    def family(self) -> tuple[str, ...]:
+        """The words that its name shares with those of the same signal of other joints."""
+        return tuple("#" if word.isdecimal() or len(word) == 1 else word for word in self.words)
+
+
+class _Joint(NamedTuple):
+    """Which joint a column is of, why, and whether its name says so."""
+
+    name: str
+    reason: str = ""
+    sure: bool = True
 
 
 def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]) -> list[Guess]:
@@ -100,39 +106,45 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
     found: dict[str, Guess] = {}
     for quantity in QUANTITIES:
         of_it = [column for column in columns if column.quantity == quantity]
-        for rank, column in enumerate(of_it):
-            joint, reason, sure = _joint(column, rank, labels, joint_names)
+        joints = _of_robot(of_it, labels, JointNames(joint_names)) if joint_names else _named(of_it, labels)
+        for column, joint in joints:
             source, doubt = _source(rows, column)
-            reasons = "; ".join(filter(None, (reason, doubt)))
-            guess = Guess(column.place, joint, quantity, source, reasons, sure)
-            if joint:
-                found.setdefault(guess.name, guess)
+            reasons = "; ".join(filter(None, (joint.reason, doubt)))
+            guess = Guess(column.place, joint.name, quantity, source, reasons, joint.sure)
+            found.setdefault(guess.name, guess)
     return sorted(found.values(), key=lambda guess: (guess.quantity not in TAKEN, guess.place))
 
 
 def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
-    """Columns whose names have a word for a quantity, those that were measured before others."""
+    """Columns of joints by their names: those of a quantity first, and what was measured before all else."""
     places = [place for place in rows.of_numbers if time is None or place != time.place]
-    columns = [column for place in places for column in _of_name(rows, place)]
-    columns.sort(key=lambda column: any(word in OTHER_THAN_MEASURED for word in _split(column.before)))
+    columns = [column for place in places if not rows.is_index(place) for column in _of_name(rows, place)]
+    columns.sort(key=lambda column: (column.bare, any(word in OTHER_THAN_MEASURED for word in column.words)))
     return columns
 
 
 def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
+    """What the name of a column says; of one without a word for a quantity, that it may be a position."""
     name = split_heading(rows.columns[place])[0]
     for match in reversed(list(WORDS.finditer(name))):
         quantity = next((key for key, known in QUANTITIES.items() if match[0].lower() in known), None)
         if quantity is not None:
             entry = _INDEX.match(name, match.end())
-            yield _Column(place, quantity, name[: match.start()], int(entry[1]) if entry else None)
+            before, words = (
+                name[: match.start()],
+                (*words_of(name[: match.start()]), *words_of(name[match.end() :])),
+            )
+            yield _Column(place, quantity, before, words, int(entry[1]) if entry else None)
             return
+    if name:
+        yield _Column(place, "q", name, words_of(name), bare=True)
 
 
 def _labels(rows: FirstRows) -> dict[int, str]:
     """Names of joints that stand in the rows, as ROS writes them, by their indices in arrays."""
     labels = {}
     for place, column in enumerate(rows.columns):
-        words = _split(column)
+        words = words_of(column)
         if len(words) > 1 and words[-2] == "name" and words[-1].isdecimal() and rows.text(place):
             labels[int(words[-1])] = rows.text(place)
     return labels
@@ -154,36 +166,82 @@ def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_Colum
     return columns, {number: rows.text(first + number) for number in range(count)}
 
 
-def _joint(
-    column: _Column, rank: int, labels: dict[int, str], joint_names: Sequence[str]
-) -> tuple[str, str, bool]:
-    """Which joint a column is of, why, and whether that is sure; no name if it is none that is known."""
-    label = None if column.entry is None else labels.get(column.entry)
-    if label is not None:
-        joint = _in_words(_split(label), joint_names) if joint_names else label
-        return (joint if IDENTIFIER.fullmatch(joint) else ""), f"the rows call it {label}", joint == label
-    joint = _in_words(_split(column.before), joint_names)
-    if joint:
-        return joint, "", True
-    if joint_names:
-        if rank < len(joint_names):
-            return joint_names[rank], f"joint {rank + 1} of the robot, by the order alone", False
-        return "", "", False
-    last = _SEPARATORS.split(column.before.rstrip("_-./ "))[-1]
-    if column.entry is None and IDENTIFIER.fullmatch(last) and last.lower() not in GENERIC:
-        return last, "", True
-    return f"joint_{rank + 1}", "by the order alone", False
+def _of_robot(
+    columns: Sequence[_Column], labels: Mapping[int, str], joints: JointNames
+) -> Iterator[tuple[_Column, _Joint]]:
+    """Columns with the joints of a robot that their names speak of; if none does, one family in order."""
+    named, families = False, defaultdict(list)
+    for column in columns:
+        families[column.family].append(column)
+    for family in families.values():
+        for column, joint in _matched(family, labels, joints):
+            named = True
+            yield column, joint
+    for family in () if named else families.values():
+        if len(family) == len(joints.names) and not any(_is_no_joint(column) for column in family):
+            for rank, (column, name) in enumerate(zip(family, joints.names, strict=True), 1):
+                yield column, _Joint(name, f"joint {rank} of the robot, by the order alone", sure=False)
+            return
 
 
-def _in_words(words: Sequence[str], joint_names: Sequence[str]) -> str:
-    """The joint whose name stands in these words, the longest if several do; empty if none does."""
-    text = f" {' '.join(words)} "
-    there = [joint for joint in joint_names if f" {' '.join(_split(joint))} " in text]
-    return max(there, key=len, default="")
+def _matched(
+    family: Sequence[_Column], labels: Mapping[int, str], joints: JointNames
+) -> list[tuple[_Column, _Joint]]:
+    """The columns of a family whose names, or the names in their rows, are those of joints.
+
+    Where columns count from zero and joints from one, or the other way round, their numbers say nothing.
+    """
+    found, unmatched = [], []
+    for column in family:
+        label = None if column.entry is None else labels.get(column.entry)
+        if label is not None:
+            match = joints.in_words(words_of(label))
+            if match is not None:
+                found.append((column, _Joint(match.joint, f"the rows call it {label}", match.joint == label)))
+        elif column.bare:
+            name = joints.called(column.words)
+            reason = "named as the joint; taken for its position"
+            if name:
+                found.append((column, _Joint(name, reason)))
+            else:
+                unmatched.append(column)
+        else:
+            match = joints.in_words(column.words)
+            if match is not None:
+                found.append((column, _Joint(match.joint)))
+            else:
+                unmatched.append(column)
+    numbered = [column for column in unmatched if any(word.isdecimal() for word in column.words)]
+    shifted = len(family) == len(joints.names) or any("0" in column.words for column in numbered)
+    return [] if numbered and shifted else found
 
 
-def _split(name: str) -> tuple[str, ...]:
-    return tuple(word.lower() for word in WORDS.findall(name))
+def _named(columns: Sequence[_Column], labels: Mapping[int, str]) -> Iterator[tuple[_Column, _Joint]]:
+    """Columns with joints that are called as their names, or the names in their rows, suggest."""
+    rank = 0
+    for column in columns:
+        label = None if column.entry is None else labels.get(column.entry)
+        last = _SEPARATORS.split(column.before.rstrip("_-./ "))[-1]
+        if column.bare and not _BARE.fullmatch(last):
+            continue
+        if label is None and _is_no_joint(column):
+            continue
+        rank += 1
+        if label is not None:
+            if IDENTIFIER.fullmatch(label):
+                yield column, _Joint(label, f"the rows call it {label}")
+        elif column.bare:
+            yield column, _Joint(last, "its name says no quantity", sure=False)
+        elif column.entry is None and IDENTIFIER.fullmatch(last) and last.lower() not in GENERIC:
+            yield column, _Joint(last)
+        else:
+            yield column, _Joint(f"joint_{rank}", "by the order alone", sure=False)
+
+
+def _is_no_joint(column: _Column) -> bool:
+    """Whether a name speaks of a pose, as `tcp_pos_x`, or says no quantity."""
+    telling = [word for word in column.words if word not in GENERIC]
+    return column.bare or any(word in AXES for word in telling) or bool(telling and set(telling) <= {*POSES})
 
 
 def _source(rows: FirstRows, column: _Column) -> tuple[MappedColumn, str]:

@@ -21,7 +21,11 @@ _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./]*")
 
 
 def mapping_lines(
-    time: TimeColumn | None, guesses: Sequence[Guess], joint_names: Sequence[str], leaves_out: bool
+    time: TimeColumn | None,
+    guesses: Sequence[Guess],
+    joint_names: Sequence[str],
+    leaves_out: bool,
+    rate: float | None = None,
 ) -> Iterator[str]:
     """The keys `columns` and `ignore`.
 
@@ -30,8 +34,10 @@ def mapping_lines(
         guesses: what the columns may stand for.
         joint_names: of the robot, empty if it is not known.
         leaves_out: whether there are further columns.
+        rate: rows per second, which is said in place of times.
     """
-    lines = [*_time(time), *_unknown(guesses, joint_names), *map(_entry, guesses)]
+    times = [] if rate is not None else _time(time)
+    lines = [*times, *_unknown(guesses, joint_names), *map(_entry, guesses)]
     width = max((len(entry) for entry, _ in lines), default=0)
     yield "columns:"
     for entry, comment in lines:
@@ -42,7 +48,7 @@ def mapping_lines(
 
 def _time(time: TimeColumn | None) -> Iterator[tuple[str, str]]:
     if time is None:
-        yield f"# {TIME}: ...", "no column increases from row to row"
+        yield f"# {TIME}: ...", "no column holds times; say which does, or the rate of the rows"
     else:
         yield f"{TIME}: {_written(time.source)}", time.reason
 
@@ -56,9 +62,10 @@ def _unknown(guesses: Sequence[Guess], joint_names: Sequence[str]) -> Iterator[t
 
 
 def _entry(guess: Guess) -> tuple[str, str]:
-    if guess.quantity not in TAKEN:
-        return f"# {guess.name}: {_written(guess.source)}", COMMENTED[guess.quantity]
     reason = guess.reason if guess.sure else f"guessed: {guess.reason}"
+    if guess.quantity not in TAKEN:
+        comment = COMMENTED[guess.quantity]
+        return f"# {guess.name}: {_written(guess.source)}", comment if guess.sure else f"{comment}; {reason}"
     return f"{guess.name}: {_written(guess.source)}", reason
 
 

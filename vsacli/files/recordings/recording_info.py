@@ -17,13 +17,13 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import for_yaml
 from vsacli.base.unit_expressions import conversion_factor
 from vsacli.documents.column_mapping import REST, TIME, ColumnMapping, MappedColumn
-from vsacli.documents.columns_file import FORMAT
+from vsacli.documents.columns_file import FORMAT, checked_rate
 from vsacli.documents.table import Table, read_table
 from vsacli.documents.table_header import read_header, split_heading
 from vsacli.files.recordings.first_rows import FirstRows, read_first_rows
 from vsacli.files.recordings.guesses import TAKEN, Guess, guesses
 from vsacli.files.recordings.mapping_text import mapping_lines
-from vsacli.files.recordings.times import TimeColumn, time_column
+from vsacli.files.recordings.times import TimeColumn, time_column, unread_times
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.trajectory import file as trajectory_file
@@ -47,7 +47,10 @@ FEWEST_ROWS = 10
 
 
 def describe_recording(
-    path: str | os.PathLike[str], robot: Robot | None = None, progress: Progress = unseen
+    path: str | os.PathLike[str],
+    robot: Robot | None = None,
+    progress: Progress = unseen,
+    rate: float | None = None,
 ) -> dict[str, Any]:
     """What a CSV file holds, whatever its columns are called, as JSON values.
 
@@ -55,19 +58,28 @@ def describe_recording(
         path: the file.
         robot: that was recorded, to whose joints columns are assigned.
         progress: opens a bar over the numbers that are looked at.
+        rate: rows per second, of a file without times.
 
     Raises:
-        InputError: it is no table.
+        InputError: it is no table, or has times although a rate is given.
     """
     rows = read_first_rows(path)
     joint_names = robot.joint_names if robot else ()
     time = time_column(rows)
+    if rate is not None:
+        rate = checked_rate(rate)
+    if time is not None and rate is not None:
+        if not time.guessed:
+            name = rows.columns[time.place] or time.place + 1
+            raise InputError.one(f"has times of its own in column {name!r}; leave the rate out", rows.path)
+        time = None
     found = guesses(rows, time, joint_names)
-    surveyed = _Survey(rows, time, found, progress)
+    surveyed = _Survey(rows, time, found, progress, rate)
     taken = [guess for guess in found if guess.quantity in TAKEN]
     stamps = {time.place, time.nanoseconds} - {None} if time else set()
     leaves_out = len(stamps | {guess.place for guess in taken}) < len(rows.columns)
-    lines = list(mapping_lines(time, found, joint_names, leaves_out))
+    lines = list(mapping_lines(time, found, joint_names, leaves_out, rate))
+    stated = [] if rate is None else [f"rate: {rate:g}"]
     return {
         "kind": "recording",
         "name": Path(path).name,
@@ -75,19 +87,29 @@ def describe_recording(
         "time": surveyed.time,
         "columns": surveyed.columns,
         "warnings": surveyed.warnings,
-        "mapping": "\n".join([f"format: {FORMAT}", *lines]),
-        "trajectory": "\n".join(_trajectory(Path(path).name, lines, taken, robot, surveyed.rate)),
+        "mapping": "\n".join([f"format: {FORMAT}", *stated, *lines]),
+        "trajectory": "\n".join(
+            _trajectory(Path(path).name, lines, taken, robot, stated or _proposed_rate(time, surveyed.rate))
+        ),
     }
 
 
+def _proposed_rate(time: TimeColumn | None, jittering: str) -> list[str]:
+    """A comment on the rate of the trajectory where one is needed, or of use."""
+    if time is None:
+        return ["# rate: ...  # rows per second: no column holds times"]
+    if jittering:
+        return [f"# rate: {jittering}  # stamps jitter; this makes the steps of the torques equal"]
+    return []
+
+
 def _trajectory(
-    file: str, mapping: Sequence[str], taken: Sequence[Guess], robot: Robot | None, rate: str
+    file: str, mapping: Sequence[str], taken: Sequence[Guess], robot: Robot | None, rate: Sequence[str]
 ) -> Iterator[str]:
     """A trajectory file that takes the positions from the recording."""
     yield f"format: {trajectory_file.FORMAT}"
     yield "name: recorded"
-    if rate:
-        yield f"# rate: {rate}  # stamps jitter; this makes the steps of the torques equal"
+    yield from rate
     yield "position:"
     yield "  type: csv"
     yield f"  file: {for_yaml(file)}"
@@ -119,13 +141,19 @@ class _Survey:
     """
 
     def __init__(
-        self, rows: FirstRows, time: TimeColumn | None, found: Sequence[Guess], progress: Progress
+        self,
+        rows: FirstRows,
+        time: TimeColumn | None,
+        found: Sequence[Guess],
+        progress: Progress,
+        rate: float | None,
     ) -> None:
-        self._rows, self._time = rows, time
+        self._rows, self._time, self._stated = rows, time, rate
         self._guesses = {guess.place: guess for guess in found}
         self.rows = 0
         self.time: dict[str, Any] | None = None
-        self.warnings: list[str] = []
+        file = Path(rows.path).name
+        self.warnings = [f"{file}: {sentence}" for sentence in unread_times(rows)]
         self.rate = ""
         stamps = () if time is None else (time.place, time.nanoseconds)
         numbers = [place for place in rows.of_numbers if place not in stamps]
@@ -140,7 +168,7 @@ class _Survey:
 
     def _unread(self, place: int) -> dict[str, Any]:
         filled = self._rows.filled(place)
-        kind = "text" if filled else "nothing"
+        kind = "index" if self._rows.is_index(place) else "text" if filled else "nothing"
         if self._time is not None and place in (self._time.place, self._time.nanoseconds):
             kind = "time"
         return {
@@ -160,7 +188,8 @@ class _Survey:
             unit = self._time.source.unit or ("s" if rest is None else None)
             at = None if rest is None else rest + 1
             columns[TIME] = MappedColumn(column=self._time.place + 1, unit=unit, nanoseconds=at)
-        return read_table(self._rows.path, ColumnMapping(columns, REST), set(columns), empty_cells=True)
+        mapping = ColumnMapping(columns, REST, self._stated)
+        return read_table(self._rows.path, mapping, set(columns), empty_cells=True)
 
     def _look(self, places: Sequence[int], table: Table) -> None:
         self.rows = len(table.values)
@@ -172,7 +201,7 @@ class _Survey:
             there = np.isfinite(values)
             described = self.columns[place]
             described |= {
-                "holds": "numbers",
+                "holds": described["holds"] if described["holds"] == "index" else "numbers",
                 "min": float(values[there].min(initial=math.inf)) if there.any() else math.nan,
                 "max": float(values[there].max(initial=-math.inf)) if there.any() else math.nan,
                 "rows": int(np.count_nonzero(there)),
@@ -186,7 +215,7 @@ class _Survey:
         Described at the first look, in the rows in which a signal has numbers: others are of another topic.
         """
         at = next((i for i, name in enumerate(table.columns) if split_heading(name)[0] == TIME), None)
-        if at is None or self._time is None:
+        if at is None:
             return None
         unit = split_heading(table.columns[at])[1] or "s"
         stamps = table.values[:, at] * conversion_factor(unit, "s")
@@ -208,13 +237,13 @@ class _Survey:
                 )
         return stamps if rising else None
 
-    def _described(self, stamps: FloatArray, unit: str, first_stamp: int | None) -> dict[str, Any]:
-        assert self._time is not None, "see _stamps"
+    def _described(self, stamps: FloatArray, unit: str, first_stamp: int | str | None) -> dict[str, Any]:
+        time = self._time
         steps = np.diff(stamps) if len(stamps) > 1 else np.array([math.nan])
         duration = float(stamps[-1] - stamps[0])
         return {
-            "column": self._rows.columns[self._time.place] or self._time.place + 1,
-            "unit": unit,
+            "column": None if time is None else self._rows.columns[time.place] or time.place + 1,
+            "unit": "clock" if time is not None and time.clock else unit,
             "first": float(stamps[0]) if first_stamp is None else first_stamp,
             "duration": duration,
             "rate": 1 / float(np.median(steps)) if np.median(steps) > 0 else math.nan,

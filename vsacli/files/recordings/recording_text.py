@@ -26,7 +26,7 @@ def recording_lines(recording: Mapping[str, Any]) -> Iterator[str]:
 
 def _timing(time: Mapping[str, Any] | None) -> str:
     if time is None:
-        return ", no column of which increases as times do"
+        return ", no column of which holds times; give their rate with --rate HZ"
     step = time["step"]
     steps = f"steps of {step_text(step['min'])} to {step_text(step['max'])}"
     rate = "" if math.isnan(time["rate"]) else f", {time['rate']:.4g} Hz ({steps})"

@@ -15,7 +15,6 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import actual
-from vsacli.base.units import time_text
 from vsacli.results.exports.result_format import ResultFormat
 from vsacli.results.exports.selection import Samples, Selection
 
@@ -29,9 +28,12 @@ WITHOUT_POINT = re.compile(r"(?<![\d.])(\d+)e")
 NANOSECONDS = 10**9
 """In a second: times of messages are whole seconds and nanoseconds."""
 
+LONGEST = 2**31 - 1
+"""Seconds of a message: builtin_interfaces/msg/Duration has 32 bits for them, with a sign."""
+
 
 def check_fields(selection: Selection) -> None:
-    """Refuse what no field of a message holds, and a selection without positions."""
+    """Refuse what no field of a message holds, a selection without positions, and times that are too long."""
     names, fields = {each.name for each in selection.chosen}, _fields(selection)
     strange = sorted(names - set(fields.values()))
     if strange:
@@ -39,6 +41,11 @@ def check_fields(selection: Selection) -> None:
         raise InputError.one(f"a JointTrajectory has no place for {', '.join(strange)}, only for {places}")
     if fields["positions"] not in names:
         raise InputError.one(f"a JointTrajectory needs positions: add {fields['positions']} to --variables")
+    if selection.time.size and selection.time[-1] - selection.time[0] > LONGEST:
+        lasts = f"lasts {selection.time[-1] - selection.time[0]:.4g} s"
+        raise InputError.one(
+            f"{lasts}, and a JointTrajectory counts seconds up to {LONGEST}", selection.result.path
+        )
 
 
 def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[[int], object]) -> None:
@@ -48,7 +55,6 @@ def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[
     stream.write(f'"joint_names": {names},\n"points": [')
     separator = "\n"
     for block in selection.blocks():
-        _check_finite(selection, block)
         points = ",\n".join(map(json.dumps, _points(selection, block)))
         stream.write(separator + WITHOUT_POINT.sub(r"\1.0e", points))
         separator = ",\n"
@@ -70,19 +76,6 @@ def _points(selection: Selection, block: Samples) -> Iterator[dict[str, Any]]:
         seconds, nanoseconds = divmod(time, NANOSECONDS)
         stamp = {"sec": seconds, "nanosec": nanoseconds}
         yield {**dict(zip(present, point, strict=True)), "time_from_start": stamp}
-
-
-def _check_finite(selection: Selection, block: Samples) -> None:
-    """Refuse infinity, for which JSON has no number."""
-    for name, values in block.values.items():
-        lost = np.argwhere(~np.isfinite(values))
-        if len(lost):
-            sample, joint = lost[0]
-            where = f"{selection.result.joint_names[joint]}.{name}"
-            reason = (
-                f"{where} is infinite at t = {time_text(float(block.time[sample]))}, which JSON cannot hold"
-            )
-            raise InputError.one(reason, selection.result.path)
 
 
 JOINT_TRAJECTORY = ResultFormat(

@@ -12,7 +12,7 @@ import numpy as np
 from vsacli.base.errors import InputError, VsacliError
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.units import time_text
-from vsacli.results.exports.selection import Chosen, Selection, Side
+from vsacli.results.exports.selection import FAULTS, INFINITE, MISSING, Chosen, Selection, Side
 from vsacli.results.store.reader import StoredResult
 
 TORQUES = {"result": ("tau_motor",), "simulation": ("q_actual", "stiffness_actual", "tau_motor_actual")}
@@ -40,27 +40,38 @@ class ResultFormat:
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples of a joint that have no value: the first one's time in s, and how many they are."""
+    """Samples of a joint, or of an axis of the wrench, that are not finite.
 
-    variable: str
-    joint: str
+    Attributes:
+        place: joint and variable, or the column of the wrench.
+        fault: MISSING or INFINITE.
+        time: of the first, s.
+        count: how many they are.
+    """
+
+    place: str
+    fault: str
     time: float
     count: int
 
     def __str__(self) -> str:
         samples = "1 sample" if self.count == 1 else f"{self.count} samples"
-        return f"{self.joint}.{self.variable} has no value at {samples}, first at t = {time_text(self.time)}"
+        return f"{self.place} {self.fault} at {samples}, first at t = {time_text(self.time)}"
 
 
 class UndefinedSamplesError(VsacliError):
-    """Samples to be exported have no value; nothing has been written."""
+    """Samples to be exported have no finite value; nothing has been written."""
 
     def __init__(self, path: Path, gaps: Iterable[Gap], missing: str | None) -> None:
         self.gaps = tuple(gaps)
+        faults = {gap.fault for gap in self.gaps}
         otherwise = f", or get {missing} with --allow-nan" if missing else ""
-        lines = [f"{path}: {gap}" for gap in self.gaps]
-        lines.append(f"nothing was exported; mend the steps the report names{otherwise}")
-        super().__init__("\n".join(lines))
+        as_they_are = "export them as they are with --allow-nan" if missing else "leave the variable out"
+        advice = {MISSING: f"mend the steps the report names{otherwise}", INFINITE: as_they_are}
+        said = "; ".join(words for fault, words in advice.items() if fault in faults)
+        super().__init__(
+            "\n".join([*(f"{path}: {gap}" for gap in self.gaps), f"nothing was exported; {said}"])
+        )
 
 
 def export_result(
@@ -82,39 +93,34 @@ def export_result(
         form: the format.
         variables: names, exported in declared order; by default what the format says.
         rate: samples per second, the stored rate or a whole fraction of it; all samples by default.
-        allow_nan: show that samples are missing instead of refusing.
+        allow_nan: show that samples are missing, and infinite ones as they are, instead of refusing.
         side: of the gear on which motion and torque of the motors are given; see `Selection`.
         progress: shows how far the work is.
 
     Raises:
         InputError: a variable is not in the file or has no place in the format, the rate is not possible, a
             gear ratio is not known, or a package is missing.
-        UndefinedSamplesError: a sample is NaN and `allow_nan` is false.
+        UndefinedSamplesError: a sample is NaN or infinite and `allow_nan` is false.
     """
     wanted = form.variables[result.kind] if variables is None else variables
     selection = Selection(result, wanted, rate, side)
     form.check(selection)
     if allow_nan and form.missing is None:
         raise InputError.one("this format cannot show that a value is missing; leave out --allow-nan")
-    if not allow_nan:
-        _check_defined(selection, form.missing)
+    gaps = [] if allow_nan else [gap for chosen in selection.chosen for gap in _gaps(selection, chosen)]
+    if gaps:
+        raise UndefinedSamplesError(result.path, gaps, form.missing)
     with progress(selection.steps) as bar:
         form.write(selection, stream, bar.update)
 
 
-def _check_defined(selection: Selection, missing: str | None) -> None:
-    """Raise UndefinedSamplesError if any value to be exported is NaN."""
-    of_joints = [chosen for chosen in selection.chosen if "joint" in chosen.variable.dims]
-    gaps = [gap for chosen in of_joints for gap in _gaps(selection, chosen)]
-    if gaps:
-        raise UndefinedSamplesError(selection.result.path, gaps, missing)
-
-
 def _gaps(selection: Selection, chosen: Chosen) -> Iterator[Gap]:
-    missing = np.concatenate(
-        [chosen.undefined(selection.read(chosen, *span)) for span in selection.spans([chosen])]
+    """The samples of a variable that are not finite, of each joint that has it."""
+    faults = np.concatenate(
+        [chosen.faults(selection.read(chosen, *span)) for span in selection.spans([chosen])]
     )
-    for joint, steps in zip(selection.result.joint_names, missing.T, strict=True):
-        if steps.any():
-            first = float(selection.time[steps.argmax()])
-            yield Gap(chosen.variable.name, joint, first, int(steps.sum()))
+    for place, of_joint in zip(chosen.places(selection.result.joint_names), faults.T, strict=True):
+        for fault in (MISSING, INFINITE):
+            steps = of_joint == FAULTS.index(fault)
+            if steps.any():
+                yield Gap(place, fault, float(selection.time[steps.argmax()]), int(steps.sum()))

@@ -22,8 +22,7 @@ def stride_of(result: StoredResult, rate: float) -> int:
     Raises:
         InputError: the stored rate is no whole multiple of it, or there is none.
     """
-    if not (rate > 0 and math.isfinite(rate)):
-        raise InputError.one(f"the rate must be positive, not {rate:g} Hz")
+    check_rate(rate)
     stored = _stored_rate(result)
     ratio = stored / rate
     stride = round(ratio)
@@ -37,6 +36,12 @@ def stride_of(result: StoredResult, rate: float) -> int:
         )
         raise InputError.one(message, result.path)
     return stride
+
+
+def check_rate(rate: float) -> None:
+    """Raise InputError unless a rate, Hz, is finite and positive."""
+    if not (rate > 0 and math.isfinite(rate)):
+        raise InputError.one(f"the rate must be positive, not {rate:g} Hz")
 
 
 def _stored_rate(result: StoredResult) -> float:

@@ -23,6 +23,10 @@ Side: TypeAlias = Literal["joint", "motor"]
 CELLS = 2**18
 """Values of a variable held in memory at a time."""
 
+MISSING, INFINITE = "has no value", "is infinite"
+FAULTS = ("", MISSING, INFINITE)
+"""What may be wrong with a sample, as sentences go on."""
+
 
 @dataclass(frozen=True)
 class Chosen:
@@ -66,11 +70,19 @@ class Chosen:
         flat: npt.NDArray[Any] = values.reshape(len(values), -1).T[self.there.ravel()]
         return flat
 
-    def undefined(self, values: FloatArray | FlagArray) -> BoolArray:
-        """(samples, joints): whether a value that the joint has is NaN."""
-        missing: BoolArray = np.isnan(values).reshape(len(values), *self.there.shape)
-        undefined: BoolArray = np.any(missing & self.there, axis=-1)
-        return undefined
+    def places(self, joint_names: Iterable[str]) -> list[str]:
+        """Names of what has rows in `there`: the variable at each joint, or the columns of the wrench."""
+        if "joint" not in self.variable.dims:
+            return column_names(self.variable, ())
+        return [f"{joint}.{self.name}" for joint in joint_names]
+
+    def faults(self, values: FloatArray | FlagArray) -> npt.NDArray[np.uint8]:
+        """(samples, places): the worst fault of the values that there are, as index of `FAULTS`."""
+        shape = len(values), *self.there.shape
+        faulty = [
+            np.any(np.reshape(test(values), shape) & self.there, axis=-1) for test in (np.isnan, np.isinf)
+        ]
+        return np.select(faulty, [FAULTS.index(MISSING), FAULTS.index(INFINITE)]).astype(np.uint8)
 
 
 class Samples(NamedTuple):

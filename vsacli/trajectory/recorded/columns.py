@@ -25,6 +25,11 @@ _PATTERNS = ("{joint}.{name}", "{name}{number}")
 
 _WRENCH_WAY: Way = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
 
+RATE_INSTEAD = "rows at equal steps need their rate instead: rate in a trajectory or columns file"
+
+MOST_NAMED = 3
+"""Unknown columns, up to which all are named."""
+
 _PARENTHESISED = re.compile(r"(?P<name>[^()]*?)\s*\((?P<unit>[^()]*)\)")
 
 
@@ -108,7 +113,7 @@ def column_layout(
         examples = f"{', '.join(expected[:2])}, ..."
         message = f"has no column of a trajectory ({examples}); {_remedy(file)}"
         raise InputError.one(message, file, line)
-    problems = list(_strangers(names, expected, known))
+    problems = list(_strangers(names, expected, known, file))
     problems += [f"column {name!r} appears {n} times" for name, n in Counter(names).items() if n > 1]
     way = way | _WRENCH_WAY
     if len(used) == len(ways):
@@ -118,8 +123,6 @@ def column_layout(
         problems += _gaps(names, way, {signal.names[0] for signal in wanted})
     units = [unit for _, unit in headings]
     columns = dict(_measured(names, units, way, joints, problems))
-    if any(name not in known and nearest(name, expected) is None for name in names):
-        problems.append(_remedy(file))
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
     return _layout(names, columns, way, _of_signals(of_every_joint))
@@ -167,23 +170,34 @@ def _all(way: Way) -> list[str]:
     return [column for columns in way.values() for column in columns.values()]
 
 
-def _strangers(header: Sequence[str], expected: Sequence[str], known: Collection[str]) -> Iterator[str]:
-    missing = [column for column in expected if column not in header]
+def _strangers(
+    header: Sequence[str], expected: Sequence[str], known: Collection[str], file: str
+) -> Iterator[str]:
+    """Columns that are not known: each that may be a slip, and all others in one sentence."""
+    missing, others = [column for column in expected if column not in header], []
     for column in header:
+        unit = _PARENTHESISED.fullmatch(column)
         if column in known:
             continue
-        unit = _PARENTHESISED.fullmatch(column)
         if unit is not None and unit["name"] in known:
             yield f"{column!r}: units are written in square brackets, {unit['name']} [{unit['unit']}]"
-        else:
+        elif nearest(column, missing) is not None:
             yield f"unknown column {column!r}{did_you_mean(column, missing)}"
+        else:
+            others.append(column)
+    if others:
+        named = ", ".join(map(repr, others[:MOST_NAMED]))
+        words = "unknown column" if len(others) == 1 else f"{len(others)} unknown columns,"
+        such = "" if len(others) <= MOST_NAMED else " such as"
+        yield f"{words}{such} {named}; {_remedy(file)}"
 
 
 def _is_foreign(names: Sequence[str], known: Collection[str]) -> bool:
-    """Whether no column is known but the time, nor like one that is."""
+    """Whether no column is known but the time, and some are like none that is: no slips, but other names."""
     columns = [name for name in names if name != TIME]
     signals = [name for name in known if name != TIME]
-    return bool(columns) and all(name not in known and nearest(name, signals) is None for name in columns)
+    none_known = not any(name in known for name in columns)
+    return none_known and any(nearest(name, signals) is None for name in columns)
 
 
 def _remedy(file: str) -> str:
@@ -196,7 +210,7 @@ def _remedy(file: str) -> str:
 
 def _gaps(header: Sequence[str], way: Way, needed: Collection[str]) -> Iterator[str]:
     if TIME not in header:
-        yield f"there is no column {TIME!r}"
+        yield f"there is no column {TIME!r}; {RATE_INSTEAD}"
     for name, columns in way.items():
         absent = [column for column in columns.values() if column not in header]
         if not absent:

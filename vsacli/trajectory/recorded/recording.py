@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,7 +27,7 @@ from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, time_problems, value_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
-from vsacli.trajectory.times import RecordedTimes
+from vsacli.trajectory.times import RecordedTimes, Times, uniform_times_over
 from vsacli.trajectory.trajectory import Trajectory
 
 NEEDED = (POSITION, *(signal for signal in COMMANDED.values() if signal.device is None))
@@ -48,6 +49,7 @@ class Recording:
         source: the file.
         lines: those of its rows.
         first_stamp: what was taken off its times, see `Table`.
+        rated: whether its times follow from a rate, see `Table`.
     """
 
     times: RecordedTimes
@@ -56,7 +58,25 @@ class Recording:
     notes: tuple[str, ...]
     source: Source
     lines: Lines
-    first_stamp: int | None = None
+    first_stamp: int | str | None = None
+    rated: bool = False
+
+    def times_at(self, rate: float | None, file: str) -> Times:
+        """The times of a trajectory that is recorded here: those of the samples, or equally spaced ones.
+
+        Args:
+            rate: samples per second; None if the recorded times are meant.
+            file: where that is said.
+
+        Raises:
+            InputError: there are too many or too few at this rate.
+        """
+        if rate is None or self.rated:
+            return self.times
+        try:
+            return uniform_times_over(self.times.span, rate)
+        except InputError as error:
+            raise InputError.one(f"rate: {error}", file) from None
 
     def check_times(self, other: Recording) -> None:
         """Refuse another recording that is to be combined with this one if its times differ.
@@ -127,14 +147,14 @@ def read_recording(
     warnings = tuple(str(_located(doubt, table, layout)) for doubt in found)
     clauses = (*turns, *_understood(table), *_unused(layout, signals))
     notes = tuple(f"{file}: {clause}" for clause in clauses)
-    source, lines, first_stamp = table.source, table.lines, table.first_stamp
+    source, lines, first_stamp, rated = table.source, table.lines, table.first_stamp, table.rated
     del table  # as large as the records, which may be fitted now
     profiles = tuple(
-        SampledProfile.of(each, wanted[each.signal], resampled=resampled, progress=progress)
+        SampledProfile.of(each, wanted[each.signal], resampled=resampled and not rated, progress=progress)
         for each in records
     )
     times = RecordedTimes(time, rounding_notes(time))
-    return Recording(times, profiles, warnings, notes, source, lines, first_stamp)
+    return Recording(times, profiles, warnings, notes, source, lines, first_stamp, rated)
 
 
 def _check_filled(table: Table) -> None:
@@ -232,21 +252,32 @@ def _located(problem: SampleProblem, table: Table, layout: ColumnLayout) -> Prob
 
 
 def recorded_trajectory(
-    path: str | os.PathLike[str], joints: CommandedJoints, progress: Progress = unseen
+    path: str | os.PathLike[str],
+    joints: CommandedJoints,
+    progress: Progress = unseen,
+    rate: float | None = None,
 ) -> Trajectory:
     """A trajectory whose position and commanded signals come from one CSV file, named after the file.
 
+    Args:
+        path: the file.
+        joints: as of `read_recording`.
+        progress: likewise.
+        rate: samples per second: of the file if it has no times, else of the trajectory.
+
     Raises:
-        InputError: as `read_recording`.
+        InputError: as `read_recording`, or of the rate.
     """
-    recording = read_recording(path, joints, progress=progress)
+    mapping, resampled = ColumnMapping(rate=rate), rate is not None
+    recording = read_recording(path, joints, mapping=mapping, resampled=resampled, progress=progress)
     profiles = {profile.signal.key: profile for profile in recording.profiles}
+    source = recording.source
     return Trajectory(
-        recording.times,
+        recording.times_at(rate, source.path),
         profiles[POSITION.key],
         profiles,
         name=as_name(Path(path).stem),
         warnings=recording.warnings,
         notes=recording.notes,
-        sources=[recording.source],
+        sources=[source if rate is None else source._replace(changes=json.dumps({"rate": rate}))],
     )

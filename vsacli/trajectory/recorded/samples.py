@@ -15,6 +15,7 @@ from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, Fit, FitChoice, fit_samples, mismatches
 from vsacli.trajectory.fits.bounds import Unresolved, unresolved, vibrations
 from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences
+from vsacli.trajectory.recorded import hermite
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.times import stretch
 
@@ -70,6 +71,11 @@ class Samples:
         """Whether all derivatives are given."""
         return all(given is not None for given in self.derivatives)
 
+    @cached_property
+    def rows(self) -> FloatArray:
+        """Value and all derivatives, (orders, components, samples), where all are given."""
+        return np.stack([self.values, *(given for given in self.derivatives if given is not None)])
+
     @property
     def missing(self) -> tuple[str, ...]:
         """The derivatives that are not given."""
@@ -106,6 +112,7 @@ class SampledProfile:
 
     At these times its derivatives are the given ones, and those of a fit where none are given; its values are
     the samples where all derivatives are given or the fit goes through the samples, else those of the fit.
+    Between them it is the function that samples with all derivatives determine, if they do, else the fit.
 
     Attributes:
         record: what was recorded.
@@ -192,13 +199,22 @@ class SampledProfile:
 
     @property
     def breakpoints(self) -> FloatArray:
-        """Ascending times between which the fit is analytic; the first and last are its span."""
+        """Ascending times between which `at` is analytic; the first and last are its span."""
+        if self._through_all:
+            return self.record.time
         return self.fit.breakpoints if self.fit.parts else self.record.time[[0, -1]]
 
     @property
     def known_between(self) -> bool:
-        """Whether all derivatives at the samples are the fit's, and none is given."""
-        return self.resampled or all(given is None for given in self.record.derivatives)
+        """Whether `at` continues the samples: all derivatives come from the fit, or from one function."""
+        nothing_given = all(given is None for given in self.record.derivatives)
+        return self.resampled or nothing_given or self._through_all
+
+    @cached_property
+    def _through_all(self) -> bool:
+        """Whether given derivatives say what lies between the samples."""
+        record = self.record
+        return not self.resampled and record.complete and hermite.belong_together(record.time, record.rows)
 
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
         """Value and derivatives at the samples start..stop-1: what was given, and for the rest the fit."""
@@ -218,7 +234,9 @@ class SampledProfile:
         return rows
 
     def at(self, time: FloatArray) -> FloatArray:
-        """The fit and its derivatives at any times of the span, shape (orders, components, samples)."""
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        if self._through_all:
+            return hermite.interpolated(self.record.time, self.record.rows, time)
         return self.fit.at(time, self.record.signal.orders)
 
     @property

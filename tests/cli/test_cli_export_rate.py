@@ -1,0 +1,57 @@
+"""`vsacli export --rate` at rates that take no whole number of stored samples."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+from samples.command_line import REPOSITORY
+
+TASK = """\
+format: vsacli-trajectory/1
+name: quick
+duration: 0.963
+rate: 500
+position: {type: polynomial, degree: 7, start: 0, end: [90 deg, 45 deg, -60 deg]}
+stiffness: {type: constant, value: 1200}
+"""
+ROBOT = REPOSITORY / "robots" / "vsa_3r.yaml"
+
+
+def columns(path):
+    header, *rows = csv.reader(path.read_text().splitlines())
+    return header, np.array(rows, dtype=float)
+
+
+def exported(vsacli, folder, task, rate):
+    (folder / "quick.yaml").write_text(task)
+    result, table = folder / f"{rate}.h5", folder / f"{rate}.csv"
+    assert vsacli("invdyn", ROBOT, folder / "quick.yaml", "-o", result).code == 0
+    done = vsacli("export", result, "--rate", rate, "-o", table)
+    assert done.code == 0, done.err
+    return columns(table)
+
+
+@pytest.mark.parametrize("rate", [1000, 300])
+def test_a_declared_trajectory_is_computed_at_the_rate(tmp_path, vsacli, rate):
+    """0.963 s hold 481.5 periods of 500 Hz, so that the steps are no multiples of 2 ms."""
+    header, rows = exported(vsacli, tmp_path, TASK, rate)
+    whole, expected = exported(vsacli, tmp_path, TASK.replace("rate: 500", "rate: 3000"), 3000)
+    assert header == whole
+    np.testing.assert_allclose(rows[:, 0], np.arange(len(rows)) / rate, rtol=1e-14)
+    assert rows[-1, 0] == pytest.approx(int(0.963 * rate + 1e-9) / rate)
+    # the same function of time at times that are rounded differently
+    np.testing.assert_allclose(rows, expected[:: 3000 // rate][: len(rows)], rtol=1e-10, atol=1e-9)
+
+
+def test_a_motion_known_at_its_samples_alone_is_not(tmp_path, vsacli):
+    (tmp_path / "quick.yaml").write_text(TASK.replace("0.963", "0.96"))
+    result, table = tmp_path / "r.h5", tmp_path / "moved.csv"
+    assert vsacli("invdyn", ROBOT, tmp_path / "quick.yaml", "-o", result).code == 0
+    assert vsacli("export", result, "--variables", "q,dq,stiffness", "-o", table).code == 0
+    again = tmp_path / "again.h5"
+    vsacli("invdyn", ROBOT, table, "-o", again)
+    done = vsacli("export", again, "--rate", 300)
+    assert done.code == 2
+    assert "no whole multiple of 300 Hz; the nearest are 250 and 500 Hz" in done.err

@@ -1,0 +1,135 @@
+"""Names of columns compared with names of joints: equal but for case, separators and common words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
+
+QUANTITIES = {
+    "q": ("position", "positions", "pos", "q", "angle", "angles"),
+    "dq": ("velocity", "velocities", "vel", "dq", "qd", "speed"),
+    "tau_motor_1": ("effort", "efforts", "torque", "torques", "tau"),
+    "stiffness": ("stiffness",),
+}
+"""Words for each quantity of a joint."""
+
+QUANTITY_WORDS = frozenset(word for words in QUANTITIES.values() for word in words)
+
+GENERIC = (
+    *(
+        "field",
+        "joint",
+        "joints",
+        "axis",
+        "state",
+        "states",
+        "data",
+        "measured",
+        "actual",
+        "current",
+        "feedback",
+    ),
+    *(
+        "name",
+        "msg",
+        "robot",
+        "arm",
+        "motor",
+        "link",
+        "deg",
+        "degree",
+        "degrees",
+        "rad",
+        "mm",
+        "m",
+        "nm",
+        "n",
+    ),
+)
+"""Words in names of columns that say nothing of which joint it is."""
+
+OF_JOINTS = ("joint", "joints", "axis", "field", "deg", "degree", "degrees", "rad", "mm", "m")
+"""Words that a name without a word for a quantity may have: others, as in `current_1`, are quantities."""
+
+AXES = ("x", "y", "z", "rx", "ry", "rz", "qx", "qy", "qz", "qw", "tcp", "ee", "pose", "cartesian")
+"""Words of which one is enough for a name to speak of a pose, and of no joint."""
+
+POSES = ("roll", "pitch", "yaw", "tool", "odom", "imu", "linear", "angular", "orientation")
+"""Words that do so if a name has no others; joints of legs and wrists are called by some of them, too."""
+
+
+def words_of(name: str) -> tuple[str, ...]:
+    """The words and numbers of a name in small letters, equal for `joint_01`, `Joint1` and `joint-1`."""
+    return tuple(word.lower().lstrip("0") or "0" for word in WORDS.findall(name))
+
+
+class Match(NamedTuple):
+    """A joint whose name stands in that of a column.
+
+    Attributes:
+        joint: its name.
+        whole: whether all of its name is there, not only what tells it from the other joints.
+    """
+
+    joint: str
+    whole: bool
+
+
+class JointNames:
+    """The names of the joints of a robot, to be found in names of columns.
+
+    Args:
+        names: base to tip.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.names = tuple(names)
+        self._words = {name: words_of(name) for name in names}
+        first, last = _common(list(self._words.values()))
+        self._cores = {name: words[first : len(words) - last] for name, words in self._words.items()}
+
+    def in_words(self, words: Sequence[str]) -> Match | None:
+        """The joint whose name stands in these words, the longest if several do; None if none or two do."""
+        for whole, of_joints in ((True, self._words), (False, self._cores)):
+            there = [name for name, own in of_joints.items() if own and _stands_in(own, words)]
+            longest = max((len(of_joints[name]) for name in there), default=0)
+            found = [name for name in there if len(of_joints[name]) == longest]
+            if len(found) == 1 and (whole or self._tells(of_joints[found[0]], words)):
+                return Match(found[0], whole)
+        return None
+
+    def called(self, words: Sequence[str]) -> str:
+        """The joint that a column is named after and nothing else; empty if it is called otherwise."""
+        rest = "".join(word for word in words if word not in OF_JOINTS)
+        for name in self.names:
+            own, core = self._words[name], self._cores[name]
+            bare = "".join(word for word in own if word not in OF_JOINTS)
+            if "".join(words) == "".join(own) or (rest and rest in (bare, "".join(core))):
+                return name
+        return ""
+
+    def _tells(self, core: Sequence[str], words: Sequence[str]) -> bool:
+        """Whether what remains of a name is enough: a number alone only amid words that say nothing else."""
+        common = {word for own in self._words.values() for word in own}
+        others = [word for word in words if word not in core]
+        return not all(word.isdecimal() for word in core) or all(
+            word in GENERIC or word in common for word in others
+        )
+
+
+def _stands_in(part: Sequence[str], words: Sequence[str]) -> bool:
+    return f" {' '.join(part)} " in f" {' '.join(words)} "
+
+
+def _common(names: Sequence[Sequence[str]]) -> tuple[int, int]:
+    """How many words all names have in common at their beginning, and at their end."""
+    if len(names) < 2:  # a single one would have nothing left
+        return 0, 0
+    shortest = min(map(len, names))
+    first = next((at for at in range(shortest) if len({words[at] for words in names}) > 1), shortest)
+    room = shortest - first
+    last = next((at for at in range(room) if len({words[-1 - at] for words in names}) > 1), room)
+    return first, last
