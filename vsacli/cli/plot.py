@@ -12,8 +12,17 @@ import click
 from vsacli.cli.command_parts import example, format_option, overwrite_option, result_line, words_of
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.plot_recording import (
+    RECORDING,
+    draw_recording,
+    has_recording,
+    is_recording,
+    recording_figure,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from vsacli.base.outputs import Outputs, Staged
     from vsacli.results.plots import FigureFiles
     from vsacli.results.store.reader import StoredResult
@@ -21,7 +30,7 @@ if TYPE_CHECKING:
 
 @click.command(
     "plot",
-    short_help="Draw results and simulations, or compare several.",
+    short_help="Draw results, simulations and recordings, or compare.",
     epilog=example("vsacli plot result.h5 -o figures --format pdf"),
 )
 @click.argument("files", type=FILE, metavar="FILE...", nargs=-1, required=True)
@@ -43,6 +52,7 @@ if TYPE_CHECKING:
     callback=words_of("theta,dtheta"),
     help="A figure of each of these variables instead, e.g. theta,dtheta.",
 )
+@click.option("--robot", metavar="ROBOT", type=FILE, help="The robot that a recording is of.")
 @overwrite_option
 @talk_options
 def plot(
@@ -53,10 +63,11 @@ def plot(
     end: float | None,
     joints: tuple[str, ...] | None,
     variables: tuple[str, ...] | None,
+    robot: str | None,
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Draw the figures of a result or a simulation, or compare several of a kind.
+    """Draw the figures of a result, a simulation or a recording, or compare several results.
 
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
     <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
@@ -64,6 +75,10 @@ def plot(
     if its motors have what that takes; results of robots with dampers <stem>-damper. Two or more FILEs give
     one figure <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid
     joint by joint, and what they differ by from the first.
+
+    A recording, a CSV file or a trajectory with recorded signals, gives <stem>-recording: the samples of each
+    signal, the spline that stands for them, the residual and the spectra of both. So does a result of one.
+    Joints have the names of the columns, or those of --robot.
 
     With --variables the figures are called <stem>-theta or <stem>-<stem>-compare-theta.
 
@@ -79,24 +94,64 @@ def plot(
     from vsacli.base.outputs import Outputs
 
     shown = _Shown(joints or (), _span(start, end), variables)
-    with Outputs(overwrite=overwrite, inputs=files) as outputs:
-        studies = _are_studies(files)
-        if studies and shown != _EVERYTHING:
-            raise click.UsageError("times, joints and variables can be chosen of results, not of studies")
-        if file_format == "html":
-            from vsacli.cli.plot_page import write_page
-
-            if shown._replace(span=_EVERYTHING.span) != _EVERYTHING:
-                raise click.UsageError("a page shows all joints and variables; leave these options out")
-            span = None if studies else shown.span
-            write_page([Path(file) for file in files], span, Path(folder), outputs, talk)
-        elif studies:
-            _draw_studies([Path(file) for file in files], Path(folder), file_format, outputs)
-        elif len(files) == 1:
-            _draw_file(Path(files[0]), shown, Path(folder), file_format, outputs, talk)
+    with Outputs(overwrite=overwrite, inputs=[*files, *filter(None, [robot])]) as outputs:
+        target = _Target(Path(folder), file_format, outputs)
+        if any(map(is_recording, files)):
+            _check_recording(files, shown, file_format)
+            draw_recording(files[0], robot, shown.joints, shown.span, target.figures, talk)
+        elif robot is not None:
+            raise click.UsageError("--robot is the robot of a recording; results name theirs")
         else:
-            _draw_comparison([Path(file) for file in files], shown, Path(folder), file_format, outputs, talk)
+            _draw_computed([Path(file) for file in files], shown, target, talk)
     talk.wrote(outputs)
+
+
+class _Target(NamedTuple):
+    """Where figures go."""
+
+    folder: Path
+    file_format: str
+    outputs: Outputs
+
+    def figures(self, names: Iterable[str], stem: str) -> FigureFiles:
+        """Stage the files of figures."""
+        from vsacli.results.plots import FigureFiles
+
+        return FigureFiles(names, self.folder, stem, self.file_format, self.outputs)
+
+
+def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) -> None:
+    """Refuse what is not drawn of recordings.
+
+    Raises:
+        click.UsageError: naming it.
+    """
+    if len(files) > 1:
+        raise click.UsageError(
+            "recordings are drawn one at a time; `vsacli compare` compares one with a result"
+        )
+    if shown.variables is not None or file_format == "html":
+        option = "--format html" if shown.variables is None else "--variables"
+        raise click.UsageError(f"{option} needs a result, which `vsacli invdyn` computes from a recording")
+
+
+def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
+    """Draw results, simulations or tables of studies."""
+    studies = _are_studies(paths)
+    if studies and shown != _EVERYTHING:
+        raise click.UsageError("times, joints and variables can be chosen of results, not of studies")
+    if target.file_format == "html":
+        from vsacli.cli.plot_page import write_page
+
+        if shown._replace(span=_EVERYTHING.span) != _EVERYTHING:
+            raise click.UsageError("a page shows all joints and variables; leave these options out")
+        write_page(paths, None if studies else shown.span, target.folder, target.outputs, talk)
+    elif studies:
+        _draw_studies(paths, target)
+    elif len(paths) == 1:
+        _draw_file(paths[0], shown, target, talk)
+    else:
+        _draw_comparison(paths, shown, target, talk)
 
 
 class _Shown(NamedTuple):
@@ -129,17 +184,17 @@ def _span(start: float | None, end: float | None) -> tuple[float, float]:
     return span
 
 
-def _are_studies(files: tuple[str, ...]) -> bool:
+def _are_studies(paths: list[Path]) -> bool:
     """Whether the first file is the table of a study; then all have to be."""
     from vsacli.results.store.reader import stored_format
     from vsacli.results.store.study_table import FORMAT
 
-    return stored_format(files[0]) == FORMAT
+    return stored_format(paths[0]) == FORMAT
 
 
-def _draw_studies(paths: list[Path], folder: Path, file_format: str, outputs: Outputs) -> None:
+def _draw_studies(paths: list[Path], target: _Target) -> None:
     """Draw the figures of a study, or compare how probable margins are in several."""
-    from vsacli.results.plots import COMPARISON, FigureFiles, compared_studies, study_figures
+    from vsacli.results.plots import COMPARISON, compared_studies, study_figures
     from vsacli.results.store.stored_study import StoredStudy
 
     stem = "-".join(path.stem for path in paths)
@@ -149,22 +204,27 @@ def _draw_studies(paths: list[Path], folder: Path, file_format: str, outputs: Ou
             figures = study_figures(tables[0])
         else:
             figures = {COMPARISON: compared_studies(tables, [path.stem for path in paths])}
-    FigureFiles(figures, folder, stem, file_format, outputs).save(figures)
+    target.figures(figures, stem).save(figures)
 
 
-def _draw_file(
-    path: Path, shown: _Shown, folder: Path, file_format: str, outputs: Outputs, talk: Talk
-) -> None:
-    """Draw the figures of one file."""
-    from vsacli.results.plots import FigureFiles, chosen_figures
+def _draw_file(path: Path, shown: _Shown, target: _Target, talk: Talk) -> None:
+    """Draw the figures of one file, and that of the recording that it was computed from."""
+    from vsacli.results.plots import chosen_figures
     from vsacli.results.store.simulation import open_stored
 
     with open_stored(path) as stored:
         talk.detail(result_line(stored))
         part = shown.of(stored)
         names = chosen_figures(part, shown.variables)
-        figures = FigureFiles(names, folder, path.stem, file_format, outputs)
+        recorded = shown.variables is None and has_recording(stored, talk)
+        figures = target.figures([*names, RECORDING] if recorded else names, path.stem)
         _draw(part, path, figures, talk, shown.variables)
+        if recorded:
+            from vsacli.files.repetition import rebuilt
+
+            robot, trajectory = rebuilt(stored)
+            profiles = trajectory.estimates.values()
+            figures.save(recording_figure(robot, profiles, path, shown.joints, shown.span))
 
 
 def draw_staged(file: Staged, figures: FigureFiles, talk: Talk) -> None:
@@ -193,14 +253,12 @@ def _draw(
         del figure  # which would stay in memory while the next one is drawn
 
 
-def _draw_comparison(
-    paths: list[Path], shown: _Shown, folder: Path, file_format: str, outputs: Outputs, talk: Talk
-) -> None:
-    from vsacli.results.plots import FigureFiles, compare_files, comparison_names
+def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
+    from vsacli.results.plots import compare_files, comparison_names
     from vsacli.results.store.simulation import open_stored
 
     stem = "-".join(path.stem for path in paths)
-    files = FigureFiles(comparison_names(shown.variables), folder, stem, file_format, outputs)
+    files = target.figures(comparison_names(shown.variables), stem)
     with ExitStack() as stack:
         opened = [stack.enter_context(open_stored(path)) for path in paths]
         for each in opened:

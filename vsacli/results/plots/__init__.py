@@ -27,6 +27,7 @@ from vsacli.results.plots.figures import (
 from vsacli.results.plots.files import FORMATS, FigureFiles, save_figures
 from vsacli.results.plots.measured_figure import measured_figure
 from vsacli.results.plots.optimum_figures import JointChange, Moved, change_figure, pace_figure
+from vsacli.results.plots.recorded_figure import recorded_figure
 from vsacli.results.plots.sensitivity_figures import Bar, Torque, band_figure, ranking_figure
 from vsacli.results.plots.simulation_figures import simulation_drawings
 from vsacli.results.plots.sizing_figure import Bounds, TorqueSpeed, torque_speed_figure
@@ -61,6 +62,7 @@ __all__ = [
     "plot_feasibility",
     "plot_stored",
     "ranking_figure",
+    "recorded_figure",
     "result_drawings",
     "save_figures",
     "simulation_drawings",

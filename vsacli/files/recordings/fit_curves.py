@@ -1,0 +1,182 @@
+"""Recorded signals of a trajectory next to their splines: what a figure needs to show how noise was judged.
+
+Everything that is stated of a fit is taken from its summary, which is what reports contain. Spectra are
+computed here, from the samples and the spline alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.progress import Progress, unseen
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.base.units import WrenchQuantity
+from vsacli.documents.table_header import read_header
+from vsacli.results.curves import Curve
+from vsacli.results.recorded_curves import Highest, RecordedCurve, Spectrum
+from vsacli.results.store.excerpt import WHOLE, Span, joint_numbers, steps_between
+from vsacli.robot.commanded_joints import CommandedJoints
+from vsacli.robot.model import Robot
+from vsacli.trajectory.fits import AS_IT_ASKS_FOR
+from vsacli.trajectory.fits.selection import INTERPOLATE, LEAST_SQUARES, SMOOTH
+from vsacli.trajectory.recorded.columns import column_layout
+from vsacli.trajectory.recorded.recording import read_recording
+from vsacli.trajectory.recorded.samples import SampledProfile
+
+FEWEST_POINTS = 1000
+"""Points that a spline is drawn with at least: lines between fewer samples would look like corners."""
+
+WINDOW_POWER = 8
+"""Of the sine that samples are weighted by. Leakage falls by the ninth power of the frequency, so that motion
+of 1 rad hides no noise of 1e-9 rad ten lines away; with a Hann window it would hide 1e-5 rad."""
+
+FIRST_LINE = 4
+"""Lowest frequency that is shown, in cycles of the recording: the window mixes slower ones with the mean."""
+
+BANDS = 120
+
+ROUNDING = 16 * np.finfo(float).eps
+"""Range of a recording over its largest value up to which it is at rest."""
+
+FOLLOWED = 0.5
+"""Gain of the spline over the samples in a band from which on it follows them."""
+
+FITS = {
+    INTERPOLATE: "interpolated",
+    LEAST_SQUARES: "least squares",
+    SMOOTH: "smoothed",
+}
+"""By the method in the report."""
+
+
+def table_profiles(path: str, robot: Robot, progress: Progress = unseen) -> list[SampledProfile]:
+    """Return the position and all commanded signals that a CSV file has columns of, fitted as a run would.
+
+    Args:
+        path: the file.
+        robot: whose joints are recorded. Unlike for a run, signals that it takes may be missing.
+        progress: opens a bar over the samples that splines are fitted to.
+
+    Raises:
+        InputError: as `read_recording`.
+    """
+    joints, header = CommandedJoints.of(robot), read_header(path)
+    layout = column_layout(header.columns, joints, (POSITION,), path, header.line)
+    wanted = [signal for signal in (POSITION, *COMMANDED.values()) if layout.quantities.get(signal.names[0])]
+    choices = dict.fromkeys(wanted, AS_IT_ASKS_FOR)
+    return list(read_recording(path, joints, choices, progress=progress).profiles)
+
+
+def recorded_curves(
+    profiles: Iterable[SampledProfile],
+    joint_types: Sequence[str],
+    file: str | Path,
+    shown: Sequence[str] = (),
+    span: Span = WHOLE,
+) -> list[RecordedCurve]:
+    """Return recorded signals and the splines that were fitted to them, component by component.
+
+    Args:
+        profiles: the signals; those that need no spline are left out.
+        joint_types: of the robot.
+        file: named in errors.
+        shown: names of the joints to show; all if there are none. A wrench has no joints and is always shown.
+        span: first and last time of the curves, s; spectra are of the whole recording.
+
+    Raises:
+        InputError: there is no such joint, or no sample at these times.
+    """
+    curves = []
+    for profile in (each for each in profiles if each.estimate is not None):
+        record, wanted = profile.record, () if profile.signal is WRENCH else shown
+        members = {record.labels[number] for number in joint_numbers(record.labels, wanted, file)}
+        steps = steps_between(record.start + record.time, span, file)
+        curves += [
+            _curve(profile, record.labels.index(stated["name"]), joint_types, stated, steps)
+            for stated in profile.summary()["columns"]
+            if stated["name"] in members
+        ]
+    return curves
+
+
+def _curve(
+    profile: SampledProfile,
+    member: int,
+    joint_types: Sequence[str],
+    stated: Mapping[str, Any],
+    steps: slice,
+) -> RecordedCurve:
+    """Return one component.
+
+    Args:
+        profile: the signal.
+        member: index of the component.
+        joint_types: of the robot.
+        stated: of its fit, an entry of the summary.
+        steps: those to show.
+    """
+    record, fit = profile.record, profile.fit
+    values, time = record.values[member], record.time
+    exact = stated["method"] == INTERPOLATE
+    residual = np.zeros_like(values) if exact else values - fit.at(time, 1)[0, member]
+    even = np.linspace(time[0], time[-1], len(time))
+    smooth = fit.at(even, 1)[0, member]
+    stamps, shown = record.start + time[steps], time[steps]
+    fine = shown if len(shown) >= FEWEST_POINTS else np.linspace(shown[0], shown[-1], FEWEST_POINTS)
+    ends = stated["doubtful"]
+    return RecordedCurve(
+        name=stated["name"] if profile.signal is WRENCH else f"{stated['name']}.{profile.signal.names[0]}",
+        unit=_unit(profile.signal, 0, member, joint_types),
+        fit=FITS.get(stated["method"], stated["method"]),
+        knots=stated["knots"],
+        recorded=Curve.reduced(stamps, values[steps]),
+        fitted=Curve.reduced(record.start + fine, fit.at(fine, 1)[0, member]),
+        residual=Curve.reduced(stamps, residual[steps]),
+        rms=float(stated["residual"]["rms"]),
+        noise=float(stated["noise"]),
+        inside=(record.start + time[0] + ends["start"], record.start + time[-1] - ends["end"]),
+        # the residual is small, and so is the error of its interpolation where stamps are uneven
+        spectrum=_spectrum(even, smooth + np.interp(even, time, residual), smooth, float(stated["noise"])),
+        highest=Highest(
+            name=profile.signal.names[-1],
+            unit=_unit(profile.signal, -1, member, joint_types),
+            order=profile.signal.orders - 1,
+            deviation=float(stated.get("deviation", math.nan)),
+        ),
+    )
+
+
+def _unit(signal: Signal, order: int, member: int, joint_types: Sequence[str]) -> str:
+    """Return the unit of a value or derivative of a component."""
+    quantity = signal.quantities[order]
+    if isinstance(quantity, WrenchQuantity):
+        return quantity.of_axis(member)
+    return quantity.unit(joint_types[member])
+
+
+def _spectrum(time: FloatArray, recorded: FloatArray, fitted: FloatArray, noise: float) -> Spectrum:
+    """Return densities in bands of equal width in octaves, from samples at equal steps."""
+    count, step = len(time), float(time[1] - time[0])
+    window = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** WINDOW_POWER
+    unit = math.sqrt(2 * step / float(np.sum(window**2)))
+    moving = float(np.ptp(recorded)) > ROUNDING * float(np.max(np.abs(recorded)))
+    lines = [unit * moving * np.fft.rfft(window * (row - row.mean())) for row in (recorded, fitted)]
+    first, end = min(FIRST_LINE, count // 4), len(lines[0]) - 1
+    starts = np.unique(np.geomspace(first, end, BANDS).astype(int))
+    sizes = np.diff(np.append(starts, len(lines[0])))
+    means = [
+        np.add.reduceat(np.real(one * np.conj(other)), starts) / sizes
+        for one, other in (lines[:1] * 2, lines[::-1], lines[1:] * 2)
+    ]
+    frequencies = (starts + (sizes - 1) / 2) / (count * step)
+    own, shared, smooth = means
+    passed = np.flatnonzero(shared > FOLLOWED * own)
+    last = int(passed[-1]) if passed.size else len(starts) - 1
+    cutoff = math.nan if last == len(starts) - 1 else float(frequencies[last : last + 2].mean())
+    return Spectrum(frequencies, np.sqrt(own), np.sqrt(smooth), noise * math.sqrt(2 * step), cutoff)

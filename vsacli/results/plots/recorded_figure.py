@@ -1,0 +1,134 @@
+"""Recorded signals and the splines that stand for them: samples, residual and spectrum of each component."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from vsacli.results.plots.drawing import ZERO, draw_curve
+from vsacli.results.plots.panels import PANEL_WIDTH, AxesGrid, add_title, complete, folding, share_time
+from vsacli.results.plots.styles import DIFFERENCE, LineStyle, house_style, line_handle, line_style
+from vsacli.results.recorded_curves import Highest, RecordedCurve
+
+COLUMNS, MOST_ROWS = 4, 14
+ROW_HEIGHT = 1.8
+"""Inches."""
+
+LEAST_DENSITY = 1e-12
+"""Share of the largest density below which nothing is shown: it is rounding."""
+
+_SAMPLES: dict[str, Any] = {"color": "0.65", "linewidth": 3.0}
+_NOISE: dict[str, Any] = {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (1, 2))}
+_CUTOFF: dict[str, Any] = {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (5, 2))}
+_BAND: dict[str, Any] = {"facecolor": "0.93", "edgecolor": "none", "zorder": 0.4}
+_ENDS: dict[str, Any] = {"facecolor": "#fde9c8", "edgecolor": "none", "zorder": 0.4}
+_FIT = LineStyle(line_style(1).color, "-", "")
+
+
+def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
+    """Draw four panels for each component: samples and spline, their difference, and two spectra."""
+    with house_style():
+        rows, folds = folding(len(curves), MOST_ROWS)
+        figure = Figure((COLUMNS * folds * PANEL_WIDTH, ROW_HEIGHT * rows + 1.2), layout="constrained")
+        grid = figure.add_gridspec(rows, COLUMNS * folds).subplots(squeeze=False)
+        panels = grid.reshape(rows, folds, COLUMNS).swapaxes(0, 1).reshape(-1, COLUMNS)
+        for unused in panels[len(curves) :].flat:
+            unused.remove()
+        _label_axes(panels[: len(curves)], curves, rows)
+        handles: list[Artist] = [Line2D([], [], **_SAMPLES, label="recorded"), line_handle(_FIT, "spline")]
+        for curve, (signal, residual, spectrum, highest) in zip(curves, panels, strict=False):
+            handles += _draw_signal(signal, curve)
+            handles += _draw_residual(residual, curve)
+            handles += _draw_spectrum(spectrum, curve, 0, curve.unit)
+            handles += _draw_spectrum(highest, curve, curve.highest.order, curve.highest.unit)
+            add_title(spectrum, _followed(curve))
+            add_title(highest, _determined(curve.highest))
+        return complete(figure, title, handles)
+
+
+def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) -> None:
+    """Let the panels of a column share a time axis, and name what is at their lower ends."""
+    times = [time for curve in curves for time in curve.recorded.time[[0, -1]].tolist()]
+    span = np.array([min(times), max(times)])
+    for first in range(0, len(panels), rows):
+        fold = panels[first : first + rows]
+        share_time(fold[:, :2], np.ones((len(fold), 2), dtype=bool), span)
+        for axes in fold[-1, 2:]:
+            axes.set_xlabel("frequency [Hz]")
+
+
+def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
+    axes.plot(curve.recorded.time, curve.recorded.values, **_SAMPLES)
+    handles = draw_curve(axes, curve.fitted, 0, _FIT)
+    if not np.any(curve.spectrum.recorded):  # at rest: rounding is no scale
+        middle = float(np.mean(curve.recorded.values))
+        axes.set_ylim(middle - 0.1 * (abs(middle) or 1.0), middle + 0.1 * (abs(middle) or 1.0))
+    add_title(axes, curve.name)
+    axes.set_ylabel(f"[{curve.unit}]")
+    return handles
+
+
+def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
+    """Draw what the spline leaves, the noise that is stated, and the ends whose derivatives mean little."""
+    axes.axhline(0.0, **ZERO)
+    handles = draw_curve(axes, curve.residual, 0, DIFFERENCE)
+    if curve.rms > 0:
+        for level in (-2 * curve.noise, 2 * curve.noise):
+            axes.axhline(level, **_NOISE)
+        handles.append(Line2D([], [], **_NOISE, label="noise as stated (residual: twice)"))
+    else:
+        axes.set_yticks([0.0])
+    first, last = axes.get_xlim()
+    for start, end in ((first, curve.inside[0]), (curve.inside[1], last)):
+        if start < end:
+            axes.axvspan(start, end, **_ENDS)
+    axes.set_xlim(first, last)
+    handles.append(Patch(**_ENDS, label="ends: derivatives unreliable"))
+    add_title(axes, f"{curve.fit}, noise {curve.noise:.2g} {curve.unit}")
+    return handles
+
+
+def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> list[Artist]:
+    """Draw densities of a derivative on logarithmic axes.
+
+    Differentiation multiplies by the frequency: noise that is small in the signal may exceed the motion in
+    its highest derivative.
+    """
+    spectrum = curve.spectrum
+    axes.set_ylabel(rf"[{unit}/$\sqrt{{\mathrm{{Hz}}}}$]")
+    factor = (2 * np.pi * spectrum.frequencies) ** order
+    recorded, fitted, noise = (factor * each for each in (spectrum.recorded, spectrum.fitted, spectrum.noise))
+    top = float(np.max(recorded))
+    if top == 0:
+        return []
+    axes.loglog(spectrum.frequencies, recorded, **_SAMPLES)
+    axes.loglog(spectrum.frequencies, fitted, **_FIT.words)
+    if spectrum.noise > LEAST_DENSITY * float(np.max(spectrum.recorded)):
+        axes.loglog(spectrum.frequencies, noise, **_NOISE)
+    axes.set_ylim(max(LEAST_DENSITY * float(np.max(fitted)), float(np.min(recorded)) / 3), 3 * top)
+    axes.set_xlim(spectrum.frequencies[0], spectrum.frequencies[-1])
+    if math.isnan(spectrum.cutoff):
+        return []
+    axes.axvspan(spectrum.frequencies[0], spectrum.cutoff, **_BAND)
+    axes.axvline(spectrum.cutoff, **_CUTOFF)
+    return [Patch(**_BAND, label="motion's band"), Line2D([], [], **_CUTOFF, label="cut-off of the spline")]
+
+
+def _followed(curve: RecordedCurve) -> str:
+    if not np.any(curve.spectrum.recorded):
+        return "at rest"
+    cutoff = curve.spectrum.cutoff
+    return "all is motion" if math.isnan(cutoff) else f"motion to {cutoff:.3g} Hz, {curve.knots} knots"
+
+
+def _determined(highest: Highest) -> str:
+    stated = "" if math.isnan(highest.deviation) else f" +- {100 * highest.deviation:.2g} %"
+    return f"{highest.name}{stated}"
