@@ -7,13 +7,13 @@ those that are there are not done again. All take an hour, `--records 1` minutes
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterable, Iterator
 from itertools import groupby, product
 from pathlib import Path
 from typing import NamedTuple
 
+import json_lines
 import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # the samples of the tests
@@ -47,10 +47,9 @@ Found = list[tuple[Of, Outcome]]
 
 def read(path: Path) -> Found:
     """What was found before."""
-    lines = map(json.loads, path.read_text().splitlines() if path.exists() else [])
     return [
         (Of(*of), Outcome(**{**it, "torque": Error(*it["torque"]), "fourth": Error(*it["fourth"])}))
-        for of, it in lines
+        for of, it in json_lines.read(path)
     ]
 
 
@@ -61,9 +60,7 @@ def run(path: Path, records: int) -> None:
     for of in (Of(*each) for each in product(seeds, RATES, MOTIONS, COLOURS)):
         if of not in done:
             found = outcomes(of.motion, of.colour, of.seed, of.rate)
-            lines = [json.dumps((of, each._asdict()), default=np.ndarray.item) + "\n" for each in found]
-            with path.open("a") as file:
-                file.writelines(lines)
+            json_lines.add(path, [(of, each._asdict()) for each in found])
 
 
 def percent(values: Iterable[float]) -> str:

@@ -19,10 +19,10 @@ DEVIATION = 1e-4
 """Of noise before it is filtered, rad."""
 
 _bump = (Polynomial([0, 1]) * Polynomial([1, -1])) ** 4
-_BLEND = _bump.integ() / _bump.integ()(1)
+BLEND = _bump.integ() / _bump.integ()(1)
 """From 0 to 1 with four derivatives that are zero at both ends."""
 
-_MINIMUM_JERK = Polynomial([0, 0, 0, 10, -15, 6])
+MINIMUM_JERK = Polynomial([0, 0, 0, 10, -15, 6])
 
 
 class Record(NamedTuple):
@@ -58,12 +58,12 @@ def _sum_of_sines(time, seed, frequencies):
 
 def pauses(time, seed):
     """From rest to rest with polynomials of degree 9, and pauses between."""
-    return _rest_to_rest(time, seed, _BLEND)
+    return _rest_to_rest(time, seed, BLEND)
 
 
 def minimum_jerk(time, seed):
     """From rest to rest with polynomials of degree 5: their fourth derivative has impulses."""
-    return _rest_to_rest(time, seed, _MINIMUM_JERK)
+    return _rest_to_rest(time, seed, MINIMUM_JERK)
 
 
 def _rest_to_rest(time, seed, blend):
@@ -81,13 +81,13 @@ def _rest_to_rest(time, seed, blend):
 def velocity_steps(time, seed, duration=0.05):
     """Steps of the velocity, each smoothed over 50 ms."""
     rng = np.random.default_rng(seed)
-    ramp, start = _BLEND.integ(), 1.0
+    ramp, start = BLEND.integ(), 1.0
     value, fourth = np.zeros_like(time), np.zeros_like(time)
     while start < time[-1] - 1:
         size, place = rng.uniform(-1, 1), (time - start) / duration
         inside, after = np.clip(place, 0, 1), np.maximum(place - 1, 0)
         value += size * duration * (ramp(inside) + after)
-        fourth += size * _BLEND.deriv(3)(inside) / duration**3 * ((place > 0) & (place < 1))
+        fourth += size * BLEND.deriv(3)(inside) / duration**3 * ((place > 0) & (place < 1))
         start += rng.uniform(0.6, 1.5)
     return np.array([value, fourth])
 

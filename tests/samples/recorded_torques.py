@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from oracles.one_joint import Arm, motor_torque
 from scipy.interpolate import make_interp_spline
 
 from samples.noisy_records import MOTIONS, Record, record
+from samples.random_recordings import Recording
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws.cubic import Cubic
@@ -60,7 +62,7 @@ class Outcome(NamedTuple):
     warned: bool
 
 
-def _arm(actuator, *, horizontal: bool = False) -> Robot:
+def lifting(actuator, *, horizontal: bool = False) -> Robot:
     """One joint that lifts a link, or turns it in a horizontal plane, of the size of an elbow."""
     link = Link(mass=5.0894, com=(-0.15, 0, 0), inertia=Inertia(xx=0.0104, yy=0.0434, zz=0.0434))
     joint = Joint(
@@ -77,12 +79,51 @@ def _arm(actuator, *, horizontal: bool = False) -> Robot:
 
 MOTOR, SPRING = Motor(inertia=1.98, damping=1e-4), Cubic(k=400, k_c=2000)
 ARMS = {
-    "antagonistic": _arm(Antagonistic(motor=(MOTOR, MOTOR), spring=(SPRING, SPRING))),
-    "elastic": _arm(Elastic(motor=MOTOR, stiffness=1000.0)),
-    "soft": _arm(Elastic(motor=Motor(inertia=0.3, damping=1e-4), stiffness=60.0)),
-    "softest": _arm(Elastic(motor=MOTOR, stiffness=2.0), horizontal=True),
+    "antagonistic": lifting(Antagonistic(motor=(MOTOR, MOTOR), spring=(SPRING, SPRING))),
+    "elastic": lifting(Elastic(motor=MOTOR, stiffness=1000.0)),
+    "soft": lifting(Elastic(motor=Motor(inertia=0.3, damping=1e-4), stiffness=60.0)),
+    "softest": lifting(Elastic(motor=MOTOR, stiffness=2.0), horizontal=True),
 }
 """From one whose preload outweighs the motion to one whose torque is little else than d4q."""
+
+
+class Verdict(NamedTuple):
+    """What a run along a random recording says, and how right it is.
+
+    Attributes:
+        verdict: of the run.
+        torque: error of `tau_motor`.
+    """
+
+    verdict: str
+    torque: Error
+
+
+def robot_of(arm: Arm) -> Robot:
+    """Return the robot of a random recording."""
+    motor = Motor(inertia=arm.motor_inertia, damping=1e-4)
+    if not arm.antagonistic:
+        return lifting(Elastic(motor=motor, stiffness=arm.k), horizontal=arm.horizontal)
+    spring = Cubic(k=arm.k, k_c=arm.k_c)
+    return lifting(Antagonistic(motor=(motor, motor), spring=(spring, spring)), horizontal=arm.horizontal)
+
+
+def judge(recording: Recording) -> Verdict:
+    """Compute motor torques along a random recording, and compare them with the truth in closed form."""
+    q, stiffness = recording.position.recorded[:, None], recording.stiffness
+    firm = {} if stiffness is None else {"stiffness": stiffness.recorded[:, None]}
+    trajectory = Trajectory.from_samples(recording.time, q, **firm)
+    run = Run(robot_of(recording.arm), trajectory)
+    blocks = list(run)
+    true = motor_torque(recording.arm, *recording.truth).T
+    starts, ends = zip(*(each.fit.doubtful for each in trajectory.estimates.values()), strict=True)
+    time = recording.time
+    inside = (time >= min(max(starts), time[-1] / 4)) & (time <= time[-1] - min(max(ends), time[-1] / 4))
+    torque, deviation = (
+        np.concatenate([getattr(block, name) for block in blocks])[inside, 0, : true.shape[1]]
+        for name in ("tau_motor", "tau_motor_std")
+    )
+    return Verdict(run.report().verdict, _error(torque, deviation, true[inside]))
 
 
 def outcomes(motion: str, colour: str, seed: int, rate: int) -> Iterator[Outcome]:
