@@ -180,6 +180,22 @@ def test_what_looks_wrong_is_told(fault: str, arm: Robot, record: Recorded, tmp_
     assert any(re.search(words, doubt) for doubt in told_of), told_of
 
 
+@pytest.mark.parametrize("exchanged", [True, False])
+def test_torques_that_pull_against_each_other_are_exchanged_or_reversed_not_both(
+    exchanged: bool, arm: Robot, tmp_path: Path
+) -> None:
+    """While hardly anything but the stiffness moves, each torque is nearly the other one's negative."""
+    quiet = excited(arm, MOTION._replace(reach=[0.05] * 3)).noisy(seed=1)
+    change = put(np.s_[:, 0], (lambda each: each[:, ::-1].copy()) if exchanged else np.negative)
+    path = changed(quiet, tau_motor=change).write(tmp_path / "record.csv", arm)
+    (found,) = identify(arm, path, fit=["joints.*.actuator.spring.k"]).records
+    told_of = " ".join(found.doubts)
+    assert (
+        "columns look exchanged: base.tau_motor_1 is like base.tau_motor_2 computed" in told_of
+    ) == exchanged
+    assert ("base.tau_motor_1 runs the other way" in told_of) == (not exchanged)
+
+
 @pytest.mark.slow
 def test_a_clean_record_is_not_doubted(arm: Robot, record: Recorded, tmp_path: Path) -> None:
     """Nor one whose positions come from encoders with 14 bits, whose torques come at a fifth of the rate."""

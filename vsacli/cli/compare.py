@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from vsacli.results.pages.document import InputText
     from vsacli.studies.measured import Comparison
 
+LARGEST_DRAWN = 1e30
+"""Value up to which axes have ticks and pages, in single precision, numbers."""
+
 
 @click.command(
     "compare",
@@ -64,8 +67,9 @@ def compare(
     them, elbow.q, elbow.tau_motor_1, or elbow.tau_motor_shaft_1 for the motor's side of its gear; a unit in
     brackets may follow. Others are left out, unless --columns says what they stand for.
 
-    The report gives, for each signal, the error, the gain and offset of measured over computed values, and
-    the lag behind the others.
+    Columns such as q_measured or q_actual stand for what the robot did, and go before q; of a simulation they
+    are compared with q_actual. The report gives, for each signal, the error, and gain and offset of measured
+    over computed values and the lag behind the others, each with its standard error.
     """
     check_plotted(folder)
     from vsacli.base.outputs import Outputs
@@ -123,11 +127,14 @@ def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
 
 def _curves(comparison: Comparison) -> dict[str, list[MeasuredCurve]]:
     """The signals that were compared, by variable."""
+    import numpy as np
+
     from vsacli.results.measured_curves import MeasuredCurve
 
     curves: dict[str, list[MeasuredCurve]] = {}
     for each in comparison.signals:
         if each.samples:
-            curve = MeasuredCurve(each.column, each.unit, each.rms, each.time, each.computed, each.measured)
+            drawn = np.clip(each.measured, -LARGEST_DRAWN, LARGEST_DRAWN)
+            curve = MeasuredCurve(each.column, each.unit, each.rms, each.time, each.computed, drawn)
             curves.setdefault(each.variable, []).append(curve)
     return curves

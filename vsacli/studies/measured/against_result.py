@@ -1,35 +1,42 @@
-"""A recording beside the result it was meant to be: when it begins, and how far apart both are."""
+"""A recording compared with the result it was meant to be: when it begins, and how far apart both are."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.simulation_variables import actual, measured
+from vsacli.base.variables import Variable
 from vsacli.documents.columns_file import load_columns
 from vsacli.results.store.reader import StoredResult
 from vsacli.results.store.simulation import open_stored
-from vsacli.studies.measured.agreement import Agreement, straight_line
-from vsacli.studies.measured.alignment import FEWEST_SAMPLES, Alignment, Pairing, align, lag_of
+from vsacli.studies.measured.agreement import Agreement
+from vsacli.studies.measured.alignment import Alignment, align
 from vsacli.studies.measured.comparison_report import SHOWN_LAG, Comparison
-from vsacli.studies.measured.measured_columns import Measured, Recording, known_columns, read_recording
-from vsacli.studies.measured.slips import slips
+from vsacli.studies.measured.exchange import exchanged_places
+from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square, still_signal
+from vsacli.studies.measured.measured_columns import (
+    Measured,
+    Recording,
+    known_columns,
+    preferred,
+    read_recording,
+    stand_ins,
+)
+from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Computed, Pairing, interpolated
+from vsacli.studies.measured.slips import NOTABLE, WILD, slips
 
 POSITIONS = ("q", "theta")
 """By these a recording is aligned if it has any: torques depend on the model, positions were commanded."""
 
-FEWEST_STEPS = 4
-"""Steps of a result through which a cubic spline goes."""
-
 OTHER_UNIT = 100
 """How many times longer or shorter than the result a recording is whose times may be in another unit."""
-
-LAG_SHARE = 0.05
-"""Share of the duration within which a lag is looked for."""
 
 SAME_LAG = 0.2
 """Relative distance of lags up to which they are one, which the clock may have."""
@@ -62,31 +69,28 @@ def compare(
     if not isinstance(result, StoredResult):
         with open_stored(result) as stored:
             return compare(stored, recording, begins_at, columns)
-    variables = [result.declared[name] for name in result.variables]
-    places = known_columns(result, variables)
-    recorded = read_recording(recording, places, "the result", load_columns(columns))
-    computed = [_interpolated(result, signal) for signal in recorded.signals]
+    places = known_columns(result, stand_ins(_variables(result)))
+    recorded, behind = _told(read_recording(recording, places, "the result", load_columns(columns)))
+    computed = _interpolated(result, recorded.signals)
     duration = float(result.time[-1] - result.time[0])
     pairings = [
         Pairing(function, duration, *_sampled(recorded, signal))
         for function, signal in zip(computed, recorded.signals, strict=True)
     ]
-    alignment = _aligned(recorded, pairings, recording) if begins_at is None else Alignment(begins_at, 1.0)
+    alignment = _aligned(recorded, pairings, recording) if begins_at is None else Alignment(begins_at)
     covered = _covered(recorded.time - alignment.begins_at, duration, recording)
-    signals = tuple(
-        _agreement(signal, pairing, alignment.begins_at, result)
-        for signal, pairing in zip(recorded.signals, pairings, strict=True)
-    )
+    signals = _agreements(result, recorded, pairings, alignment)
     notes = (
         *_alignment_notes(alignment),
         *_common_lag(signals, alignment.begins_at),
         *slips(signals, _gear_ratios(recorded, result)),
-        *_left_out(recorded),
+        *_left_out(recorded, behind),
     )
     return Comparison(
         result=str(result.path),
         recording=str(recording),
         begins_at=alignment.begins_at,
+        begins_at_error=alignment.error,
         found=begins_at is None,
         duration=duration,
         compared=covered,
@@ -94,6 +98,24 @@ def compare(
         notes=notes,
         sources=(recorded.table.source,),
     )
+
+
+def _variables(result: StoredResult) -> dict[str, Variable]:
+    """Variables by their plain names: of a simulation what happened, not what was commanded."""
+    found: dict[str, Variable] = {}
+    for name in result.variables:
+        plain = name.removesuffix(measured("")).removesuffix(actual(""))
+        happened = next(each for each in (actual(plain), plain, name) if each in result.variables)
+        found[plain] = result.declared[happened]
+    return found
+
+
+def _told(recorded: Recording) -> tuple[Recording, list[str]]:
+    """The recording with one column for each signal, the most direct one, and the names of the others."""
+    best = {signal.column for signal in preferred(recorded.signals).values()}
+    kept = tuple(signal for signal in recorded.signals if signal.column in best)
+    behind = [signal.column for signal in recorded.signals if signal.column not in best]
+    return recorded._replace(signals=kept), behind
 
 
 def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatArray]:
@@ -105,43 +127,39 @@ def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatAr
     return recorded.time[there], signal.values[there]
 
 
-def _interpolated(result: StoredResult, signal: Measured) -> Callable[[FloatArray], FloatArray]:
-    """What was computed of a signal as a function of the time from the beginning of the result.
-
-    NaN beyond the result and next to steps that have no value.
-    """
-    from scipy.interpolate import make_interp_spline
-
-    place, time = signal.place, result.time - result.time[0]
-    values = result.read(place.variable)[:, place.joint]
-    values = np.asarray(values if place.motor is None else values[:, place.motor - 1], dtype=float)
-    known = np.isfinite(values)
-    if known.sum() < FEWEST_STEPS:
-        return lambda times: np.full(np.shape(times), np.nan)
-    spline = make_interp_spline(time[known], values[known], k=3)
-    gaps = np.where(known, 0.0, np.nan)
-
-    def at(times: FloatArray) -> FloatArray:
-        return np.asarray(spline(times) + np.interp(times, time, gaps, left=np.nan, right=np.nan))
-
-    return at
+def _interpolated(result: StoredResult, signals: Sequence[Measured]) -> list[Computed]:
+    """What was computed of each signal, as a function of the time from the beginning of the result."""
+    found, time = [], result.time - result.time[0]
+    names = {signal.place.variable for signal in signals}
+    stored = {name: np.asarray(result.read(name), dtype=float) for name in names}
+    largest = {
+        name: float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+        for name, values in stored.items()
+    }
+    for variable, joint, motor in (signal.place.target for signal in signals):
+        values = stored[variable][:, joint]
+        found.append(interpolated(time, values if motor is None else values[:, motor - 1], largest[variable]))
+    return found
 
 
 def _aligned(recorded: Recording, pairings: Sequence[Pairing], path: str | Path) -> Alignment:
-    positions = [
-        pairing
-        for signal, pairing in zip(recorded.signals, pairings, strict=True)
-        if signal.place.variable.startswith(POSITIONS)
-    ]
-    alignment = align(positions) if positions else None
-    alignment = alignment or align(pairings)
+    groups = [_group(signal) for signal in recorded.signals]
+    of_positions = [signal.place.variable.startswith(POSITIONS) for signal in recorded.signals]
+    positions = align(list(compress(pairings, of_positions)), list(compress(groups, of_positions)))
+    alignment = positions or align(pairings, groups)
     if alignment is None:
         raise InputError.one(
-            "is like the computed signals at no shift in time; is it the recording of this motion? "
-            f"{_other_unit(pairings[0])}--begins-at says when in the recording the result begins",
+            "is like the computed signals at no shift in time; is it the recording of this motion, and does "
+            f"it move beyond its noise? {_other_unit(pairings[0])}--begins-at says when in the recording the "
+            "result begins",
             path,
         )
     return alignment
+
+
+def _group(signal: Measured) -> tuple[str, str]:
+    """Columns of a group may have been exchanged for each other."""
+    return signal.place.variable, signal.place.unit
 
 
 def _other_unit(pairing: Pairing) -> str:
@@ -166,18 +184,36 @@ def _covered(time: FloatArray, duration: float, path: str | Path) -> float:
     return covered
 
 
-def _agreement(signal: Measured, pairing: Pairing, begins_at: float, result: StoredResult) -> Agreement:
-    time = pairing.time - begins_at
-    computed = pairing.computed(time)
-    there = np.isfinite(computed)
-    time, computed, measured = time[there], computed[there], pairing.measured[there]
-    error = measured - computed
-    place = signal.place
+def _agreements(
+    result: StoredResult, recorded: Recording, pairings: Sequence[Pairing], alignment: Alignment
+) -> tuple[Agreement, ...]:
+    """Every column against what was computed."""
+    groups = [_group(signal) for signal in recorded.signals]
+    places = exchanged_places(pairings, groups, alignment.begins_at)
+    followed = [
+        None if place == index else recorded.signals[place].column for index, place in enumerate(places)
+    ]
+    return tuple(
+        _agreement(result, signal, pairing, alignment, follows)
+        for signal, pairing, follows in zip(recorded.signals, pairings, followed, strict=True)
+    )
+
+
+def _agreement(
+    result: StoredResult, signal: Measured, pairing: Pairing, alignment: Alignment, follows: str | None
+) -> Agreement:
+    computed, there = pairing.overlap(alignment.begins_at)
+    time, computed = (pairing.time - alignment.begins_at)[there], computed[there]
+    values = pairing.measured[there]
+    error, place = values - computed, signal.place
     worst = int(np.argmax(np.abs(error))) if error.size else None
-    offset, gain, correlation = straight_line(computed, measured) if error.size else (math.nan,) * 3
-    scale = math.sqrt(np.mean(computed**2)) if error.size else math.nan
-    rms = math.sqrt(np.mean(error**2)) if error.size else math.nan
-    lag = lag_of(pairing, begins_at, LAG_SHARE * pairing.duration) if math.isfinite(gain) else math.nan
+    rms, scale = root_mean_square(error), root_mean_square(computed)
+    fit = LineFit() if follows else fit_line(pairing, alignment.begins_at)
+    still = still_signal(pairing, alignment.begins_at, fit) if error.size and not follows else None
+    line = LineFit() if still else fit
+    left_out = int(np.count_nonzero(there) - np.count_nonzero(fit.used)) if fit.used.size else 0
+    usual = root_mean_square(error[fit.used[there]]) if left_out else 0.0
+    wild = max(WILD * usual, NOTABLE * float(np.ptp(computed))) if left_out else 0.0
     return Agreement(
         column=signal.column,
         variable=place.variable,
@@ -189,13 +225,19 @@ def _agreement(signal: Measured, pairing: Pairing, begins_at: float, result: Sto
         share=rms / scale if scale > 0 else math.nan,
         worst=math.nan if worst is None else float(error[worst]),
         worst_time=math.nan if worst is None else float(time[worst]),
-        offset=offset,
-        gain=gain,
-        correlation=correlation,
-        lag=lag,
+        offset=line.offset,
+        gain=line.gain,
+        correlation=line.correlation,
+        lag=line.lag,
         time=time,
         computed=computed,
-        measured=measured,
+        measured=values,
+        offset_error=line.offset_error,
+        gain_error=line.gain_error,
+        lag_error=math.hypot(line.lag_error, np.nan_to_num(alignment.error)),
+        follows=follows,
+        still=still,
+        left_out=left_out if left_out and np.abs(error).max() > wild else 0,
     )
 
 
@@ -207,9 +249,11 @@ def _alignment_notes(alignment: Alignment) -> Iterator[str]:
 
 def _common_lag(signals: Sequence[Agreement], begins_at: float) -> Iterator[str]:
     """Where all that is no position lags alike: a joint that does not follow its command misleads."""
-    lags = [signal.lag for signal in signals if not signal.variable.startswith(POSITIONS)]
+    others = [signal for signal in signals if not signal.variable.startswith(POSITIONS)]
+    lags = [signal.lag for signal in others if math.isfinite(signal.lag)]
     middle = float(np.median(lags)) if lags else math.nan
-    if abs(middle) >= SHOWN_LAG and max(abs(lag - middle) for lag in lags) <= SAME_LAG * abs(middle):
+    sure = all(abs(signal.lag) > 3 * signal.lag_error for signal in others if math.isfinite(signal.lag))
+    if sure and abs(middle) >= SHOWN_LAG and max(abs(lag - middle) for lag in lags) <= SAME_LAG * abs(middle):
         yield (
             f"all signals but positions lag by {1e3 * middle:+.1f} ms; if the joints did not follow their "
             f"commands, --begins-at {begins_at + middle:.4f} may be right"
@@ -225,6 +269,8 @@ def _gear_ratios(recorded: Recording, result: StoredResult) -> list[float]:
     ]
 
 
-def _left_out(recorded: Recording) -> Iterator[str]:
+def _left_out(recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
+    if behind:
+        yield f"not compared, as other columns say what the robot did: {', '.join(behind)}"
     if recorded.others:
         yield f"not compared, as the result has none of that name: {', '.join(recorded.others)}"

@@ -1,63 +1,54 @@
 """When in a recording the computed motion begins: the shift at which measured signals follow computed ones.
 
 Clocks of a laboratory start before the motion, and a recording may end before it or be cut out of its middle.
-At first the measured values are taken as they are, and the shift is that of the smallest mean square error.
-If no shift will do, they are compared by the straight line through them, so that wrong offsets, units and
-gains do not matter, and at last by a falling one: a sensor may be mounted the other way round, but half a
-period of a vibration looks alike. Since a line fits many a piece of a smooth motion, what lies outside the
-recording then counts as not explained.
+Two steps find the shift. A search over all shifts takes the one at which the columns together leave least
+unexplained (`likeness.py`), each column's part of which is bounded. Then each column says by how much it lags
+behind that shift, with offset and gain of its own (`line_fit.py`), and the columns that agree are averaged,
+weighted by their standard errors. So neither offsets, units and signs nor a minority of columns that are late
+or exchanged move the result.
 """
 
 from __future__ import annotations
 
-import enum
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.studies.measured.exchange import exchanged_places
+from vsacli.studies.measured.likeness import Moments, exactness, moments_of, unlikeness
+from vsacli.studies.measured.line_fit import LineFit, fit_line
+from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Pairing, tame
 
 MOST_POINTS = 200_000
 """Points of the grid on which the shift is looked for first; the computed signal is known between them."""
 
 EXPLAINED = 0.5
-"""Share of the variance of the computed signals that the best shift must explain."""
+"""Share of the variance that the best shift must explain in half of the columns."""
 
 FEWEST_COVERED = 0.5
 """Share of the result, or of the recording if that is shorter, over which both must overlap."""
 
-COVERAGE_WEIGHT = 1e-4
-"""Of two shifts that explain as much, the one by which the recording covers more is taken."""
-
-AS_GOOD = 0.99
-"""Share of the best explanation from which on another shift is as good."""
-
-ROUNDING = 1e-6
-"""Share of the variance of a recording below which sums of transforms are but rounding."""
-
-FEWEST_SAMPLES = 4
-"""Samples by which two signals can be told to be alike."""
+AS_GOOD = 0.5
+"""Difference of the logarithms of what two shifts leave unexplained, up to which one is as good as the
+other."""
 
 OWN_WIDTH = 0.05
-"""Share of the duration around a shift that belongs to the same maximum."""
+"""Share of the duration around a shift that belongs to the same minimum."""
 
+MOST_CANDIDATES = 5
+"""Minima of the search that are looked at closely."""
 
-class Pairing(NamedTuple):
-    """A computed signal and what was measured of it.
+LONGEST_STEP = 3.0
+"""Steps between samples of a column, in usual ones, beyond which nothing is known between them."""
 
-    Attributes:
-        computed: values at times from the beginning of the result, (samples,), NaN outside.
-        duration: of the result, s.
-        time: of the measured values, s, ascending.
-        measured: (samples,).
-    """
+ROUNDS = 3
+"""How often the columns are asked by how much they lag; the second answer hardly differs from the first."""
 
-    computed: Callable[[FloatArray], FloatArray]
-    duration: float
-    time: FloatArray
-    measured: FloatArray
+APART = 3.5
+"""Distance from the middle, in deviations, from which on a column does not count."""
 
 
 class Alignment(NamedTuple):
@@ -65,94 +56,100 @@ class Alignment(NamedTuple):
 
     Attributes:
         begins_at: time of the recording, s, at which the result begins; negative if that is before it.
-        explained: share of the variance of the computed signals that the measured ones explain there.
+        error: standard error, s; NaN if it was given, or no column says.
         others: further times that explain nearly as much, as in periodic motions.
     """
 
     begins_at: float
-    explained: float
+    error: float = math.nan
     others: tuple[float, ...] = ()
 
 
-class Way(enum.Enum):
-    """How measured values are held against computed ones."""
-
-    AS_THEY_ARE = enum.auto()
-    BY_A_RISING_LINE = enum.auto()
-    BY_ANY_LINE = enum.auto()
-
-
 @np.errstate(all="ignore")  # numbers too large, or too few, explain nothing
-def align(pairings: Sequence[Pairing]) -> Alignment | None:
-    """The shift that explains most; None if there is none that explains half, or nothing moves."""
-    moving = [pairing for pairing in pairings if _moves(pairing)]
-    for way in Way if moving else ():
-        found = _search(moving, way)
-        if found is not None and found.explained >= EXPLAINED:
-            return found
-    return None
+def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | None:
+    """The shift that explains most; None if there is none that explains half, or nothing moves.
 
-
-def _search(pairings: Sequence[Pairing], way: Way) -> Alignment | None:
-    step = _step(pairings[0])
-    shifts, explained = _on_grid(pairings, step, way)
-    best = int(np.argmax(explained))
-    if not explained[best] > 0:
-        return None
-    apart = np.abs(shifts - shifts[best]) > OWN_WIDTH * pairings[0].duration
-    peaks = (explained > np.roll(explained, 1)) & (explained >= np.roll(explained, -1))
-    others = shifts[peaks & apart & (explained >= AS_GOOD * explained[best])]
-    shift, of_covered = _refined(pairings, float(shifts[best]), step, way)
-    share = of_covered if way is Way.AS_THEY_ARE else float(explained[best])
-    return Alignment(shift, share, tuple(others.tolist()))
-
-
-def _moves(pairing: Pairing) -> bool:
-    values = pairing.computed(np.linspace(0.0, pairing.duration, 1000))
-    return bool(np.nanstd(values) > 0 and np.std(pairing.measured) > 0)
-
-
-def _step(pairing: Pairing) -> float:
-    """Of the grid: that of the recording, unless it is finer than the grid has points."""
-    span = pairing.duration + float(pairing.time[-1])
-    return max(float(np.median(np.diff(pairing.time))), span / MOST_POINTS)
-
-
-def _on_grid(pairings: Sequence[Pairing], step: float, way: Way) -> tuple[FloatArray, FloatArray]:
-    """Shifts, and what each explains of the signals, the mean of the shares of their variances."""
-    grid = np.arange(0.0, pairings[0].duration + step / 2, step)
-    recorded = np.arange(0.0, float(pairings[0].time[-1]) + step / 2, step)
-    shifts = step * np.arange(1 - len(grid), len(recorded), dtype=float)
-    explained = [
-        _by_shift(pairing.computed(grid), np.interp(recorded, pairing.time, pairing.measured), way)
-        for pairing in pairings
-    ]
-    return shifts, np.asarray(np.mean(explained, axis=0))
-
-
-def _by_shift(computed: FloatArray, measured: FloatArray, way: Way) -> FloatArray:
-    """Share of the variance of the computed values that measured ones explain.
-
-    For every shift at which both overlap, (len(computed) + len(measured) - 1,).
+    Args:
+        pairings: all columns that may say something.
+        groups: for each, what it has in common with those with which it may have been exchanged.
     """
-    there = np.isfinite(computed).astype(float)
-    middle = float(np.nanmean(computed))
-    computed, measured = np.where(there > 0, computed - middle, 0.0), measured - middle
-    total = float(np.sum(computed**2))
-    ones = np.ones_like(measured)
-    count = np.maximum(np.round(_correlated(there, ones)), 1.0)
-    both, squared = _correlated(computed, measured), _correlated(there, measured**2)
-    if way is Way.AS_THEY_ARE:
-        covered = count / there.sum()
-        error = (_correlated(computed**2, ones) - 2 * both + squared) / count
-        share = 1 - error * there.sum() / total + COVERAGE_WEIGHT * covered
-        return np.where(covered >= FEWEST_COVERED * min(1.0, len(measured) / len(computed)), share, -np.inf)
-    mean = _correlated(there, measured) / count
-    together = both - _correlated(computed, ones) * mean
-    spread = squared - count * mean * mean
-    flat = spread <= ROUNDING * count * float(np.var(measured))
-    along = together if way is Way.BY_ANY_LINE else np.maximum(together, 0.0)
-    return np.where(flat, 0.0, along * along / np.where(flat, 1.0, spread)) / total
+    moving = [pairing.computed.moves and float(np.ptp(tame(pairing.measured))) > 0 for pairing in pairings]
+    pairings = [pairing for pairing, moves in zip(pairings, moving, strict=True) if moves]
+    groups = [group for group, moves in zip(groups, moving, strict=True) if moves]
+    if not pairings:
+        return None
+    candidates, others = _search(pairings)
+    refined = [_refined(pairings, groups, each, _step(pairings)) for each in candidates]
+    if not refined:
+        return None
+    _, shift, paired = min(refined, key=lambda each: each[0])
+    if np.median([_explained(pairing, shift) for pairing in paired]) < EXPLAINED:
+        return None
+    shift, error = _agreed(paired, shift)
+    return Alignment(shift, error, others if len(candidates) > 1 else ())
+
+
+def _search(pairings: Sequence[Pairing]) -> tuple[list[float], tuple[float, ...]]:
+    """Shifts of the lowest minima, lowest first, and those besides the first that are as good."""
+    step = _step(pairings)
+    shifts, left = _on_grid(pairings, step)
+    minima = np.flatnonzero((left < np.roll(left, 1)) & (left <= np.roll(left, -1)) & (left < 0))
+    chosen: list[int] = []
+    for index in minima[np.argsort(left[minima])].tolist():
+        if all(abs(shifts[index] - shifts[each]) > OWN_WIDTH * pairings[0].duration for each in chosen):
+            chosen.append(index)
+        if len(chosen) == MOST_CANDIDATES:
+            break
+    others = [float(shifts[each]) for each in chosen[1:] if left[each] <= left[chosen[0]] + AS_GOOD]
+    return [float(shifts[each]) for each in chosen], tuple(others)
+
+
+def _step(pairings: Sequence[Pairing]) -> float:
+    """Of the grid: that of the most frequent column, unless it is finer than the grid has points."""
+    span = pairings[0].duration + max(float(pairing.time[-1]) for pairing in pairings)
+    return max(min(float(np.median(np.diff(each.time))) for each in pairings), span / MOST_POINTS)
+
+
+def _on_grid(pairings: Sequence[Pairing], step: float) -> tuple[FloatArray, FloatArray]:
+    """Shifts, and what each leaves unexplained, the mean of all columns."""
+    grid = np.arange(0.0, pairings[0].duration + step / 2, step)
+    last = max(float(pairing.time[-1]) for pairing in pairings)
+    recorded = np.arange(0.0, last + step / 2, step)
+    shifts = step * np.arange(1 - len(grid), len(recorded), dtype=float)
+    left = np.mean([_by_shift(pairing, grid, recorded) for pairing in pairings], axis=0)
+    return shifts, np.asarray(left)
+
+
+def _by_shift(pairing: Pairing, grid: FloatArray, recorded: FloatArray) -> FloatArray:
+    """What one column leaves unexplained at every shift, (len(grid) + len(recorded) - 1,)."""
+    tamed, computed = tame(pairing.measured), pairing.computed.at(grid)
+    there, known = np.isfinite(computed), _known(pairing.time, recorded)
+    middle, center = float(np.nanmean(computed)), float(np.mean(tamed))
+    first = np.where(there, computed - middle, 0.0)
+    second = np.where(known, np.interp(recorded, pairing.time, tamed) - center, 0.0)
+    inside, ones = there.astype(float), known.astype(float)
+    count = np.round(_correlated(inside, ones))
+    moments = Moments(
+        np.maximum(count, 1.0),
+        _correlated(first, ones),
+        _correlated(inside, second),
+        _correlated(first**2, ones),
+        _correlated(inside, second**2),
+        _correlated(first, second),
+        apart=center - middle,
+        measured_variance=float(np.var(tamed)),
+    )
+    needed = max(FEWEST_SAMPLES, FEWEST_COVERED * min(inside.sum(), ones.sum()))
+    covered = moments.spreads()[0] / float(np.sum(first**2))
+    return np.where(count >= needed, np.clip(covered, 0, 1) * unlikeness(moments, exactness(tamed)), 0.0)
+
+
+def _known(time: FloatArray, recorded: FloatArray) -> BoolArray:
+    """Which points of a grid lie between samples that follow each other as usual."""
+    steps = np.diff(time)
+    follows = np.append(steps <= LONGEST_STEP * np.median(steps), True)
+    before = np.clip(np.searchsorted(time, recorded, side="right") - 1, 0, len(time) - 1)
+    return np.asarray((recorded >= time[0]) & (recorded <= time[-1]) & follows[before])
 
 
 def _correlated(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -164,60 +161,105 @@ def _correlated(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.concatenate([product[size - len(first) + 1 :], product[: len(second)]])
 
 
-def _refined(pairings: Sequence[Pairing], shift: float, step: float, way: Way) -> tuple[float, float]:
-    """The shift between the points of the grid, and what it explains of what the recording covers."""
+def _refined(
+    pairings: Sequence[Pairing], groups: Sequence[object], shift: float, step: float
+) -> tuple[float, float, list[Pairing]]:
+    """Refine a candidate between the points of the grid.
+
+    Returns:
+        What it leaves unexplained, its shift, and the pairings with exchanged columns put right.
+    """
     from scipy.optimize import minimize_scalar
 
-    def unexplained(candidate: float) -> float:
-        return -float(np.mean([_explained(pairing, candidate, way) for pairing in pairings]))
+    exact = [exactness(tame(each.measured)) for each in pairings]
+    thin = [each.thinned() for each in pairings]
+    tamed = [tame(each.measured) for each in thin]
 
-    bounds = (shift - 2 * step, shift + 2 * step)
-    found = minimize_scalar(unexplained, bounds=bounds, method="bounded", options={"xatol": 1e-4 * step})
-    return float(found.x), -float(found.fun)
+    def left(pairs: Sequence[Pairing], candidate: float) -> float:
+        return float(np.mean([_left(*each, candidate) for each in zip(pairs, tamed, exact, strict=True)]))
+
+    found = minimize_scalar(
+        lambda at: left(thin, at),
+        bounds=(shift - 2 * step, shift + 2 * step),
+        method="bounded",
+        options={"xatol": 1e-3 * step},
+    )
+    best = float(found.x)
+    places = exchanged_places(pairings, groups, best)
+    right = [pairings[place].computed for place in places]
+    unexplained = left([each._replace(computed=it) for each, it in zip(thin, right, strict=True)], best)
+    paired = [each._replace(computed=it) for each, it in zip(pairings, right, strict=True)]
+    return unexplained, best, paired
 
 
-def _explained(pairing: Pairing, shift: float, way: Way) -> float:
-    """Share of the variance of the computed values that is explained where both overlap."""
-    computed = pairing.computed(pairing.time - shift)
-    both = np.isfinite(computed)
-    computed, measured = computed[both], pairing.measured[both]
-    if both.sum() < FEWEST_SAMPLES or np.std(computed) == 0 or np.std(measured) == 0:
+def _left(pairing: Pairing, tamed: FloatArray, exact: float, shift: float) -> float:
+    """What one column leaves unexplained at a shift."""
+    moments = moments_of(pairing.overlap(shift)[0], tamed)
+    if moments.samples < FEWEST_SAMPLES:
         return 0.0
-    if way is Way.AS_THEY_ARE:
-        return max(0.0, 1.0 - float(np.mean((measured - computed) ** 2) / np.var(computed)))
-    coefficient = float(np.corrcoef(computed, measured)[0, 1])
-    return coefficient**2 if way is Way.BY_ANY_LINE else max(coefficient, 0.0) ** 2
+    covered = float(moments.spreads()[0] / moments.samples) / pairing.computed.spread**2
+    return min(1.0, covered) * float(unlikeness(moments, exact))
 
 
-@np.errstate(all="ignore")  # where it is infinite or no number, as of too few samples, no lag explains it
-def lag_of(pairing: Pairing, begins_at: float, within: float) -> float:
-    """How much later than the alignment a measured signal follows, s.
+def _explained(pairing: Pairing, shift: float) -> float:
+    """Share of the variance of the measured values that a line explains where both overlap."""
+    moments = moments_of(pairing.overlap(shift)[0], tame(pairing.measured))
+    computed, measured, product = moments.spreads()
+    if moments.samples < FEWEST_SAMPLES or not computed * measured > 0:
+        return 0.0
+    freedom = (moments.samples - 1) / max(float(moments.samples) - 3, 0.5)
+    return float(1 - (1 - product**2 / (computed * measured)) * freedom)
 
-    NaN if no shift up to `within` explains half of what is not explained without, noise from sample to sample
-    apart: the signal disagrees otherwise, or by no more than its noise.
+
+def _agreed(pairings: Sequence[Pairing], shift: float) -> tuple[float, float]:
+    """The shift on which the columns agree that follow their computed signals, and its standard error."""
+    error = math.nan
+    for _ in range(ROUNDS):
+        fits = [fit_line(pairing, shift) for pairing in pairings]
+        found = _average([fit for fit in fits if math.isfinite(fit.lag) and fit.correlation**2 >= EXPLAINED])
+        if found is None:
+            break
+        shift, error = shift + found[0], found[1]
+    return shift, error
+
+
+def _average(fits: Sequence[LineFit]) -> tuple[float, float] | None:
+    """Weighted mean of the lags of columns that agree, and its standard error; None if there is no column.
+
+    Where lags scatter more than their errors say, all errors are wider by that scatter.
     """
-    from scipy.optimize import minimize_scalar
+    if not fits:
+        return None
+    lags, errors = (np.array([getattr(fit, name) for fit in fits]) for name in ("lag", "lag_error"))
+    bounded = np.maximum(errors, np.median(errors))
+    middle = _weighted_median(lags, 1 / bounded)
+    scatter = 1.4826 * _weighted_median(np.abs(lags - middle), 1 / bounded)
+    of_middle = 1.25 * float(np.sqrt(1 / np.sum(1 / bounded**2)))
+    wide = np.sqrt(errors**2 + max(0.0, scatter**2 - float(np.median(errors)) ** 2) + of_middle**2)
+    kept = np.abs(lags - middle) <= APART * wide
+    if 2 * np.count_nonzero(kept) <= len(fits):
+        kept[:] = True  # where no majority agrees, nobody is wrong
+    return _mean_of_effects(lags[kept], errors[kept])
 
-    def smooth_rest(lag: float) -> float:
-        return _rest(pairing, begins_at + lag)[0]
 
-    bounds = (-within, within)
-    found = minimize_scalar(smooth_rest, bounds=bounds, method="bounded", options={"xatol": 1e-4 * within})
-    smooth, noise = _rest(pairing, begins_at)
-    explained = noise < smooth and found.fun <= (1 - EXPLAINED) * smooth
-    return float(found.x) if explained else math.nan
+def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
+    order = np.argsort(values)
+    sums = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(sums, sums[-1] / 2)])
 
 
-def _rest(pairing: Pairing, shift: float) -> tuple[float, float]:
-    """Variance of what the line through the measured values leaves, without that of its white noise.
+def _mean_of_effects(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
+    """Mean of values that scatter beyond their errors, and its error.
 
-    The second number is what that noise alone could make of the first.
+    R. DerSimonian, N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7 (1986).
     """
-    computed = pairing.computed(pairing.time - shift)
-    both = np.isfinite(computed)
-    computed, measured = computed[both], pairing.measured[both]
-    if both.sum() < FEWEST_SAMPLES or np.std(computed) == 0:
-        return math.inf, 0.0
-    rest = measured - np.polyval(np.polyfit(computed, measured, 1), computed)
-    white = float(np.mean(np.diff(rest) ** 2) / 2)
-    return max(0.0, float(np.var(rest)) - white), 4 * white / math.sqrt(len(rest))
+    weights = 1 / errors**2
+    mean = float(weights @ values / weights.sum())
+    excess = float(weights @ (values - mean) ** 2) - (len(values) - 1)
+    between = (
+        max(0.0, excess / float(weights.sum() - weights @ weights / weights.sum()))
+        if len(values) > 1
+        else 0.0
+    )
+    weights = 1 / (errors**2 + between)
+    return float(weights @ values / weights.sum()), float(np.sqrt(1 / weights.sum()))

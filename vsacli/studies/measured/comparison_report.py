@@ -12,7 +12,7 @@ from vsacli.documents.source import Source
 from vsacli.studies.measured.agreement import Agreement
 
 SHOWN_LAG = 5e-4
-"""Lag, s, from which on it is shown."""
+"""Lag, s, from which on it may be one of clocks."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +22,7 @@ class Comparison(Published):
     Attributes:
         result, recording: paths of the files.
         begins_at: time of the recording at which the result begins, s from its first sample.
+        begins_at_error: standard error of that, s; NaN if it was given.
         found: whether that was found from the signals.
         duration: of the result, s.
         compared: how much of it the recording covers, s.
@@ -33,6 +34,7 @@ class Comparison(Published):
     result: str
     recording: str
     begins_at: float
+    begins_at_error: float
     found: bool
     duration: float
     compared: float
@@ -43,7 +45,8 @@ class Comparison(Published):
     format: ClassVar[str] = "vsacli-comparison/1"
     shape: ClassVar = {
         "format": "format",
-        **{name: name for name in ("result", "recording", "begins_at", "found", "duration", "compared")},
+        **{name: name for name in ("result", "recording", "begins_at", "begins_at_error")},
+        **{name: name for name in ("found", "duration", "compared")},
         **{name: name for name in ("signals", "notes")},
     }
 
@@ -55,13 +58,24 @@ class Comparison(Published):
         return ReportText(self._headline(), self._rows(), [f"note: {note}" for note in self.notes])
 
     def _headline(self) -> str:
-        where = f"{abs(self.begins_at):.4f} s {'into' if self.begins_at >= 0 else 'before'} the recording"
+        when = _with_error(abs(self.begins_at), self.begins_at_error, "s", ".4f")
+        where = f"{when} {'into' if self.begins_at >= 0 else 'before'} the recording"
         how = "found from the signals" if self.found else "as given"
         covered = f"{self.compared:.4g} s of {self.duration:.4g} s compared"
         return f"{self.result}, {self.recording}: {covered}; the result begins {where} ({how})"
 
     def _rows(self) -> list[tuple[str, ...]]:
-        header = ("measured", "rms error", "of rms", "largest", "at", "offset", "gain", "lag")
+        header = (
+            "measured",
+            "compared with",
+            "rms error",
+            "of rms",
+            "largest",
+            "at",
+            "offset",
+            "gain",
+            "lag",
+        )
         return [header, *map(_row, self.signals)]
 
 
@@ -72,11 +86,19 @@ def _row(signal: Agreement) -> tuple[str, ...]:
     unit = f" {signal.unit}"
     return (
         signal.column,
+        signal.variable,
         figure(signal.rms, ".3g", unit),
         figure(100 * signal.share, ".3g", " %"),
         figure(signal.worst, "+.3g", unit),
         figure(signal.worst_time, ".3f", " s"),
-        figure(signal.offset, "+.2g", unit),
-        figure(signal.gain, ".4g"),
-        figure(1e3 * signal.lag, "+.1f", " ms") if abs(signal.lag) >= SHOWN_LAG else "-",
+        _with_error(signal.offset, signal.offset_error, signal.unit, "+.2g"),
+        _with_error(signal.gain, signal.gain_error, "", ".4g"),
+        _with_error(1e3 * signal.lag, 1e3 * signal.lag_error, "ms", "+.1f"),
     )
+
+
+def _with_error(value: float, error: float, unit: str, form: str) -> str:
+    if not math.isfinite(value):
+        return "-"
+    known = f" +- {error:.1g}" if math.isfinite(error) else ""
+    return f"{value:{form}}{known} {unit}".rstrip()

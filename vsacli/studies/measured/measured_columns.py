@@ -12,6 +12,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.simulation_variables import actual, measured
 from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.documents.column_mapping import TIME, ColumnMapping
@@ -46,11 +47,12 @@ class Place(NamedTuple):
     """Where a column belongs.
 
     Attributes:
-        variable: its name.
+        variable: name of what it is compared with or stands for.
         joint: its index.
         motor: 1 or 2, None if the variable is none of motors.
         unit: of numbers without a unit of their own.
         gear: what those are multiplied by to be on the joint side of the gear.
+        rank: how directly it says what the robot did; of columns that stand for the same the highest counts.
     """
 
     variable: str
@@ -58,6 +60,12 @@ class Place(NamedTuple):
     motor: int | None
     unit: str
     gear: float = 1.0
+    rank: int = 0
+
+    @property
+    def target(self) -> tuple[str, int, int | None]:
+        """Variable, joint and motor, without how it is written."""
+        return self.variable, self.joint, self.motor
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +132,7 @@ def read_recording(
         raise InputError(problems)
     order = {name: number for number, name in enumerate(places)}
     signals = [
-        Measured(name, places[name], table.values[:, index] * (factors[index] * places[name].gear))
+        Measured(name, places[name], _scaled(table.values[:, index], factors[index] * places[name].gear))
         for index, name in enumerate(names)
         if name in places
     ]
@@ -133,17 +141,42 @@ def read_recording(
     return Recording(_elapsed(table, factors[names.index(TIME)]), tuple(signals), others, table)
 
 
-def known_columns(jointed: Jointed, variables: Iterable[Variable]) -> dict[str, Place]:
-    """Every name that a column of some variables may have, those of joints."""
+def stand_ins(variables: Mapping[str, Variable]) -> Iterator[tuple[str, int, Variable]]:
+    """Names that columns may have, each with its rank and the variable that it stands for.
+
+    What sensors read, `q_measured`, goes before what a simulation says happened, `q_actual`, and that before
+    what has the plain name, which may be the command.
+
+    Args:
+        variables: by their plain names.
+    """
+    for plain, variable in variables.items():
+        for rank, name in enumerate((plain, actual(plain), measured(plain))):
+            yield name, rank, variable
+
+
+def known_columns(jointed: Jointed, named: Iterable[tuple[str, int, Variable]]) -> dict[str, Place]:
+    """Every name that a column may have of variables of joints.
+
+    Args:
+        jointed: what the recording is of.
+        named: names of variables in columns, with rank and variable, as `stand_ins` makes them.
+    """
     return {
-        name: place
-        for variable in variables
+        column: place
+        for name, rank, variable in named
         if "joint" in variable.dims and variable.name != "flags"
-        for name, place in _names(jointed, variable)
+        for column, place in _names(jointed, name, rank, variable)
     }
 
 
-def _names(jointed: Jointed, variable: Variable) -> Iterator[tuple[str, Place]]:
+def preferred(signals: Iterable[Measured]) -> dict[tuple[str, int, int | None], Measured]:
+    """For each variable of a joint or motor the column that says most directly what the robot did."""
+    ranked = sorted(signals, key=lambda signal: signal.place.rank)
+    return {signal.place.target: signal for signal in ranked}
+
+
+def _names(jointed: Jointed, name: str, rank: int, variable: Variable) -> Iterator[tuple[str, Place]]:
     """Names of the columns of a variable, of those joints and motors that have it."""
     of_motors = "motor" in variable.dims
     for joint, there in enumerate(jointed.existing(variable)):
@@ -151,14 +184,14 @@ def _names(jointed: Jointed, variable: Variable) -> Iterator[tuple[str, Place]]:
         for number in (motor for motor, exists in zip(MOTORS, there, strict=False) if exists):
             motor = number if of_motors else None
             ending = f"_{number}" if of_motors else ""
-            place = Place(variable.name, joint, motor, unit)
-            yield f"{jointed.joint_names[joint]}.{variable.name}{ending}", place
-            yield f"{variable.name}{joint + 1}{ending}", place
+            place = Place(variable.name, joint, motor, unit, rank=rank)
+            yield f"{jointed.joint_names[joint]}.{name}{ending}", place
+            yield f"{name}{joint + 1}{ending}", place
             ratio = float(jointed.gear_ratio[joint, number - 1])
             if variable.geared and np.isfinite(ratio):  # a shaft turns, whatever the joint does
                 on_shaft = variable.quantity.unit("revolute")
                 shaft = place._replace(unit=on_shaft, gear=ratio**-variable.geared)
-                yield f"{jointed.joint_names[joint]}.{variable.name}_shaft{ending}", shaft
+                yield f"{jointed.joint_names[joint]}.{name}_shaft{ending}", shaft
 
 
 def _unusable(
@@ -183,6 +216,11 @@ def _unusable(
 
 def _factor(unit: str | None, expected: str) -> float:
     return 1.0 if unit is None else conversion_factor(unit, expected)
+
+
+@np.errstate(over="ignore")  # beyond the largest number there is no sample
+def _scaled(values: FloatArray, factor: float) -> FloatArray:
+    return np.asarray(values * factor)
 
 
 def _elapsed(table: Table, factor: float) -> FloatArray:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from vsacli.studies.measured.agreement import Agreement, straight_line
+from vsacli.studies.measured.agreement import Agreement
 
 ALIKE = 0.98
 """Coefficient of correlation from which on the gain says something about units and signs."""
@@ -15,11 +15,14 @@ ALIKE = 0.98
 NEAR = 0.05
 """Relative distance at which a gain is taken for one that a slip makes."""
 
-RESTING = 1e-3
-"""Share of the computed range below which a measured signal does not move."""
+SURE = 5.0
+"""Standard errors from which on a gain or an offset is named; of a million right columns one has that."""
 
-EXCHANGED = 0.25
-"""Share of the squared errors that may remain where columns look exchanged."""
+NOTABLE = 0.02
+"""Gain less 1, or offset over the range, from which on it is named: few models are better."""
+
+WILD = 20.0
+"""Largest error, in root mean squares of the others, from which on samples that were left out are named."""
 
 
 def slips(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
@@ -30,9 +33,17 @@ def slips(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterato
         gear_ratios: of the motor that each is of, NaN if it is of none or not known.
     """
     for signal, ratio in zip(signals, gear_ratios, strict=True):
-        yield from _slip_of(signal, ratio)
-    for variable in dict.fromkeys(signal.variable for signal in signals):
-        yield from _exchanged([signal for signal in signals if signal.variable == variable])
+        if signal.follows is None:
+            yield from _slip_of(signal, ratio)
+    for variable in dict.fromkeys(signal.variable for signal in signals if signal.follows):
+        moved = [signal for signal in signals if signal.variable == variable and signal.follows]
+        pairs = ", ".join(f"{signal.column} is like {signal.follows} computed" for signal in moved)
+        yield f"columns look exchanged: {pairs}"
+    still = [signal.column for signal in signals if signal.still == "computed"]
+    if still:
+        verb = "holds" if len(still) == 1 else "hold"
+        known = "up to rounding or noise: no gain, offset or lag follows"
+        yield f"{', '.join(still)} {verb} still as computed, {known}"
 
 
 def _gains_of_slips(gear_ratio: float) -> Mapping[str, float]:
@@ -59,41 +70,41 @@ def _slip_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
     if not agreement.samples:
         yield f"{agreement.column} has no computed value: its joint is infeasible or singular throughout"
         return
-    moves = float(np.ptp(agreement.computed))
-    if moves > 0 and np.ptp(agreement.measured) < RESTING * moves:
+    if agreement.left_out:
+        samples = "1 sample" if agreement.left_out == 1 else f"{agreement.left_out} samples"
+        where = (
+            f"the largest error is {agreement.worst:+.3g} {agreement.unit} at {agreement.worst_time:.3f} s"
+        )
+        out = "left out of gain, offset and lag"
+        yield f"{agreement.column} has {samples} far from all others, {out}: {where}"
+    if agreement.still == "measured":
         yield f"{agreement.column} does not move, though {agreement.variable} was computed to"
-        return
     if not abs(agreement.correlation) >= ALIKE:
         return
-    sign, size = math.copysign(1.0, agreement.gain), abs(agreement.gain)
+    gain, size = agreement.gain, abs(agreement.gain)
     looks = next(
-        (slip for slip, gain in _gains_of_slips(gear_ratio).items() if abs(size / gain - 1) < NEAR), None
+        (slip for slip, slipped in _gains_of_slips(gear_ratio).items() if abs(size / slipped - 1) < NEAR),
+        None,
     )
-    if sign < 0:
-        yield f"{agreement.column} runs the other way (its gain is {agreement.gain:.4g})"
+    if gain < 0:
+        yield f"{agreement.column} runs the other way (its gain is {gain:.4g})"
     if looks is not None:
-        yield f"{agreement.column} looks as if it {looks} (its gain is {agreement.gain:.4g})"
+        yield f"{agreement.column} looks as if it {looks} (its gain is {gain:.4g})"
+    elif abs(size - 1) > NOTABLE and abs(size - 1) > SURE * agreement.gain_error:
+        yield f"{agreement.column} is {size:.4g} times as large as computed"
+    yield from _offset(agreement)
+
+
+def _offset(agreement: Agreement) -> Iterator[str]:
+    """A sentence on an offset that is known and large."""
     turns = agreement.offset / (2 * math.pi)
     whole = abs(turns) > 1 / 2 and abs(turns - round(turns)) < NEAR
     if agreement.unit == "rad" and whole and abs(agreement.gain - 1) < NEAR:
         yield f"{agreement.column} is {round(turns):+d} turns off"
-
-
-def _exchanged(signals: Sequence[Agreement]) -> Iterator[str]:
-    """Columns of a variable that agree much better with each other's computed values."""
-    units = {signal.unit for signal in signals}
-    if len(signals) < 2 or len(units) > 1 or len({signal.samples for signal in signals}) > 1:
         return
-    from scipy.optimize import linear_sum_assignment
-
-    costs = np.array([[np.sum((one.measured - other.computed) ** 2) for other in signals] for one in signals])
-    rows, columns = linear_sum_assignment(costs)
-    moved = [
-        (signals[row], signals[column])
-        for row, column in zip(rows.tolist(), columns.tolist(), strict=True)
-        if row != column
-    ]
-    alike = all(straight_line(other.computed, one.measured)[2] >= ALIKE for one, other in moved)
-    if alike and costs[rows, columns].sum() < EXCHANGED * np.trace(costs):
-        pairs = ", ".join(f"{one.column} is like {other.column} computed" for one, other in moved)
-        yield f"columns look exchanged: {pairs}"
+    notable, sure = (
+        NOTABLE * abs(agreement.gain) * float(np.ptp(agreement.computed)),
+        SURE * agreement.offset_error,
+    )
+    if abs(agreement.offset) > notable and abs(agreement.offset) > sure:
+        yield f"{agreement.column} is {agreement.offset:+.3g} {agreement.unit} off"

@@ -1,0 +1,72 @@
+"""Recordings of simulations: measured and actual columns stand for what the robot did."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from samples.command_line import REPOSITORY, edited
+
+ROBOT = REPOSITORY / "robots" / "planar_2r.yaml"
+OFF = 0.02
+"""Position errors that a model with wrong parameters leaves at least, rad."""
+
+
+@pytest.fixture
+def simulated(vsacli, tmp_path):
+    """A plan, `plan.h5`, and a simulation `lab.h5` that does not follow it."""
+    edited(
+        REPOSITORY / "trajectories" / "planar_2r.yaml", tmp_path / "move.yaml", ("rate: 1000", "rate: 250")
+    )
+    assert vsacli("invdyn", ROBOT, "move.yaml", "-o", "plan.h5").code == 0
+    options = ["--controller", "feedback-linearization", "--perturb", "0.3", "--sensor-noise", "1e-4,0.5"]
+    assert vsacli("simulate", ROBOT, "move.yaml", *options, "-o", "lab.h5").code == 3
+    return vsacli
+
+
+def compared(run, result, recording):
+    report = json.loads(run("compare", result, recording, "--begins-at", "0", "--json").out)
+    return {signal["column"]: signal for signal in report["signals"]}, report["notes"]
+
+
+def test_a_default_export_is_compared_with_its_plan(simulated):
+    assert simulated("export", "lab.h5", "-o", "m.csv").code == 0
+    signals, _ = compared(simulated, "plan.h5", "m.csv")
+    assert {column.partition(".")[2].rstrip("_12"): each["variable"] for column, each in signals.items()} == {
+        "q_actual": "q",
+        "stiffness_actual": "stiffness",
+        "tau_motor_actual": "tau_motor",
+    }
+    assert signals["shoulder.q_actual"]["rms"] > OFF
+
+
+@pytest.mark.parametrize(("result", "variable"), [("plan.h5", "q"), ("lab.h5", "q_actual")])
+def test_what_sensors_read_goes_before_the_command(simulated, result, variable):
+    assert simulated("export", "lab.h5", "--variables", "q,q_actual,q_measured", "-o", "m.csv").code == 0
+    signals, notes = compared(simulated, result, "m.csv")
+    assert {column: each["variable"] for column, each in signals.items()} == {
+        "shoulder.q_measured": variable,
+        "elbow.q_measured": variable,
+    }
+    assert (
+        "not compared, as other columns say what the robot did: shoulder.q, elbow.q, shoulder.q_actual"
+        in notes[-1]
+    )
+
+
+def test_a_simulation_says_what_happened_not_what_was_commanded(simulated):
+    """A recorded q of the plan is off by as much as the simulated arm was, and that of the arm is not."""
+    for variable in ("q", "q_actual"):
+        assert simulated("export", "lab.h5", "--variables", variable, "-o", f"{variable}.csv").code == 0
+    command, _ = compared(simulated, "lab.h5", "q.csv")
+    arm, _ = compared(simulated, "lab.h5", "q_actual.csv")
+    assert command["shoulder.q"]["variable"] == arm["shoulder.q_actual"]["variable"] == "q_actual"
+    assert command["shoulder.q"]["rms"] > OFF
+    assert arm["shoulder.q_actual"]["rms"] < 1e-12  # numbers are printed with all digits
+
+
+def test_the_report_names_the_variable(simulated):
+    assert simulated("export", "lab.h5", "--variables", "q_measured", "-o", "m.csv").code == 0
+    header, first, *_ = simulated("compare", "plan.h5", "m.csv").out.splitlines()[1:]
+    assert header.split()[:3] == ["measured", "compared", "with"]
+    assert first.split()[:2] == ["shoulder.q_measured", "q"]

@@ -1,0 +1,139 @@
+"""Pairs of a computed signal and its measured values, and whether either of them moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray
+
+FEWEST_SAMPLES = 4
+"""Samples by which two signals can be compared."""
+
+ROUNDING = 1e-8
+"""Share of the largest value of a variable, over all joints, below which changes are rounding. Torques of
+joints at rest change by 1e-16 to 1e-12 of it, and 1e-8 of a motion is below the resolution of any sensor."""
+
+WIDEST = 3.0
+"""How far beyond the range of nearly all samples the search takes values to go, in such ranges: single wild
+samples count no more than their neighbors."""
+
+LARGEST = 1e100
+"""Values beyond are no measurements; the search sees the bound, since their squares would overflow."""
+
+ENOUGH = 20_000
+"""Samples that tell where about the shift is, and which columns are exchanged."""
+
+NEARLY_ALL = (0.02, 0.98)
+"""Quantiles between which nearly all samples lie."""
+
+NORMAL_MEDIAN = 0.6745
+"""Median of the size of normal values, in standard deviations."""
+
+
+class Computed(NamedTuple):
+    """A computed signal.
+
+    Attributes:
+        at: values at times from the beginning of the result, NaN outside it and next to samples without a
+            value.
+        slope: derivatives at such times.
+        error: root mean square error of interpolation.
+        spread: root mean square deviation from the mean.
+        moves: whether it does, beyond rounding.
+    """
+
+    at: Callable[[FloatArray], FloatArray]
+    slope: Callable[[FloatArray], FloatArray]
+    error: float
+    spread: float
+    moves: bool
+
+
+class Pairing(NamedTuple):
+    """A computed signal and what was measured of it.
+
+    Attributes:
+        computed: the signal.
+        duration: of the result, s.
+        time: of the measured values, s, ascending.
+        measured: (samples,).
+    """
+
+    computed: Computed
+    duration: float
+    time: FloatArray
+    measured: FloatArray
+
+    def thinned(self) -> Pairing:
+        """The same with at most `ENOUGH` samples."""
+        every = -(-len(self.time) // ENOUGH)
+        return self._replace(time=self.time[::every], measured=self.measured[::every])
+
+    def overlap(self, shift: float) -> tuple[FloatArray, BoolArray]:
+        """Computed values at the measured times if the result begins at `shift`, and where there are any."""
+        computed = self.computed.at(self.time - shift)
+        return computed, np.isfinite(computed)
+
+
+def tame(values: FloatArray) -> FloatArray:
+    """Measured values, wild ones moved to the bounds of what the others suggest."""
+    limited = np.clip(values, -LARGEST, LARGEST)
+    low, high = np.quantile(limited, NEARLY_ALL)
+    room = WIDEST * (high - low)
+    return limited if room == 0 else np.clip(limited, low - room, high + room)
+
+
+def noise(values: FloatArray) -> float:
+    """Variance of the white noise of tame values, from their second differences."""
+    second = np.abs(np.diff(values, 2))
+    return float(np.median(second) / NORMAL_MEDIAN) ** 2 / 6 if second.size else 0.0
+
+
+def interpolated(time: FloatArray, values: FloatArray, largest: float) -> Computed:
+    """A stored signal as a function of the time from its beginning.
+
+    Args:
+        time: of the samples, (samples,), s, the first at 0.
+        values: (samples,), NaN where there is none.
+        largest: value of the variable in size, over all joints.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    known = np.isfinite(values)
+    if np.count_nonzero(known) < FEWEST_SAMPLES:
+        return Computed(_nowhere, _nowhere, 0.0, 0.0, moves=False)
+    stamps, given = time[known], values[known]
+    spline = make_interp_spline(stamps, given, k=3)
+    slope, gaps = spline.derivative(), np.where(known, 0.0, np.nan)
+
+    def at(times: FloatArray) -> FloatArray:
+        return np.asarray(spline(times) + np.interp(times, time, gaps, left=np.nan, right=np.nan))
+
+    return Computed(
+        at=at,
+        slope=lambda times: np.asarray(slope(times)),
+        error=_interpolation_error(stamps, given),
+        spread=float(np.std(given)),
+        moves=float(np.ptp(given)) > ROUNDING * largest,
+    )
+
+
+def _nowhere(times: FloatArray) -> FloatArray:
+    return np.full(np.shape(times), np.nan)
+
+
+def _interpolation_error(time: FloatArray, values: FloatArray) -> float:
+    """Root mean square error of a cubic spline: that of every second sample, which is 16 times larger."""
+    from scipy.interpolate import make_interp_spline
+
+    rounding = float(np.finfo(float).eps * np.abs(values).max())
+    if len(time) < 2 * FEWEST_SAMPLES:
+        return rounding
+    between = slice(1, len(time) - 1, 2)
+    coarse = make_interp_spline(time[::2], values[::2], k=3)
+    inside = time[between] <= time[::2][-1]
+    apart = coarse(time[between][inside]) - values[between][inside]
+    return rounding + float(np.sqrt(np.mean(apart**2))) / 16
