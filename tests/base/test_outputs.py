@@ -112,6 +112,63 @@ def test_an_exception_of_the_caller_leaves_nothing(project: Path) -> None:
     assert not (project / "new").exists()
 
 
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_that_is_replaced_keeps_its_mode(
+    project: Path, monkeypatch: pytest.MonkeyPatch, mode: int, links: bool
+) -> None:
+    (project / "a").chmod(mode)
+    if not links:
+        monkeypatch.setattr(os, "link", no_links)
+    write(project, overwrite=True)
+    assert (project / "a").read_text() == "new a"
+    assert stat.S_IMODE((project / "a").stat().st_mode) == mode
+
+
+@pytest.mark.parametrize("refused", [None, "group", "both"])
+def test_a_file_that_is_replaced_keeps_its_owner_where_that_is_permitted(
+    project: Path, monkeypatch: pytest.MonkeyPatch, refused: str | None
+) -> None:
+    """A group that is refused gets no rights that others have not: its members were not asked."""
+    genuine, asked = Path.stat, []
+
+    def foreign(path: Path, **options: bool) -> os.stat_result:
+        found = genuine(path, **options)
+        changes = {4: found.st_uid + 1, 5: found.st_gid + 1} if path.name == "a" else {}
+        return os.stat_result([changes.get(place, value) for place, value in enumerate(found)])
+
+    def chown(_path: Path, user: int, group: int) -> None:
+        asked.append((user, group))
+        if refused == "both" or (refused == "group" and group != -1):
+            raise PermissionError(errno.EPERM, "Operation not permitted")
+
+    (project / "a").chmod(0o674)
+    owner = genuine(project / "a")
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "stat", foreign)
+        patch.setattr(os, "chown", chown)
+        write(project, overwrite=True)
+    assert asked == [(-1, owner.st_gid + 1), (owner.st_uid + 1, -1)]
+    assert stat.S_IMODE((project / "a").stat().st_mode) == (0o674 if refused is None else 0o644)
+
+
+def test_a_file_of_several_names_is_not_replaced(project: Path) -> None:
+    os.link(project / "a", project / "same")
+    before = contents(project)
+    with pytest.raises(StorageError, match=r"a: has 2 names \(hard links\), of which only this one would"):
+        write(project, overwrite=True)
+    assert contents(project) == before
+
+
+def test_a_name_that_a_killed_run_gave_is_no_further_one(project: Path) -> None:
+    """It keeps the old file under a second name while the new one gets the first."""
+    script = "from vsacli.base.staging import staging_name; print(staging_name())"
+    dead = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    os.link(project / "a", project / dead.stdout.strip())
+    write(project, overwrite=True)
+    assert contents(project) == {"a": "new a", "b": "new b", "c": "new c", "further/below/d": "new d"}
+
+
 def test_inputs_are_never_replaced(project: Path) -> None:
     (project / "link").symlink_to("a")
     with (

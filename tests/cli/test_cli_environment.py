@@ -97,11 +97,12 @@ def closing(*streams: int) -> Any:
 @pytest.mark.parametrize("streams", [slow((0,)), (1,), slow((2,)), slow((1, 2)), slow((0, 1, 2))], ids=str)
 @pytest.mark.parametrize("command", ["invdyn", slow("invdyn --plot"), slow("check-feasibility")])
 def test_closed_streams(command: str, streams: tuple[int, ...], tmp_path: Path) -> None:
+    """The report is lost without a standard output, which the exit code says; the file is whole."""
     code, out, err = run(*COMMANDS[command], folder=tmp_path, preexec_fn=closing(*streams))
-    assert code == 0
+    assert code == (4 if 1 in streams else 0)
     assert (tmp_path / "r.h5").is_file() == ("-o" in COMMANDS[command])
     assert bool(out) == (1 not in streams)
-    assert ("wrote" in err) == (2 not in streams and "-o" in COMMANDS[command])
+    assert ("wrote" in err) == (not {1, 2} & set(streams) and "-o" in COMMANDS[command])
 
 
 def no_room() -> None:

@@ -142,10 +142,11 @@ def test_the_result_runs(vsacli, tmp_path):
     assert vsacli("invdyn", "arm.yaml", "move.yaml").code == 0
 
 
-@pytest.mark.parametrize("existing", ["arm.yaml", "arm.urdf"])
+@pytest.mark.parametrize("existing", ["arm.yaml", "link.yaml"])
 def test_nothing_is_replaced(vsacli, tmp_path, existing):
     write(tmp_path / "arm.urdf", serial("RR"))
     write(tmp_path / "arm.yaml", "mine")
+    (tmp_path / "link.yaml").symlink_to(tmp_path / "arm.urdf")
     before = contents(tmp_path)
     done = vsacli("import-urdf", "arm.urdf", "-o", existing)
     assert (done.code, done.out) == (4 if existing == "arm.yaml" else 2, "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -71,3 +72,21 @@ def test_a_result_is_whole_although_nobody_reads_its_report(tmp_path: Path) -> N
         os.close(writing)
     assert (done.returncode, done.stderr) == (0, "wrote r.h5\n")
     assert set(contents(tmp_path)) == {"r.h5"}
+
+
+def test_a_warning_of_numpy_does_not_reach_the_user() -> None:
+    """It says nothing that a user could act on; `python -W` shows it to a developer."""
+    program = (
+        "import sys, numpy as np, vsacli.cli.main\n"
+        "command = sys.modules['vsacli.cli.main']\n"
+        "command.run = lambda _: int(np.isfinite(np.array([1e308]) * 10).any())\n"
+        "command.main()"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONWARNINGS"}
+    for options, silent in (((), True), (("-W", "default"), False)):
+        done = subprocess.run(
+            [sys.executable, *options, "-c", program],
+            env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0
+        assert ("RuntimeWarning: overflow" not in done.stderr) is silent

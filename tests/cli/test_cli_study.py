@@ -3,19 +3,46 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
-from samples.marks import needs_compiler
+from samples.marks import needs_compiler, slow_but
 from samples.studies import HEAD, column, content, study
 
 from vsacli import InputError, StorageError, StudySummary, run_study
 from vsacli.studies.sweeps.study import load_study
 
 PATHS = ("joints.*.actuator.spring.k", "stiffness.end.elbow")
+
+
+NEEDED = (
+    "method",
+    "seed",
+    "engine",
+    "compiler",
+    "numpy",
+    "command_line",
+    "created",
+    "generated_by",
+    "study_name",
+)
+
+
+@pytest.mark.parametrize("attribute", slow_but(["created", "numpy"], NEEDED))
+def test_an_attribute_of_a_table_that_is_missing_is_named(
+    vsacli: Any, grid_table: Path, attribute: str
+) -> None:
+    shutil.copy(grid_table, "t.h5")
+    with h5py.File("t.h5", "r+") as file:
+        del file.attrs[attribute]
+    checked, shown = vsacli("validate", "t.h5"), vsacli("info", "t.h5")
+    assert (checked.code, attribute in checked.out) == (2, True)
+    assert (shown.code, shown.out, attribute in shown.err) == (2, "", True)
 
 
 def test_a_row_is_what_a_run_with_its_values_says(vsacli: Any, grid_study: str) -> None:

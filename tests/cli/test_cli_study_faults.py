@@ -45,16 +45,85 @@ def test_an_interrupted_study_goes_on(vsacli: Any, grid_study: str, grid_table: 
     assert not journal.exists()
 
 
+def kept(path: Path, study_file: str) -> bytes:
+    """A journal of all six rows, and what is in it."""
+    with Journal(path) as rows:
+        gather(map(Computer(load_study(study_file)).row, range(6)), rows, lambda _: None)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("where", ["checksum", "row", "break"])
+def test_a_damaged_row_costs_no_other_one(vsacli: Any, grid_study: str, grid_table: Path, where: str) -> None:
+    """A bit that is wrong in the third row, or in the break behind it."""
+    journal = Path("study.h5.journal")
+    lines = kept(journal, grid_study).splitlines(keepends=True)
+    place = {"checksum": 3, "row": len(lines[3]) // 2, "break": -1}[where]
+    spoiled = bytearray(lines[3])
+    spoiled[place] ^= 1
+    journal.write_bytes(b"".join([*lines[:3], bytes(spoiled), *lines[4:]]))
+    done = vsacli("study", grid_study)
+    assert done.err.splitlines() == [
+        f"{journal}: line 4 is damaged; its run is computed again",
+        f"5 of 6 runs are in {journal} already",
+        "wrote study.h5",
+    ]
+    assert content("study.h5") == content(grid_table)
+
+
+@pytest.mark.slow
+def test_whichever_bit_of_a_journal_is_wrong(tmp_path: Path, grid_study: str) -> None:
+    """All rows but one are there, or all if it is the blank behind a checksum; or the file is refused."""
+    whole, spoiled = kept(tmp_path / "whole", grid_study), tmp_path / "spoiled"
+    first = whole.index(b"\n") + 1
+    for place in range(0, len(whole), 7):
+        content_now = bytearray(whole)
+        content_now[place] ^= 1 << place % 8
+        spoiled.write_bytes(content_now)
+        if place < first:
+            with pytest.raises(StorageError, match="is no journal"), Journal(spoiled):
+                pass
+            assert spoiled.read_bytes() == content_now
+            continue
+        with Journal(spoiled) as rows:
+            assert len(rows) >= 5
+
+
+@pytest.mark.parametrize(
+    "content_then", [b"notes\n1 2 3\n", b"\x89HDF\r\n\x1a\n", b"vsacli-study-journal/9\n"]
+)
+def test_a_file_of_somebody_else_is_no_journal(vsacli: Any, grid_study: str, content_then: bytes) -> None:
+    journal = Path("study.h5.journal")
+    journal.write_bytes(content_then)
+    done = vsacli("study", grid_study)
+    assert (done.code, Path("study.h5").exists()) == (4, False)
+    assert done.err == (
+        f"{journal}: is no journal of a study, and stands where this one keeps its finished runs; move it, "
+        "or name another table with -o\n"
+    )
+    assert journal.read_bytes() == content_then
+
+
+@pytest.mark.parametrize("length", [0, 7])
+def test_a_journal_that_was_cut_off_in_its_first_line_is_begun_anew(
+    vsacli: Any, grid_study: str, grid_table: Path, length: int
+) -> None:
+    journal = Path("study.h5.journal")
+    journal.write_bytes(journal_module.FIRST_LINE[:length])
+    assert vsacli("study", grid_study).err == "wrote study.h5\n"
+    assert content("study.h5") == content(grid_table)
+    assert not journal.exists()
+
+
 def test_a_full_disk_costs_no_finished_row(
     vsacli: Any, grid_study: str, grid_table: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    room = [2]
+    room = [3]  # the first line, a row, and a part of the next
 
     def write(file: int, data: memoryview) -> int:
         room[0] -= 1
         if room[0] < 0:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return original(file, data if room[0] else data[:40])  # the disk becomes full in the second row
+        return original(file, data if room[0] else data[:40])  # the disk becomes full there
 
     original = os.write
     with monkeypatch.context() as patch:

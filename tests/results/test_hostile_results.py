@@ -15,6 +15,7 @@ from typing import Any
 import h5py
 import pytest
 from samples.command_line import ROBOT
+from samples.marks import slow_but
 from samples.results import random_block, write_result
 
 from vsacli import open_result
@@ -301,6 +302,50 @@ def test_provenance_that_is_missing(vsacli: Any, small_result: Path, attribute: 
     done = vsacli("info", "r.h5")
     assert (done.code, done.out) == (2, "")
     assert "is damaged or truncated" in done.err
+
+
+ROOT = ("generated_by", "created", "command_line", "engine", "compiler", "threads", "options", "versions")
+OF_ROOT = ("format", *ROOT, "robot_name", "trajectory_name", "verdict", "complete", "Conventions")
+OF_VARIABLES = {
+    "tau_e": ("units", "long_name", "equation", "coordinates", "DIMENSION_LIST"),
+    "flags": ("flag_masks", "flag_meanings"),
+    "time": ("units", "long_name", "equation"),
+    "inputs/file_1": ("path", "sha256"),
+}
+NEEDED = [
+    *(("/", name) for name in OF_ROOT),
+    *((at, name) for at, names in OF_VARIABLES.items() for name in names),
+]
+
+
+QUICK = [("/", "compiler"), ("/", "created"), ("tau_e", "units")]
+
+
+@pytest.mark.parametrize("place", slow_but(QUICK, NEEDED), ids="-".join)
+def test_an_attribute_that_is_missing_is_named(
+    vsacli: Any, small_result: Path, place: tuple[str, str]
+) -> None:
+    at, attribute = place
+    shutil.copy(small_result, "r.h5")
+    with h5py.File("r.h5", "r+") as file:
+        del file[at].attrs[attribute]
+    checked = vsacli("validate", "r.h5")
+    assert (checked.code, attribute in checked.out) == (2, True)
+    assert vsacli("info", "r.h5").code in (0, 2)  # it shows what it can, and no traceback
+
+
+def test_no_attribute_is_forgotten_above(small_result: Path) -> None:
+    """Those of groups, scales and roles are for other programs, or may be absent."""
+    found = set()
+    with h5py.File(small_result) as file:
+        found |= {("/", name) for name in file.attrs}
+        for at in OF_VARIABLES:
+            found |= {(at, name) for name in file[at].attrs}
+    assert found - set(NEEDED) == {
+        *(("flags", name) for name in OF_VARIABLES["tau_e"]),
+        *(("time", name) for name in ("CLASS", "NAME", "REFERENCE_LIST")),
+        ("inputs/file_1", "role"),
+    }
 
 
 def test_a_link_to_another_file_is_not_followed(vsacli: Any, small_result: Path) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-from collections.abc import Iterable, Iterator
+import stat
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -90,11 +91,11 @@ class Outputs:
     removes; and while files get their names in a folder that was there, some of them before the others.
 
     Args:
-        overwrite: whether files that exist may be replaced.
+        overwrite: whether files that exist may be replaced; None if the command has no option for that.
         inputs: files that the command reads, which it never replaces.
     """
 
-    def __init__(self, *, overwrite: bool = False, inputs: Iterable[str | Path] = ()) -> None:
+    def __init__(self, *, overwrite: bool | None = None, inputs: Iterable[str | Path] = ()) -> None:
         self._overwrite = overwrite
         self._inputs = tuple(inputs)
         self._files: list[Staged] = []
@@ -216,10 +217,11 @@ class Outputs:
         if self._overwrite and file.target.exists():
             kept = self._staging(file.target)
             _keep(file.target, kept)
+            _take_permissions(file.temporary, file.target.stat())
             file.temporary.replace(file.target)
             undo.callback(kept.replace, file.target)
         else:
-            _name_without_replacing(file)
+            _name_without_replacing(file, optional=self._overwrite is not None)
             undo.callback(file.target.unlink)
 
 
@@ -233,15 +235,37 @@ def _keep(path: Path, kept: Path) -> None:
         shutil.copy2(path, kept)
 
 
-def _name_without_replacing(file: Staged) -> None:
+def _take_permissions(path: Path, replaced: os.stat_result) -> None:
+    """Give a file the owner, group and mode of the one that it replaces, as far as the system permits.
+
+    A group that cannot be given is one of strangers: it may do no more with the file than all others may.
+    """
+    mode, new = stat.S_IMODE(replaced.st_mode), path.stat()
+    if hasattr(os, "chown"):
+        if replaced.st_gid != new.st_gid and not _permitted(os.chown, path, -1, replaced.st_gid):
+            mode &= ~stat.S_IRWXG | (mode & stat.S_IRWXO) << 3
+        if replaced.st_uid != new.st_uid:
+            _permitted(os.chown, path, replaced.st_uid, -1)
+    _permitted(path.chmod, mode)  # last, since a change of owner clears the setuid bit
+
+
+def _permitted(change: Callable[..., None], *arguments: object) -> bool:
+    try:
+        change(*arguments)
+    except OSError:  # no permission, or a file system without owners
+        return False
+    return True
+
+
+def _name_without_replacing(file: Staged, *, optional: bool) -> None:
     """Name a file without ever replacing another one, which a rename would."""
     try:
         os.link(file.temporary, file.target)
     except FileExistsError as error:
-        raise already_there(file.path) from error
+        raise already_there(file.path, optional=optional) from error
     except OSError as error:  # no hard links here
         if file.target.exists():
-            raise already_there(file.path) from error
+            raise already_there(file.path, optional=optional) from error
         file.temporary.replace(file.target)
 
 

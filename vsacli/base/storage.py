@@ -80,11 +80,16 @@ def temporary_folder() -> Iterator[Path]:
         remove(folder)
 
 
-def check_target(path: str | Path, *, overwrite: bool) -> Path:
+def check_target(path: str | Path, *, overwrite: bool | None) -> Path:
     """The file that `path` means, links followed, if it may be written.
 
+    Args:
+        path: the file.
+        overwrite: whether it may be replaced; None if the command has no option for that.
+
     Raises:
-        StorageError: it exists and `overwrite` is false, it is no regular file, or its folder does not exist.
+        StorageError: it exists and may not be replaced, it is no regular file or has several names, or its
+            folder does not exist.
     """
     with reporting_storage_errors(path):
         target = Path(os.path.realpath(path))
@@ -94,9 +99,27 @@ def check_target(path: str | Path, *, overwrite: bool) -> Path:
             raise StorageError(path, f"there is no folder {target.parent}; create it or choose another one")
         if target.exists() and not target.is_file():
             raise StorageError(path, "is not a regular file and cannot be replaced")
-        if target.exists() and not overwrite:
-            raise already_there(path)
+        if target.exists():
+            if not overwrite:
+                raise already_there(path, optional=overwrite is not None)
+            _check_names(path, target)
     return target
+
+
+def _check_names(path: str | Path, target: Path) -> None:
+    """Refuse to replace a file of several names: the others would keep the old content.
+
+    Raises:
+        StorageError: it has several.
+    """
+    if target.stat().st_nlink > 1:
+        sweep(target.parent)  # a run that was killed while it named this file has left it a second name
+        if (names := target.stat().st_nlink) > 1:
+            raise StorageError(
+                path,
+                f"has {names} names (hard links), of which only this one would get the new content; choose "
+                "another name, or remove this one first",
+            )
 
 
 def check_free_space(path: str | Path, size: int) -> None:
@@ -124,6 +147,7 @@ def reason(error: OSError) -> str:
     return _REASON.get(error.errno or 0, error.strerror or str(error))
 
 
-def already_there(path: str | Path) -> StorageError:
-    """What to say of a file that must not be replaced."""
-    return StorageError(path, "exists already; choose another name, or replace it with --overwrite")
+def already_there(path: str | Path, *, optional: bool) -> StorageError:
+    """What to say of a file that must not be replaced, by a command that may have an option for that."""
+    advice = "replace it with --overwrite" if optional else "remove it first"
+    return StorageError(path, f"exists already; choose another name, or {advice}")

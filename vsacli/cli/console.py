@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import enum
+import errno
+import io
 import json
 import os
 import re
@@ -241,16 +243,22 @@ def _refuse_empty_texts(context: click.Context) -> None:
 @contextmanager
 def reporting_stdout_errors() -> Iterator[None]:
     """Within this context, what cannot be written to standard output raises an OutputError."""
-    stream = sys.stdout
-    if stream is None:  # closed before the start, as by `>&-`; click then prints nothing
-        yield
-        return
+    stream: Any = sys.stdout or _ClosedOutput()
     try:
         with redirect_stdout(cast("TextIO", _CheckedOutput(stream))):
             yield
     except OutputError:
-        _discard_buffer(stream)
+        if sys.stdout is not None:
+            _discard_buffer(stream)
         raise
+
+
+class _ClosedOutput(io.TextIOBase):
+    """Standard output that was closed before the start, as by `>&-`: what is written to it is lost."""
+
+    def write(self, _text: str) -> int:
+        """Refuse it, as the system does."""
+        raise OSError(errno.EBADF, "it is closed")
 
 
 class _CheckedOutput:

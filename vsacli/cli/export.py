@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from vsacli.base.errors import InputError, StorageError
+from vsacli.base.errors import InputError
 from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import (
     example,
@@ -18,7 +19,7 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Exit, Talk, talk_options, tell
-from vsacli.cli.file_names import FILE
+from vsacli.cli.file_names import FILE, ending_of
 from vsacli.results.exports import FORMATS as OF_RESULTS
 from vsacli.robot.models import FORMATS as OF_ROBOTS
 
@@ -29,6 +30,16 @@ if TYPE_CHECKING:
     from vsacli.results.store.reader import StoredResult
     from vsacli.robot.model import Robot
     from vsacli.robot.models.start import Start
+
+ENDINGS = {
+    "csv": (".csv",),
+    "mat": (".mat",),
+    "parquet": (".parquet",),
+    "joint-trajectory": (".json", ".yaml", ".yml"),
+    "urdf": (".urdf", ".xml"),
+    "mjcf": (".mjcf", ".xml"),
+}
+"""How the names of files of each format end."""
 
 ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 """Options that say nothing of a robot."""
@@ -45,15 +56,18 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
     "--format",
     "form",
     type=click.Choice((*OF_RESULTS, *OF_ROBOTS)),
-    help="Of a result: CSV, which is the default, a MATLAB file, Parquet, or a JointTrajectory of ROS 2; of "
-    "a robot: URDF, or MJCF, the XML of MuJoCo.",
+    help="Of a result: CSV, a MATLAB file, Parquet, or a JointTrajectory of ROS 2; of a robot: URDF, or "
+    "MJCF, the XML of MuJoCo. By default what the name of the output ends with, else CSV.",
 )
 @variables_option(
     "tau_motor, of a simulation q_actual, stiffness_actual, tau_motor_actual; of a joint-trajectory what it "
     "has fields for, q, dq, ddq, tau_e"
 )
 @click.option(
-    "--rate", metavar="HZ", type=float, help="Samples per second, a whole fraction of the stored rate."
+    "--rate",
+    metavar="HZ",
+    type=float,
+    help="Samples per second; a motion known at its samples alone needs a whole fraction of the stored rate.",
 )
 @click.option(
     "--side",
@@ -62,7 +76,9 @@ ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
     show_default=True,
     help="Of the gear, on which motion and torque of the motors are given.",
 )
-@click.option("--allow-nan", is_flag=True, help="Leave values out where there are none.")
+@click.option(
+    "--allow-nan", is_flag=True, help="Leave values out where there are none, and export infinite ones."
+)
 @click.option(
     "--start",
     metavar="RESULT",
@@ -85,8 +101,8 @@ def export(
     By default these are the motor torques to send; of a simulation, motion, stiffness and motor torques as
     they were.
 
-    Refuses samples that have no value (infeasible or singular steps) with exit code 3 and writes nothing,
-    unless --allow-nan.
+    Refuses samples that have no value (infeasible or singular steps) or an infinite one with exit code 3 and
+    writes nothing, unless --allow-nan.
 
     With --side motor, motion and torque of the motors are those of their shafts, in rad and N m at any joint;
     every motor needs a gear_ratio in the robot file. What is not of a motor stays as it is.
@@ -100,27 +116,36 @@ def export(
     output = None if output == STANDARD else output
     if kind is FileKind.ROBOT:
         _check_options()
-        name = _chosen(form, OF_ROBOTS, file, kind)
+        name = _chosen(form, OF_ROBOTS, output, file, kind)
         return _export_robot(file, output, name, start, overwrite, talk)
     if kind not in {FileKind.RESULT, FileKind.SIMULATION}:
         raise InputError.one(f"is a {kind}; export takes a result, a simulation or a robot", file)
     if start is not None:
         raise InputError.one("--start is for robots; leave it out", file)
-    name = _chosen(form or "csv", OF_RESULTS, file, kind)
+    name = _chosen(form, OF_RESULTS, output, file, kind)
     if OF_RESULTS[name].binary and output is None:
         raise InputError.one(f"a {name} file is no text; name it with -o")
     options = {**of_results, "progress": talk.writing}
     return _export_result(file, output, OF_RESULTS[name], options, overwrite, talk)
 
 
-def _chosen(form: str | None, formats: Any, file: str, kind: FileKind) -> str:
-    """A format that there is for a kind of files."""
-    words = ", ".join(formats)
-    if form is None:
-        raise InputError.one(f"is a {kind}; say by --format as what to write it: {words}", file)
-    if form not in formats:
+def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind: FileKind) -> str:
+    """The format that is meant, by --format or the name of the output; of results CSV if neither says."""
+    words, name = ", ".join(formats), output or ""
+    if form is not None and form not in formats:
         raise InputError.one(f"is a {kind}, which --format {form} is not for; there is {words}", file)
-    return form
+    able = [each for each in formats if ending_of(name) in ENDINGS[each]]
+    if ending_of(name) and not able:
+        endings = ", ".join(dict.fromkeys(ending for each in formats for ending in ENDINGS[each]))
+        raise InputError.one(f"no format of a {kind} has such a name; there is {endings}", name)
+    if form is not None:
+        if able and form not in able:
+            message = f"--format {form} makes no file of this name; name it {ENDINGS[form][0]}"
+            raise InputError.one(message, name)
+        return form
+    if len(able) != 1 and formats is not OF_RESULTS:
+        raise InputError.one(f"is a {kind}; say by --format as what to write it: {words}", file)
+    return able[0] if able else "csv"
 
 
 def _check_options() -> None:
@@ -177,14 +202,18 @@ def _export_result(
     file: str, output: str | None, form: ResultFormat, options: dict[str, Any], overwrite: bool, talk: Talk
 ) -> int:
     from vsacli.base.outputs import Outputs
+    from vsacli.files.resampled import at_rate
     from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
     from vsacli.results.store.simulation import open_stored
 
     try:
-        with open_stored(file) as stored:
+        with ExitStack() as stack:
+            stored = stack.enter_context(open_stored(file))
             talk.detail(result_line(stored))
+            if options["rate"] is not None:
+                stored = stack.enter_context(at_rate(stored, options["rate"]))
             if output is None:
-                export_result(stored, _stdout(), form, **options)
+                export_result(stored, sys.stdout, form, **options)
                 sys.stdout.flush()
             else:
                 with Outputs(overwrite=overwrite, inputs=[file]) as outputs:
@@ -201,9 +230,3 @@ def _write(stored: StoredResult, file: Staged, form: ResultFormat, options: dict
 
     with file.opened_for_bytes() if form.binary else file.opened() as stream:
         export_result(stored, stream, form, **options)
-
-
-def _stdout() -> TextIO:
-    if sys.stdout is None:
-        raise StorageError("standard output", "is closed; name a file with -o")
-    return sys.stdout

@@ -1,8 +1,13 @@
-"""Names of files and folders on the command line, which shells complete."""
+"""Names of files and folders on the command line, which shells complete.
+
+The ending of a name says what the file holds: an output whose name promises another format is refused, since
+whoever opens it, a program or a later command, goes by that name.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
 
 from click.types import StringParamType
 
@@ -27,5 +32,66 @@ class NameType(StringParamType):
         return [CompletionItem(incomplete, type=self.completion)]
 
 
+FIGURES = (".png", ".pdf", ".svg", ".html")
+
+ENDINGS = {
+    "HDF5": (".h5", ".hdf5", ".hdf"),
+    "YAML": (".yaml", ".yml"),
+    "CSV": (".csv",),
+    "MATLAB": (".mat",),
+    "Parquet": (".parquet",),
+    "JSON": (".json",),
+    "XML": (".xml", ".urdf", ".mjcf", ".sdf", ".srdf", ".xacro"),
+    "figures": FIGURES,
+    "programs": (".c", ".h", ".py", ".m"),
+    "other data": (".npy", ".npz", ".xlsx", ".tsv"),
+}
+"""How names of files end that hold what is meant."""
+
+KNOWN = frozenset(ending for endings in ENDINGS.values() for ending in endings)
+
+
+def ending_of(name: str) -> str:
+    """The ending of a name in small letters, if it is one that says what a file holds; else empty."""
+    ending = PurePath(name).suffix.lower()
+    return ending if ending in KNOWN else ""
+
+
+class OutputType(NameType):
+    """A file of one format: a name that promises another one is refused."""
+
+    def __init__(self, form: str, advice: str = "") -> None:
+        super().__init__("file", "file")
+        self.form, self.advice = form, advice
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """See `click.ParamType.convert`."""
+        name = super().convert(value, param, ctx)
+        ending = ending_of(name)
+        if ending and ending not in ENDINGS[self.form]:
+            own, advice = ENDINGS[self.form][0], self.advice if ending == ".csv" else ""
+            self.fail(f"{name!r}: the file is {self.form}; name it {own}{advice}", param, ctx)
+        return name
+
+
+class FolderType(NameType):
+    """A folder; the name of a file is refused, unless there is a folder of that name."""
+
+    def __init__(self) -> None:
+        super().__init__("folder", "dir")
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """See `click.ParamType.convert`."""
+        name = super().convert(value, param, ctx)
+        ending = ending_of(name)
+        if ending and not Path(name).is_dir():
+            chosen = ctx is not None and any(each.name == "file_format" for each in ctx.command.params)
+            advice = f", and the format by --format {ending[1:]}" if chosen and ending in FIGURES else ""
+            self.fail(f"{name!r} is the name of a file; name a folder{advice}", param, ctx)
+        return name
+
+
 FILE = NameType("file", "file")
-FOLDER = NameType("folder", "dir")
+FOLDER = FolderType()
+HDF5_FILE = OutputType("HDF5", "; `vsacli export` makes CSV of it")
+YAML_FILE = OutputType("YAML")

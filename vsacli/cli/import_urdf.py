@@ -9,7 +9,7 @@ import click
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.file_names import FILE
+from vsacli.cli.file_names import FILE, YAML_FILE
 
 
 def _spring(
@@ -46,7 +46,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 @click.option("--tip", metavar="LINK", help="Link of the end effector; needed if there is a choice.")
 @click.option("--srdf", type=FILE, help="SRDF file, a group of which says base and tip.")
 @click.option("--group", metavar="NAME", help="Which group of it; the only one by default.")
-@click.option("-o", "--output", type=FILE, help="Robot file; by default URDF.yaml in this folder.")
+@click.option("-o", "--output", type=YAML_FILE, help="Robot file; by default URDF.yaml in this folder.")
 @click.option(
     "--actuator",
     type=click.Choice(tuple(ACTUATORS)),

@@ -24,6 +24,12 @@ from vsacli.cli.file_names import FILE, FOLDER
 @click.option(
     "--robot", metavar="ROBOT", type=FILE, help="The robot that a trajectory is for, or a recording of."
 )
+@click.option(
+    "--rate",
+    metavar="HZ",
+    type=float,
+    help="Rows per second of a recording without times.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 @click.option(
     "--field",
@@ -43,6 +49,7 @@ from vsacli.cli.file_names import FILE, FOLDER
 def info(
     file: str | None,
     robot: str | None,
+    rate: float | None,
     as_json: bool,
     field: str | None,
     folder: str | None,
@@ -73,7 +80,7 @@ def info(
     else:
         from vsacli.files.info import describe_file
 
-        _show(describe_file(file, robot, talk.looking), as_json, field)
+        _show(describe_file(file, robot, talk.looking, rate), as_json, field)
 
 
 def _show(description: dict[str, Any], as_json: bool, field: str | None) -> None:

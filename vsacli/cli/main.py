@@ -6,6 +6,7 @@ import gc
 import io
 import os
 import sys
+import warnings
 from collections.abc import Mapping, MutableMapping, Sequence
 from typing import Any, NoReturn, cast
 
@@ -89,6 +90,9 @@ def vsacli() -> None:
     """
 
 
+FIRST_OWN = 3
+"""The first number of a file that is no standard stream."""
+
 SELDOM = 100_000
 """New objects before Python looks for garbage: hardly anything that a short run makes is."""
 
@@ -96,6 +100,10 @@ SELDOM = 100_000
 def main() -> NoReturn:
     """Entry point of the command `vsacli`."""
     gc.set_threshold(SELDOM)
+    _hold_closed_streams()
+    if not sys.warnoptions:  # a warning of NumPy helps a developer, who asks for it by `python -W`
+        warnings.simplefilter("ignore", RuntimeWarning)
+        os.environ["PYTHONWARNINGS"] = "ignore::RuntimeWarning"  # for processes that are started
     os.environ["MPLBACKEND"] = "agg"  # a notebook, whose terminal this may be, sets one that is not here
     if isinstance(sys.stdout, io.TextIOWrapper):  # a name may hold letters that the terminal has not
         sys.stdout.reconfigure(errors="backslashreplace")
@@ -103,6 +111,16 @@ def main() -> NoReturn:
         code = run(sys.argv[1:])
     gc.freeze()  # else Python would go through everything once more before it ends
     sys.exit(code)
+
+
+def _hold_closed_streams() -> None:
+    """Open what the caller closed of the three standard streams, as by `>&-`.
+
+    Else the first file that is opened gets the number of one, and what a library prints goes into it.
+    """
+    while (number := os.open(os.devnull, os.O_RDWR)) < FIRST_OWN:
+        os.set_inheritable(number, True)
+    os.close(number)
 
 
 def run(arguments: Sequence[str]) -> int:

@@ -12,9 +12,11 @@ from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.base.streams import STANDARD
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.file_names import FILE
+from vsacli.cli.file_names import FILE, YAML_FILE
 
-_output_option = click.option("-o", "--output", type=FILE, help="File to write; by default standard output.")
+_output_option = click.option(
+    "-o", "--output", type=YAML_FILE, help="File to write; by default standard output."
+)
 
 
 @click.group(

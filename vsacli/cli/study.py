@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import click
 
 from vsacli.base.streams import STANDARD
-from vsacli.cli.command_parts import example, hdf5_name, json_option, overwrite_option
+from vsacli.cli.command_parts import example, json_option, overwrite_option
 from vsacli.cli.console import Exit, Talk, say, talk_options
-from vsacli.cli.file_names import FILE
+from vsacli.cli.file_names import FILE, HDF5_FILE
 
 if TYPE_CHECKING:
     from vsacli.results.store.stored_study import StoredStudy
@@ -34,9 +34,7 @@ def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> t
     epilog=example("vsacli study yield.yaml -o yield.h5"),
 )
 @click.argument("files", type=FILE, metavar="STUDY", nargs=-1, required=True)
-@click.option(
-    "-o", "--output", type=FILE, callback=hdf5_name, help="Table; by default STUDY.h5 in this folder."
-)
+@click.option("-o", "--output", type=HDF5_FILE, help="Table; by default STUDY.h5 in this folder.")
 @click.option(
     "--processes",
     metavar="COUNT",

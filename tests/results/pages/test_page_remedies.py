@@ -62,7 +62,10 @@ def test_each_file_has_its_own_and_one_that_is_fine_has_none(
     page, notes = page_of(vsacli, feasible_result, soft)
     assert page.text.count(HEADING) == 1
     assert page.text.index("Report: rest-to-rest (soft)") < page.text.index(HEADING)
-    assert section(page, f"{HEADING}: rest-to-rest (soft)")[1].startswith("1. reshape the stiffness of base")
+    assert any(
+        line.startswith("1. reshape the stiffness of base")
+        for line in section(page, f"{HEADING}: rest-to-rest (soft)")
+    )
     assert notes == ""
 
 

@@ -11,15 +11,21 @@ import contextlib
 import io
 import os
 import struct
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, StorageError
 from vsacli.documents.source import HDF5_SIGNATURE
+from vsacli.trajectory.curves.closed_form import LONGEST
+
+SCALES = "DIMENSION_LIST"
+"""What HDF5 calls the attribute of a dataset that has coordinates."""
 
 EXPECTED = "expected a result file, as invdyn or simulate writes it"
 
@@ -199,6 +205,17 @@ def own_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
     return dataset
 
 
+def check_present(attributes: Container[str], needed: Iterable[str], name: str = "the file") -> None:
+    """Refuse something that lacks attributes which each file has.
+
+    Raises:
+        ValueError: naming those that are missing.
+    """
+    missing = [each for each in needed if each not in attributes]
+    if missing:
+        raise ValueError(f"{name} has no attribute {', '.join(missing)}")
+
+
 def read_attributes(file: h5py.File) -> None:
     """Read all attributes of everything once: damage of one shows only then."""
     file.visititems(lambda _name, each: dict(each.attrs) and None)
@@ -219,6 +236,24 @@ def bounded(dataset: h5py.Dataset) -> h5py.Dataset:
     if dataset.nbytes > size:
         raise ValueError(f"{dataset.name} claims {dataset.nbytes:,} bytes in a file of {size:,}")
     return dataset
+
+
+def check_times(time: FloatArray) -> None:
+    """Refuse times that no run has, which searches, splines and rates would not survive.
+
+    Raises:
+        ValueError: one is not finite or not later than the one before, or they last longer than any
+            trajectory.
+    """
+    finite, rising = np.isfinite(time), time[1:] > time[:-1]
+    if not finite.all():
+        sample = int(np.argmin(finite))
+        raise ValueError(f"sample {sample} is at {time[sample]} s")
+    if not rising.all():
+        sample = int(np.argmin(rising))
+        raise ValueError(f"{time[sample + 1]:.9g} s follows {time[sample]:.9g} s, at sample {sample + 1}")
+    if time.size and not max(-time[0], time[-1]) <= LONGEST:
+        raise ValueError(f"they go from {time[0]:.3g} to {time[-1]:.3g} s")
 
 
 def _check_chunks(dataset: h5py.Dataset, size: int) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +37,8 @@ class Excerpt(StoredResult):
     def __init__(self, whole: StoredResult, joints: Sequence[str] = (), span: Span = WHOLE) -> None:
         vars(self).update(vars(whole))  # all but what follows is that of the whole file
         self.kind, self.command, self.declared = whole.kind, whole.command, whole.declared
-        self._original, self._steps, self._joints = whole, _steps(whole, span), _numbers(whole, joints)
+        self._original, self._steps = whole, steps_between(whole.time, span, whole.path)
+        self._joints = joint_numbers(whole.joint_names, joints, whole.path)
         self.time = whole.time[self._steps]
         self.samples = self.time.size
         self.complete = whole.complete or self._steps.stop < whole.samples
@@ -50,6 +53,14 @@ class Excerpt(StoredResult):
         end = self.samples if stop is None else min(stop, self.samples)
         values = self._original.read(name, first + start, first + end)
         return values[:, self._joints] if "joint" in self.declared[name].dims else values
+
+    def whole_span(self) -> tuple[float, float]:
+        """As of the whole file."""
+        return self._original.whole_span()
+
+    def provenance(self) -> dict[str, Any]:
+        """As of the whole file."""
+        return self._original.provenance()
 
     def motor_constant(self, name: str) -> FloatArray:
         """As of the whole file, of these joints."""
@@ -69,13 +80,16 @@ class Excerpt(StoredResult):
         return one_of_them and super().has(variable)
 
 
-def _steps(whole: StoredResult, span: Span) -> slice:
-    """The steps in a stretch of time."""
-    time, (first, last) = whole.time, span
-    start, stop = np.searchsorted(time, first), np.searchsorted(time, last, side="right")
+def steps_between(time: FloatArray, span: Span, path: str | Path) -> slice:
+    """Return which of ascending times lie in a stretch.
+
+    Raises:
+        InputError: none does; names the file.
+    """
+    start, stop = np.searchsorted(time, span[0]), np.searchsorted(time, span[1], side="right")
     if start >= stop:
-        steps = f"{whole.samples} steps go {_words((float(time[0]), float(time[-1])))}"
-        raise InputError.one(f"has no step {_words(span)}; its {steps}", whole.path)
+        steps = f"{len(time)} steps go {_words((float(time[0]), float(time[-1])))}"
+        raise InputError.one(f"has no step {_words(span)}; its {steps}", path)
     return slice(int(start), int(stop))
 
 
@@ -84,12 +98,15 @@ def _words(span: Span) -> str:
     return " ".join(f"{word} {time_text(time)}" for word, time in ends if not math.isinf(time))
 
 
-def _numbers(whole: StoredResult, joints: Sequence[str]) -> list[int]:
-    """Numbers of the joints, ascending."""
-    unknown = [name for name in joints if name not in whole.joint_names]
+def joint_numbers(names: Sequence[str], chosen: Sequence[str], path: str | Path) -> list[int]:
+    """Return the numbers of chosen joints, ascending; those of all if none is chosen.
+
+    Raises:
+        InputError: a joint is not among the names; names the file.
+    """
+    unknown = [name for name in chosen if name not in names]
     if unknown:
         raise InputError(
-            Problem(str(whole.path), 0, f"has no joint {name!r}{did_you_mean(name, whole.joint_names)}")
-            for name in unknown
+            Problem(str(path), 0, f"has no joint {name!r}{did_you_mean(name, names)}") for name in unknown
         )
-    return [number for number, name in enumerate(whole.joint_names) if not joints or name in joints]
+    return [number for number, name in enumerate(names) if not chosen or name in chosen]

@@ -18,13 +18,24 @@ from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line, shown
 from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import (
+    SCALES,
     CheckedFile,
+    check_present,
+    check_times,
     own_dataset,
     read_attributes,
     reporting_damage,
 )
 from vsacli.results.store.inputs import StoredInput
-from vsacli.results.store.schema import DOUBLE, EXISTING, FORMAT, PRECISION, row_shape, storage_type
+from vsacli.results.store.schema import (
+    DOUBLE,
+    EXISTING,
+    FORMAT,
+    PRECISION,
+    row_shape,
+    storage_type,
+    variable_attributes,
+)
 from vsacli.results.store.stored_file import StoredFile
 from vsacli.results.store.stored_geometry import DH, StoredGeometry
 from vsacli.results.store.stored_limits import ACHIEVED, RANGES, SIZES
@@ -35,8 +46,11 @@ OF_JOINTS = "inputs/robot/joints/{}"
 BLOCK_SAMPLES = 8192
 """Samples that are read at a time to see whether they can be."""
 
-COMPUTED_BY = ("engine", "compiler", "threads", PRECISION)
-"""Attributes that not every file has."""
+MADE_BY = ("created", "generated_by", "command_line", "versions", "Conventions")
+"""Root attributes of every file."""
+
+COMPUTED_BY = ("engine", "compiler", "threads")
+"""Root attributes of files that a run has written: all of them, or none."""
 
 
 class StoredResult(StoredFile):
@@ -62,6 +76,7 @@ class StoredResult(StoredFile):
     kind = "result"
     command = "invdyn"
     declared: Mapping[str, Variable] = VARIABLES
+    _of_runs: tuple[str, ...] = ("options",)
     _to_get = "run invdyn again without --variables, or with {} among them"
 
     @classmethod
@@ -78,6 +93,7 @@ class StoredResult(StoredFile):
         super().__init__(path, file)
         with reporting_damage(path):
             self.attributes: dict[str, Any] = dict(file.attrs)
+            check_present(self.attributes, ("robot_name", "trajectory_name", "verdict", "complete"))
             self.robot_name, self.trajectory_name, self.verdict = (
                 one_line(str(file.attrs[name])) for name in ("robot_name", "trajectory_name", "verdict")
             )
@@ -161,24 +177,19 @@ class StoredResult(StoredFile):
         return int(shape[0])
 
     def whole_span(self) -> tuple[float, float]:
-        """First and last time of the run, also of an excerpt of it, s.
-
-        Raises:
-            InputError: they are damaged.
-        """
-        with reporting_damage(self.path, "time"):
-            stored = self._dataset("time")
-            return float(stored[0]), float(stored[-1])
+        """First and last time of the run, also of an excerpt of it, s; see `time`."""
+        return float(self.time[0]), float(self.time[-1])
 
     @cached_property
     def time(self) -> FloatArray:
-        """Times, (samples,), s.
+        """Times, (samples,), s; finite, and each later than the one before.
 
         Raises:
-            InputError: they are damaged.
+            InputError: they are not, or are damaged otherwise.
         """
         with reporting_damage(self.path, "time"):
             values: FloatArray = self._dataset("time")[...]
+            check_times(values)
         return values
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
@@ -188,6 +199,8 @@ class StoredResult(StoredFile):
             InputError: there is no such variable, the file does not hold it, or it is damaged there.
         """
         select_variables([name], self.declared)
+        if name == "time":
+            return self.time[start:stop]
         if name not in self._file:
             raise InputError.one(f"holds no {name}; {self._to_get.format(name)}", self.path)
         with reporting_damage(self.path, name):
@@ -226,6 +239,11 @@ class StoredResult(StoredFile):
         self.provenance()
         with reporting_damage(self.path):
             read_attributes(self._file)
+            for name in ("time", *self.variables):
+                needed = variable_attributes(self.declared[name], self.joint_types)
+                check_present(self._file[name].attrs, needed, name)
+                if self.declared[name].dims:
+                    check_present(self._file[name].attrs, [SCALES], name)
 
     def existing(self, variable: Variable) -> BoolArray:
         """Which columns of a variable of joints there are, (joints, 1 or 2)."""
@@ -241,10 +259,13 @@ class StoredResult(StoredFile):
         Raises:
             InputError: the file is damaged.
         """
+        known = (*COMPUTED_BY, PRECISION)
         with reporting_damage(self.path):
+            ran = any(name in self.attributes for name in (*COMPUTED_BY, *self._of_runs))
+            check_present(self.attributes, (*MADE_BY, *((*COMPUTED_BY, *self._of_runs) if ran else ())))
             provenance = {
                 **{name: str(self.attributes[name]) for name in ("created", "generated_by", "command_line")},
-                **{name: str(self.attributes[name]) for name in COMPUTED_BY if name in self.attributes},
+                **{name: str(self.attributes[name]) for name in known if name in self.attributes},
                 "versions": json.loads(self.attributes["versions"]),
                 "options": json.loads(self.attributes.get("options", "{}")),
                 "inputs": [

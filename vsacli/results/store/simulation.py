@@ -23,6 +23,7 @@ class StoredSimulation(StoredResult):
     kind = "simulation"
     command = "simulate"
     declared = SIMULATION_VARIABLES
+    _of_runs = ()
     _to_get = "run simulate again"
 
 

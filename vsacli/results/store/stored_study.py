@@ -10,12 +10,14 @@ from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import one_line
 from vsacli.base.units import Quantity
-from vsacli.results.store.damage import CheckedFile, reporting_damage
+from vsacli.results.store.damage import SCALES, CheckedFile, check_present, read_attributes, reporting_damage
 from vsacli.results.store.stored_file import StoredFile
 from vsacli.results.store.study_table import FORMAT, TEXTS
 
 PROVENANCE = ("method", "seed", "engine", "compiler", "numpy", "command_line")
 """Root attributes that say how a table was computed."""
+
+OF_COLUMNS = ("units", "long_name", "coordinates", SCALES)
 
 
 ALL = slice(None)
@@ -134,8 +136,14 @@ class StoredStudy(StoredFile):
         return bool(self._dataset(path).dtype.kind != "f")
 
     def provenance(self) -> dict[str, str]:
-        """What is known of how it was computed: method, seed and engine, and what was typed."""
-        return {name: str(self.attributes[name]) for name in PROVENANCE if name in self.attributes}
+        """What is known of how it was computed: method, seed and engine, and what was typed.
+
+        Raises:
+            InputError: some of it is missing.
+        """
+        with reporting_damage(self.path):
+            check_present(self.attributes, (*PROVENANCE, "created", "generated_by", "Conventions"))
+        return {name: str(self.attributes[name]) for name in PROVENANCE}
 
     def check(self) -> None:
         """Read everything once.
@@ -148,3 +156,8 @@ class StoredStudy(StoredFile):
         for name in ("run", *self.columns):
             self.read(name)
         self.inputs()
+        self.provenance()
+        with reporting_damage(self.path):
+            read_attributes(self._file)
+            for name in self.columns:
+                check_present(self._file[name].attrs, OF_COLUMNS, name)

@@ -1,7 +1,8 @@
 """Rows that are finished, in a file that is only ever added to: whatever ends the study, they stay.
 
-A line holds the checksum of what follows, the key of the row, and the row. What a kill or a full disk left
-of a line is cut off when the journal is opened again.
+The first line says that the file is a journal. Each further line holds the checksum of what follows, the key
+of the row, and the row. What a kill or a full disk left of the last line is cut off when the journal is
+opened again; damaged lines before it are passed over.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import base64
 import contextlib
 import json
 import os
+import re
 import time
 import zlib
 from pathlib import Path
@@ -22,6 +24,9 @@ from vsacli.base.errors import StorageError
 from vsacli.base.storage import reason, reporting_storage_errors
 from vsacli.studies.sweeps.rows import Row
 
+FIRST_LINE = b"vsacli-study-journal/1\n"
+"""Without it a file is somebody else's, whatever it is called."""
+
 SYNC_SECONDS = 1.0
 """How often rows are forced to the disk: what a power failure may cost; a kill costs none."""
 
@@ -32,12 +37,17 @@ class Journal:
     Args:
         path: of the journal; it is made if it does not exist.
 
+    Attributes:
+        path: the same.
+        damaged: numbers of the lines, from 1, that hold no row although they were written whole.
+
     Raises:
-        StorageError: it cannot be opened, or another process works with it.
+        StorageError: it cannot be opened, is no journal, or another process works with it.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.damaged: list[int] = []
         self._places: dict[str, tuple[int, int]] = {}
 
     def __enter__(self) -> Self:
@@ -82,16 +92,41 @@ class Journal:
             pass  # a system or file system without locks
 
     def _index(self) -> None:
-        """Find the rows; what begins with the first line that is not whole is cut off."""
-        self._end = 0
+        """Find the rows; the end of a line that was being written is cut off.
+
+        Raises:
+            StorageError: the file is no journal; it stays as it is.
+        """
         with open(self._file, "rb", closefd=False) as file:
-            for line in file:
-                key = _key(line)
-                if key is None:
+            self._check_first_line(file.readline(len(FIRST_LINE)))
+            self._end = len(FIRST_LINE)
+            for number, line in enumerate(file, 2):
+                if not line.endswith(b"\n"):
                     break
-                self._places[key] = (self._end, len(line))
+                start, key = _row_in(line)
+                if key:
+                    self._places[key] = (self._end + start, len(line) - start)
+                if start or not key:
+                    self.damaged.append(number)
                 self._end += len(line)
         os.ftruncate(self._file, self._end)
+
+    def _check_first_line(self, line: bytes) -> None:
+        """Begin a journal in an empty file, or in one whose beginning a kill cut off."""
+        if line == FIRST_LINE:
+            return
+        if not FIRST_LINE.startswith(line):
+            raise StorageError(
+                self.path,
+                "is no journal of a study, and stands where this one keeps its finished runs; move it, or "
+                "name another table with -o",
+            )
+        try:
+            os.lseek(self._file, 0, os.SEEK_SET)
+            os.write(self._file, FIRST_LINE)
+        except OSError:
+            self.remove()
+            raise
 
     def add(self, row: Row) -> None:
         """Add a row.
@@ -140,6 +175,9 @@ _CHECK = 8
 """Hexadecimal digits of a checksum."""
 
 
+_BEGINNING = re.compile(rb'[0-9a-f]{8} \{"key": ')
+
+
 def _line(row: Row) -> bytes:
     arrays = {name: base64.b64encode(getattr(row, name).tobytes()).decode() for name in _ARRAYS}
     content = {"key": row.key, "verdict": row.verdict, "error": row.error, **arrays}
@@ -147,9 +185,13 @@ def _line(row: Row) -> bytes:
     return b"%08x %s\n" % (zlib.crc32(text), text)
 
 
-def _key(line: bytes) -> str | None:
-    """The key of the row in a line; None if the line is not whole."""
-    text = line[_CHECK + 1 : -1]
-    if not line.endswith(b"\n") or line[:_CHECK] != b"%08x" % zlib.crc32(text):
-        return None
-    return str(json.loads(text)["key"])
+def _row_in(line: bytes) -> tuple[int, str]:
+    """Where the row begins that a line ends with, and its key; no key if it ends with none.
+
+    A line whose break is damaged is followed by a row that is whole.
+    """
+    for start in (0, *(found.start() for found in _BEGINNING.finditer(line, 1))):
+        text = line[start + _CHECK + 1 : -1]
+        if line[start : start + _CHECK] == b"%08x" % zlib.crc32(text):
+            return start, str(json.loads(text)["key"])
+    return 0, ""

@@ -130,7 +130,7 @@ KEPT = {
             "co_contraction",
             JOINT,
             units.TORQUE,
-            "root mean square of half the difference of the motor torques",
+            "root mean square of half the difference of the spring torques",
             lambda joint: joint.energy.co_contraction,
             whole=True,
         ),

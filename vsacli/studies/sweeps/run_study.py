@@ -23,6 +23,10 @@ RUNS_A_PROCESS = 25
 """A process takes as long to begin as some 25 short runs."""
 
 
+MOST_LINES_NAMED = 5
+"""Damaged lines of a journal up to which all are named."""
+
+
 class Shard(NamedTuple):
     """Which part of a study is computed: part `number` of `parts`, the runs taken in turn."""
 
@@ -85,6 +89,7 @@ def run_study(
     with Outputs(overwrite=overwrite, inputs=[source.path for source in study.sources]) as outputs:
         outputs.check(target)
         with Journal(target.with_name(f"{target.name}.journal")) as journal:
+            _tell_damage(journal, tell)
             file, runs = outputs.file(target), part.runs(study)
             with _telling_what_is_kept(journal, tell):
                 lost = _computed(study, runs, journal, _Means(processes, dask), progress, tell)
@@ -118,6 +123,17 @@ class _Means(NamedTuple):
         paying = 1 + runs // RUNS_A_PROCESS if short else runs
         count = min(processors(), paying) if self.processes is None else min(self.processes, runs)
         return executor(study, count, self.dask, tell)
+
+
+def _tell_damage(journal: Journal, tell: Callable[[str], object]) -> None:
+    if journal.damaged:
+        numbers = ", ".join(map(str, journal.damaged[:MOST_LINES_NAMED]))
+        more = len(journal.damaged) - MOST_LINES_NAMED
+        words = (
+            ("lines", "are", "their runs are") if len(journal.damaged) > 1 else ("line", "is", "its run is")
+        )
+        named = f"{words[0]} {numbers}{f' and {more} more' if more > 0 else ''}"
+        tell(f"{journal.path}: {named} {words[1]} damaged; {words[2]} computed again")
 
 
 def _computed(
