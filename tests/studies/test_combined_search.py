@@ -75,7 +75,7 @@ def test_fastest_is_as_fast_as_a_limit_of_the_motion_lets_it():
     trajectory = rest_to_rest(1.0, 810.0)
     peak = math.pi / 2 * math.factorial(7) / math.factorial(3) ** 2 / 4**3  # of the degree 7, in 1 s
     found = search(robot, trajectory).fastest()
-    assert found.factor == pytest.approx(peak / 2.0, abs=1.01e-4)
+    assert 0 <= found.factor - peak / 2.0 <= 1.01e-3  # whole periods of 1 kHz
     assert found.changes.keys() == {1}
 
 
@@ -87,12 +87,12 @@ def test_too_fast_and_slightly_too_soft_takes_both():
     )
     (remedy,) = found.remedies
     assert remedy.sentence == (
-        "slow down by a factor 1.7181 (1 s -> 1.7181 s), and raise the stiffness of shoulder by 19.56 N m/rad"
+        "slow down by a factor 1.719 (1 s -> 1.719 s), and raise the stiffness of shoulder by 19.55 N m/rad"
     )
     assert accepted(remedy.robot, remedy.trajectory)
     content = remedy.as_json()
-    assert content["slow_down"]["factor"] == 1.7181
-    assert content["stiffness_offset"]["offsets"] == {"base": 0.0, "shoulder": 19.56, "elbow": 0.0}
+    assert content["slow_down"]["factor"] == 1.719
+    assert content["stiffness_offset"]["offsets"] == {"base": 0.0, "shoulder": 19.55, "elbow": 0.0}
     assert "preload" not in content
     assert content["text"] == remedy.sentence
 

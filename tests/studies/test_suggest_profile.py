@@ -28,8 +28,8 @@ from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.joint import Limits
 from vsacli.studies.remedies import suggest
 from vsacli.studies.remedies.acceptance import Acceptance
+from vsacli.studies.remedies.combination import AS_IT_IS
 from vsacli.studies.remedies.nearest_spline import Bounds, NoSplineError, nearest_spline
-from vsacli.studies.remedies.smallest_changes import AS_IT_IS
 from vsacli.studies.remedies.suggestions import NotPossible
 from vsacli.studies.remedies.task import Task
 from vsacli.trajectory.curves.sinusoids import Sinusoids
@@ -128,7 +128,10 @@ def test_profile_follows_the_corridor_and_is_nearer_than_the_offset(duration, st
     robot, trajectory = vsa_3r(), rest_to_rest(duration, stiffness, rate=800 / duration)
     suggestions = suggest(robot, trajectory, MARGIN)
     fixed, found = profile(robot, trajectory)
-    assert suggestions.stiffness_profile == found
+    # the suggested one also minds instants between steps, which moves the fourth digit
+    for suggested, first in zip(suggestions.stiffness_profile.changes, found.changes, strict=True):
+        assert suggested.joint == first.joint
+        assert suggested.largest == pytest.approx(first.largest, rel=1e-3)
     assert accepted(robot, fixed, MARGIN)
     constants = {each.joint: each.value for each in suggestions.stiffness_offset.offsets}
     for joint in found.changes:
@@ -229,15 +232,16 @@ def test_deflection_limit_bounds_the_profile_from_above():
 def test_stiffness_limit_below_what_the_load_needs():
     robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 820.0)))
     assert reason(robot, rest_to_rest(4.0, (850.0, 810.0, 850.0))) == (
-        "shoulder needs at least 828.005 N m/rad at t = 0.930 s, "
-        "but its limits of stiffness and deflection allow at most 820"
+        "shoulder: stiffness is 810 N m/rad at t = 0.000 s, even at rest, below the 827.7 its load allows: "
+        "no slower motion and no constant stiffness helps"
     )
 
 
 def test_limits_of_the_motion_are_none_of_the_stiffness():
     robot = changed(BASE, limits=Limits(position=(-1.0, 1.0)))
     assert reason(robot, rest_to_rest(1.0)) == (
-        "the position of base, 1.5708 rad at t = 1.000 s, is above its limit 1"
+        "base: position is 1.571 rad at t = 1.000 s, above its limit of 1: "
+        "no timing and no stiffness changes that, another path does"
     )
 
 

@@ -25,10 +25,13 @@ from samples.robots import vsa_3r
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.robot.joint import Limits
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.remedies.slow_down import FACTOR_DENOMINATOR, smallest_slow_down
+from vsacli.studies.remedies.slow_down import Factors, smallest_slow_down
 from vsacli.trajectory.trajectory import Trajectory
 
-STEP = 1 / FACTOR_DENOMINATOR
+
+def step_of(trajectory):
+    """By how much the next factor is larger: a period of the rate, or 1e-4 where steps are recorded."""
+    return 1 / Factors.of(trajectory).denominator
 
 
 def slow_down(robot, trajectory, near_singular=0.01):
@@ -38,13 +41,24 @@ def slow_down(robot, trajectory, near_singular=0.01):
 def check_smallest(robot, trajectory, factor, near_singular=0.01):
     """Accepted on all steps, and the next smaller factor is not."""
     assert accepted(robot, trajectory.stretched(factor), near_singular)
-    assert not accepted(robot, trajectory.stretched(factor - STEP), near_singular)
+    assert not accepted(robot, trajectory.stretched(factor - step_of(trajectory)), near_singular)
 
 
 def test_fast_motion_of_the_paper_ends_at_its_threshold_duration():
-    # The closed bound gives 0.53557 s, to five digits; a margin of 1e-6 moves it by less than that.
+    # The closed bound gives 0.53557 s, to five digits; a margin of 1e-6 moves it by less than that. The next
+    # whole millisecond is 0.536 s.
     factor = slow_down(vsa_3r(), rest_to_rest(0.5), near_singular=1e-6)
-    assert 0.5 * factor == pytest.approx(0.53557, abs=0.5 * STEP + 1e-5)
+    assert 0.5 * factor == pytest.approx(0.536, rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", [1000.0, 333.3, 21.0])
+def test_a_controller_can_run_what_is_slowed_down(rate):
+    trajectory = rest_to_rest(0.5, rate=rate)
+    slower = trajectory.stretched(slow_down(vsa_3r(), trajectory))
+    steps = slower.duration * rate
+    assert steps == pytest.approx(round(steps), rel=1e-12)  # rounding of the duration
+    assert slower.times.notes == ()
+    assert slower.duration > trajectory.duration
 
 
 @pytest.mark.slow
@@ -64,7 +78,7 @@ def test_velocity_limit_gives_the_ratio_of_the_velocities():
     robot = changed(BASE, limits=Limits(velocity=(-limit, limit)))
     peak = math.pi / 2 * math.factorial(7) / math.factorial(3) ** 2 / 4**3  # of the degree 7, in 1 s
     factor = slow_down(robot, rest_to_rest(1.0))
-    assert factor == pytest.approx(peak / limit, abs=1.01 * STEP)
+    assert factor == pytest.approx(peak / limit, abs=1.01 * step_of(rest_to_rest(1.0)))
     assert factor >= peak / limit * (1 - 1e-6)  # a step may miss the very peak
 
 
@@ -147,7 +161,7 @@ def test_recorded_steps_are_stretched():
     assert slower.times.span == (2.0, pytest.approx(2.0 + 0.5 * factor))
     check_smallest(vsa_3r(), trajectory, factor)
     # interpolation between 201 samples moves the accelerations by less than a thousandth
-    assert factor == pytest.approx(slow_down(vsa_3r(), rest_to_rest(0.5)), rel=1e-3)
+    assert factor == pytest.approx(slow_down(vsa_3r(), rest_to_rest(0.5, rate=20_000.0)), rel=1e-3)
 
 
 def test_wrench_counts_and_is_stretched_too():

@@ -22,7 +22,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.file_names import FOLDER, YAML_FILE
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 @click.option(
     "--write-fixed",
     "fixed",
-    type=FILE,
+    type=YAML_FILE,
     help="Write the first suggestion as a trajectory, with a CSV beside it for what is no formula, and as"
     " FILE-robot.yaml the robot, if its preload changes; implies --suggest.",
 )

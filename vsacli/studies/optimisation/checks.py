@@ -74,4 +74,4 @@ def checked_criterion(robot: Robot, name: str, joints: Sequence[int]) -> Criteri
 def confirmed(what: Optimum, trajectory: Trajectory) -> bool:
     """Whether a run keeps margin and limits."""
     task = Task(Acceptance(what.robot, what.margin), trajectory)
-    return task.confirms(Remedy(0.0, what.robot, trajectory))
+    return task.falls_short(Remedy(0.0, what.robot, trajectory)) is None

@@ -24,9 +24,12 @@ from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
 from vsacli.studies.remedies.motions import Load
-from vsacli.studies.remedies.smallest_changes import STRICTER
 from vsacli.studies.remedies.task import STEPS
 from vsacli.trajectory.trajectory import Trajectory
+
+STRICTER = (0.0, 0.001, 0.01)
+"""Shares by which the rule is stricter, one after the other: what has the margin at the steps may fall short
+of it between them."""
 
 
 def cheapest_stiffness(

@@ -10,9 +10,8 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, Speeds
-from vsacli.trajectory.fits import INTERPOLATE, FitChoice
 from vsacli.trajectory.profile import WrenchProfile
-from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.recorded.hermite import HermiteSpline
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -54,12 +53,9 @@ def retimed(
         for order, each in enumerate(STIFFNESS.names):
             arrays[each][index] = spline(s, nu=order)
 
-    def recorded(signal: Signal) -> SampledProfile:
+    def recorded(signal: Signal) -> HermiteSpline:
         by_s = np.stack([arrays[each] for each in signal.names])
-        values, *derivatives = speeds.rates(list(by_s))
-        labels = tuple(f"column {component}" for component in range(len(values)))
-        samples = Samples.recorded(signal, time, values, tuple(derivatives), labels)
-        return SampledProfile.of(samples, FitChoice(INTERPOLATE))
+        return HermiteSpline(signal=signal, time=time, rows=np.stack(speeds.rates(list(by_s))))
 
     wrench = None if motion.wrench is None else WrenchProfile(recorded(WRENCH), motion.wrench.frame)
     commanded = {

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from vsacli.actuators.limit_check import Excess, LimitCheck, OfJoint
+from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import VsacliError
@@ -20,7 +20,7 @@ from vsacli.dynamics.inverse import compute_block, usual_block
 from vsacli.dynamics.limits import limit_checks, limit_flags
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.remedies.motions import Instants, Load, Passage
+from vsacli.studies.remedies.motions import Instants, Load, Passage, evenly_chosen, joined
 from vsacli.studies.remedies.recorded_limits import RecordedLimits
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -49,12 +49,16 @@ class Acceptance:
         near_singular: the margin.
         recorded: how limits are judged if the task was recorded.
         reserve: share of each limit of `RESERVED` that is kept clear of.
+        ignored: joints that do not count, by index.
+        between: instants between the steps that count as well, since the start of the task as it is, s.
     """
 
     robot: Robot
     near_singular: float
     recorded: RecordedLimits | None = None
     reserve: float = 0.0
+    ignored: frozenset[int] = frozenset()
+    between: FloatArray = field(default_factory=lambda: np.empty(0), compare=False)
 
     def stricter(self, share: float) -> Acceptance:
         """The same with a margin that is larger by a share, which is kept clear of limits as well."""
@@ -68,13 +72,24 @@ class Acceptance:
             self._refused(joint, of_joint, passage.instants)
             for joint, of_joint in zip(self.robot.joints, values, strict=True)
         ]
-        return np.stack(by_joint, axis=1)
+        refused = np.stack(by_joint, axis=1)
+        refused[:, list(self.ignored)] = False
+        return refused
 
     def passages(self, trajectory: Trajectory, factor: float = 1.0) -> Iterator[Passage]:
-        """All steps of a task, or of one that was stretched by a factor, block by block."""
+        """All steps of a task, or of one that was stretched by a factor, in blocks; then what is between."""
         samples = usual_block(len(self.robot.joints))
         for start in range(0, trajectory.samples, samples):
             yield Passage.of(trajectory, start, start + samples, factor)
+        if self.between.size:
+            yield Passage.between(trajectory, self.between, factor)
+
+    def watched(self, trajectory: Trajectory, steps: int) -> Passage:
+        """At most so many steps of a task, and the instants between the steps that count."""
+        passages = [evenly_chosen(trajectory, steps)]
+        if self.between.size:
+            passages.append(Passage.between(trajectory, self.between))
+        return joined(passages)
 
     def refused_joints(self, trajectory: Trajectory, factor: float = 1.0) -> BoolArray:
         """The joints with any step that is not accepted, (joints,)."""
@@ -87,32 +102,39 @@ class Acceptance:
         """The steps of one joint that are not accepted, (samples,)."""
         return self._refused(joint, self._driven(joint, load), load.instants)
 
-    def position_reasons(self, trajectory: Trajectory) -> tuple[str, ...]:
-        """For each joint the limit of its position that the motion exceeds, at whatever speed, if it does."""
-        found: dict[str, str] = {}
+    def beyond_position(self, trajectory: Trajectory) -> dict[int, Trouble]:
+        """For each joint, by index, how it exceeds a limit of its position, at whatever speed, if it does."""
+        found: dict[int, Trouble] = {}
         for passage in self.passages(trajectory):
             for index, joint in enumerate(self.robot.joints):
                 values = {"q": passage.motion.q[:, index]}
-                if reason := self._limit_reason(joint, values, passage.motion.time, passage.instants):
-                    found.setdefault(joint.name, reason)
-        return tuple(found.values())
+                trouble = self._limit_trouble(joint, values, passage.motion.time, passage.instants)
+                if trouble is not None:
+                    found.setdefault(index, trouble)
+        return found
 
     def reasons(self, passage: Passage) -> tuple[str, ...]:
         """For each joint that is not accepted throughout, the worst that is wrong with it."""
-        loads = passage.loads(self.robot)
-        found = (self.reason(joint, load) for joint, load in zip(self.robot.joints, loads, strict=True))
+        joints = enumerate(zip(self.robot.joints, passage.loads(self.robot), strict=True))
+        found = (self.reason(*pair) for index, pair in joints if index not in self.ignored)
         return tuple(reason for reason in found if reason)
 
-    def reason(self, joint: Joint, load: Load) -> str:
-        """The worst that is wrong with the steps of one joint, in a clause; empty if they are accepted."""
+    def trouble(self, joint: Joint, load: Load) -> Trouble | None:
+        """The worst that is wrong with the steps of one joint; None if they are accepted."""
         values = self._driven(joint, load)
-        limit_reason = self._limit_reason(joint, values, load.time, load.instants)
-        return self._reach_reason(joint, load, values) or limit_reason
+        of_limits = self._limit_trouble(joint, values, load.time, load.instants)
+        return self._reach_trouble(joint, load, values) or of_limits
+
+    def reason(self, joint: Joint, load: Load) -> str:
+        """The same in a clause; empty if they are accepted."""
+        trouble = self.trouble(joint, load)
+        return "" if trouble is None else trouble.clause(joint)
 
     def path_reason(self, joint: Joint, load: Load) -> str:
         """A limit that the motion itself exceeds, whatever the stiffness, in a clause; empty if none."""
         values = {"q": load.command.q, "dq": load.command.dq}
-        return self._limit_reason(joint, values, load.time, load.instants)
+        trouble = self._limit_trouble(joint, values, load.time, load.instants)
+        return "" if trouble is None else trouble.clause(joint)
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
         """All variables of one joint, by name."""
@@ -134,7 +156,7 @@ class Acceptance:
                 near |= check.clearance(values) < self.reserve
         return near
 
-    def _reach_reason(self, joint: Joint, load: Load, values: OfJoint) -> str:
+    def _reach_trouble(self, joint: Joint, load: Load, values: OfJoint) -> Trouble | None:
         asked = load.command.commanded["stiffness"]
         lower, upper = values["stiffness_lower"], values["stiffness_upper"]
         gap = margin(asked, lower, upper)
@@ -142,46 +164,64 @@ class Acceptance:
         gap[has(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf
         step = int(gap.argmin())
         if gap[step] >= self.near_singular:
-            return ""
-        return _corridor_reason(
-            joint,
-            load.time[step],
-            asked[step],
-            lower[step] / (1 - self.near_singular),
-            upper[step] / (1 + self.near_singular),
+            return None
+        low, high = lower[step] / (1 - self.near_singular), upper[step] / (1 + self.near_singular)
+        bound = low if math.isnan(low) or asked[step] < low else high
+        return Trouble(
+            "stiffness", "stiffness", load.time[step], asked[step], bound, STIFFNESS.unit(joint.type)
         )
 
-    def _limit_reason(self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants) -> str:
+    def _limit_trouble(
+        self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
+    ) -> Trouble | None:
         """The first kind of limit that is exceeded, of those on variables that were computed."""
         flags = limit_flags(joint, values, np.zeros(len(time), dtype=np.uint16))
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
         for check in limit_checks(joint):
             if check.variable in values and (excess := check.worst(values, flags)):
-                return _limit_text(joint, time[excess.step], check, excess)
-        return ""
+                whose, unit = check.flag.quantity_of(check.motor), check.unit(joint.type)
+                return Trouble(check.variable, whose, time[excess.step], excess.value, excess.bound, unit)
+        return None
+
+
+class Trouble(NamedTuple):
+    """The worst step at which a joint is not accepted.
+
+    Attributes:
+        variable: what is beyond a bound, by its name in results.
+        whose: the same in words.
+        time: when, s.
+        value: of the variable there.
+        bound: that it is beyond; NaN if no stiffness carries the elastic torque.
+        unit: of both.
+    """
+
+    variable: str
+    whose: str
+    time: float
+    value: float
+    bound: float
+    unit: str
+
+    def clause(self, joint: Joint) -> str:
+        """What is wrong, and with which joint."""
+        when = f"at t = {self.time:.3f} s"
+        if math.isnan(self.bound):
+            whatever = "" if math.isnan(self.value) else " at any stiffness"
+            return f"the springs of {joint.name} cannot carry its elastic torque {when}{whatever}"
+        below = self.value < self.bound
+        if self.variable == "stiffness":
+            needed = f"{'at least' if below else 'at most'} {stiffness_text(joint, self.bound)}"
+            return f"{joint.name} needs {needed} {when} and is asked for {self.value:.6g}"
+        asked = f"{self.value:.6g} {self.unit} {when}"
+        side = "below" if below else "above"
+        return f"the {self.whose} of {joint.name}, {asked}, is {side} its limit {self.bound:g}"
 
 
 def stiffness_text(joint: Joint, value: float) -> str:
     """A stiffness with its unit."""
     return f"{value:.6g} {STIFFNESS.unit(joint.type)}"
-
-
-def _corridor_reason(joint: Joint, time: float, asked: float, low: float, high: float) -> str:
-    """A step whose stiffness is not between the smallest and the largest that would be accepted."""
-    when = f"at t = {time:.3f} s"
-    if math.isnan(low):
-        whatever = "" if math.isnan(asked) else " at any stiffness"
-        return f"the springs of {joint.name} cannot carry its elastic torque {when}{whatever}"
-    side, bound = ("at least", low) if asked < low else ("at most", high)
-    return f"{joint.name} needs {side} {stiffness_text(joint, bound)} {when} and is asked for {asked:.6g}"
-
-
-def _limit_text(joint: Joint, time: float, check: LimitCheck, excess: Excess) -> str:
-    """A step that exceeds a limit."""
-    whose, side = check.flag.quantity_of(check.motor), "below" if excess.value < excess.bound else "above"
-    asked = f"{excess.value:.6g} {check.unit(joint.type)} at t = {time:.3f} s"
-    return f"the {whose} of {joint.name}, {asked}, is {side} its limit {excess.bound:g}"
 
 
 class Candidates(Protocol):

@@ -13,7 +13,7 @@ from vsacli.dynamics.inverse import elastic_torques, usual_block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.remedies.motions import Load
+from vsacli.studies.remedies.motions import Load, motion_between
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -21,11 +21,23 @@ BISECTIONS = 50
 """Bisections of a share of 0 to 1: down to rounding."""
 
 
-def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int], factor: float = 1.0) -> list[Load]:
+def joint_loads(
+    robot: Robot,
+    trajectory: Trajectory,
+    joints: list[int],
+    factor: float = 1.0,
+    between: FloatArray | None = None,
+) -> list[Load]:
     """The loads of some joints, given by index: at every step, and half-way from one to the next.
 
-    Every second instant, from the first on, is a step. The trajectory is a task, or one that was stretched by
-    a factor.
+    Every second instant, from the first on, is a step, unless there are further instants.
+
+    Args:
+        robot: the robot.
+        trajectory: a task, or one that was stretched.
+        joints: by index.
+        factor: of the stretching.
+        between: further instants, as times since the start of the task as it is, s.
     """
     instants = 2 * trajectory.samples - 1
     names = Command.names(trajectory.commanded)
@@ -35,27 +47,22 @@ def joint_loads(robot: Robot, trajectory: Trajectory, joints: list[int], factor:
         steps = trajectory.block(start, start + samples + 1)
         middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
         for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
-            _fill(robot, motion, joints, names, time[first:], rows[:, :, first:])
+            places = slice(first, first + 2 * len(motion.time), 2)
+            time[places], rows[:, :, places] = motion.time, _rows(robot, motion, joints, names)
+    if between is not None and between.size:
+        motion = motion_between(trajectory, between, factor)
+        time, chosen = np.unique(np.concatenate([time, motion.time]), return_index=True)
+        rows = np.concatenate([rows, _rows(robot, motion, joints, names)], axis=2)[:, :, chosen]
     commands = (Command.of(dict(zip(names, of_joint, strict=True))) for of_joint in rows)
     return [Load.over(trajectory, factor, time, command) for command in commands]
 
 
-def _fill(
-    robot: Robot,
-    motion: Motion,
-    joints: list[int],
-    names: tuple[str, ...],
-    time: FloatArray,
-    rows: FloatArray,
-) -> None:
-    """Enter a motion at every second instant."""
-    if not len(motion.time):
-        return
-    places = slice(0, 2 * len(motion.time), 2)
+def _rows(robot: Robot, motion: Motion, joints: list[int], names: tuple[str, ...]) -> FloatArray:
+    """What some joints are commanded along a motion, with elastic torques, (joints, names, instants)."""
+    if not (joints and len(motion.time)):
+        return np.empty((len(joints), len(names), len(motion.time)))
     commanded = {**motion.variables(), **elastic_torques(robot, motion)}
-    time[places] = motion.time
-    for row, joint in zip(rows, joints, strict=True):
-        row[:, places] = np.stack([commanded[name][:, joint] for name in names])
+    return np.stack([[commanded[name][:, joint] for name in names] for joint in joints])
 
 
 class Range(NamedTuple):

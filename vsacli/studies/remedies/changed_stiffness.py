@@ -12,9 +12,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.texts import as_name
 from vsacli.trajectory.curves import ClosedForm
-from vsacli.trajectory.fits import INTERPOLATE, FitChoice
 from vsacli.trajectory.profile import Profile
-from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.recorded.even_stamps import elapsed_times
+from vsacli.trajectory.recorded.hermite import HermiteSpline
 from vsacli.trajectory.times import RecordedTimes, Times
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -33,7 +33,12 @@ def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]
         steps[0] = 1.0
         return with_changed_stiffness(trajectory, {joint: by * steps for joint, by in constants.items()})
     raised = stiffness.raised([constants.get(joint, 0.0) for joint in range(trajectory.joints)])
-    return _fixed(trajectory, trajectory.times, raised)
+    return with_stiffness(trajectory, raised)
+
+
+def with_stiffness(trajectory: Trajectory, stiffness: Profile) -> Trajectory:
+    """A trajectory at the same times with another profile of the stiffness."""
+    return _fixed(trajectory, trajectory.times, stiffness)
 
 
 def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatArray]) -> Trajectory:
@@ -71,16 +76,13 @@ def _with_records_at_steps(trajectory: Trajectory) -> Trajectory:
 
 def _at_steps(
     signal: Signal, profile: Profile, trajectory: Trajectory, changes: Mapping[int, FloatArray] = NOTHING
-) -> SampledProfile:
-    """A signal recorded at the steps with all its derivatives, and something added to some components."""
-    time = trajectory.times.block(0, trajectory.samples)
-    rows = profile.samples(0, trajectory.samples, time - trajectory.start).copy()
+) -> HermiteSpline:
+    """A signal known at the steps with all its derivatives, and something added to some components."""
+    elapsed = elapsed_times(trajectory.times.block(0, trajectory.samples))
+    rows = profile.samples(0, trajectory.samples, elapsed).copy()
     for component, change in changes.items():
         rows[:, component] += change
-    values, *derivatives = rows
-    labels = tuple(f"column {component}" for component in range(len(values)))
-    samples = Samples.recorded(signal, time, values, tuple(derivatives), labels)
-    return SampledProfile.of(samples, FitChoice(INTERPOLATE))
+    return HermiteSpline(signal=signal, time=elapsed, rows=rows)
 
 
 def _fixed(trajectory: Trajectory, times: Times, stiffness: Profile) -> Trajectory:

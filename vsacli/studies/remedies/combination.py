@@ -94,6 +94,9 @@ class Combination:
         )
 
 
+AS_IT_IS = Combination(1.0, {}, {}, 0.0)
+
+
 def preload_path(robot: Robot, index: int) -> str:
     """The path to the preload of a joint in the file of its robot."""
     return f"joints.{index}.actuator.{robot.joints[index].actuator.preload_field}"

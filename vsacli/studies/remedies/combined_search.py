@@ -18,15 +18,12 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.remedies.acceptance import ImpossibleError
 from vsacli.studies.remedies.combination import Combination, Form, constant_change, preload_path
-from vsacli.studies.remedies.motions import Load, Passage, evenly_chosen, joined
-from vsacli.studies.remedies.slow_down import FACTOR_DENOMINATOR, LARGEST_FACTOR, WATCHED_STEPS
+from vsacli.studies.remedies.motions import Load, Passage, joined
+from vsacli.studies.remedies.slow_down import LARGEST_FACTOR, WATCHED_STEPS, Factors
 from vsacli.studies.remedies.task import Task
 
 STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 """Relative strides of the scan, each up to the factor before it: fine where a slow-down is small."""
-
-FASTEST, SLOWEST = FACTOR_DENOMINATOR, LARGEST_FACTOR * FACTOR_DENOMINATOR
-"""Ends of the search, as whole multiples of 1/FACTOR_DENOMINATOR."""
 
 MOST_ROUNDS = 20
 """Rounds of adding steps that refuse what the watched ones accept; two or three are usual."""
@@ -49,7 +46,7 @@ class CombinedSearch:
 
     def __init__(self, task: Task, form: Form = constant_change, *, preloads: bool = False) -> None:
         self.task, self.form = task, form
-        watched = evenly_chosen(task.trajectory, WATCHED_STEPS)
+        watched = task.acceptance.watched(task.trajectory, WATCHED_STEPS)
         self.choices = _choices(task.acceptance.robot, watched if preloads else None)
         self._looking = WatchedSearch(self, watched)
 
@@ -121,12 +118,13 @@ class WatchedSearch:
 
     def __init__(self, search: CombinedSearch, watched: Passage) -> None:
         self._search, self.watched = search, watched
+        self._factors = Factors.of(search.task.trajectory)
         self._found: dict[int, Combination | None] = {}
 
     def fastest(self) -> Combination | None:
         """The combination with the least factor that scan and bisection find."""
-        refused = FASTEST - 1
-        for number in _scanned():
+        refused = self._factors.first - 1
+        for number in self._scanned():
             if self._at(number) is not None:
                 break
             refused = number
@@ -140,17 +138,18 @@ class WatchedSearch:
     def smallest(self) -> Combination | None:
         """The combination of least cost, by the scan, and then steps to either side that get shorter."""
         best, at, cost = None, 0, self._search.task.cost
-        for number in _scanned():
-            if best is not None and cost.of_factor(number / FACTOR_DENOMINATOR) >= best.size:
+        for number in self._scanned():
+            if best is not None and cost.of_factor(self._factors.factor(number)) >= best.size:
                 break
             found = self._at(number)
             if found is not None and (best is None or found.size < best.size):
                 best, at = found, number
         if best is None:
             return None
-        step = _stride(at)
+        step = self._stride(at)
+        within = range(self._factors.first, self._factors.last + 1)
         while step:
-            sides = {side: self._at(side) for side in (at - step, at + step) if SLOWEST >= side >= FASTEST}
+            sides = {side: self._at(side) for side in (at - step, at + step) if side in within}
             found, side = min(
                 ((each, side) for side, each in sides.items() if each is not None),
                 key=lambda pair: pair[0].size,
@@ -166,7 +165,7 @@ class WatchedSearch:
         """What mends every joint at a factor, if anything does."""
         if number not in self._found:
             try:
-                self._found[number] = self._mended(number / FACTOR_DENOMINATOR)
+                self._found[number] = self._mended(self._factors.factor(number))
             except ImpossibleError:
                 self._found[number] = None
         return self._found[number]
@@ -179,10 +178,11 @@ class WatchedSearch:
         """
         search, acceptance = self._search, self._search.task.acceptance
         loads = self.watched.slowed(factor).loads(acceptance.robot)
-        for choices, load in zip(search.choices, loads, strict=True):
-            if reason := acceptance.path_reason(choices[""], load):
+        joints = list(enumerate(zip(search.choices, loads, strict=True)))
+        for index, (choices, load) in joints:
+            if index not in acceptance.ignored and (reason := acceptance.path_reason(choices[""], load)):
                 raise ImpossibleError(reason)
-        found = [self._of_joint(choices, load) for choices, load in zip(search.choices, loads, strict=True)]
+        found = [self._of_joint(index, choices, load) for index, (choices, load) in joints]
         return Combination(
             factor,
             changes={index: change for index, (_, _, change) in enumerate(found) if change.any()},
@@ -190,8 +190,10 @@ class WatchedSearch:
             size=math.hypot(search.task.cost.of_factor(factor), *(size for size, _, _ in found)),
         )
 
-    def _of_joint(self, choices: dict[str, Joint], load: Load) -> tuple[float, str, FloatArray]:
+    def _of_joint(self, index: int, choices: dict[str, Joint], load: Load) -> tuple[float, str, FloatArray]:
         """Cost, preload and change of stiffness of one joint; the preload is empty if it stays as it is."""
+        if index in self._search.task.acceptance.ignored:
+            return 0.0, "", np.zeros(len(load.time))
         asked, best, reason = load.command.commanded["stiffness"], None, ImpossibleError()
         for preload, joint in choices.items():
             try:
@@ -214,17 +216,15 @@ class WatchedSearch:
             return np.zeros(len(load.time))
         return self._search.form(acceptance, joint, load)
 
+    def _scanned(self) -> Iterator[int]:
+        """The numbers of the factors at which a search looks."""
+        number = self._factors.first
+        while number < self._factors.last:
+            yield number
+            number += self._stride(number)
+        yield self._factors.last
 
-def _scanned() -> Iterator[int]:
-    """The factors at which a search looks, in units of 1/FACTOR_DENOMINATOR."""
-    number = FASTEST
-    while number < SLOWEST:
-        yield number
-        number += _stride(number)
-    yield SLOWEST
-
-
-def _stride(number: int) -> int:
-    factor = number / FACTOR_DENOMINATOR
-    share = next(share for limit, share in STRIDES if factor <= limit)
-    return math.ceil(number * share)
+    def _stride(self, number: int) -> int:
+        factor = self._factors.factor(number)
+        share = next(share for limit, share in STRIDES if factor <= limit)
+        return math.ceil(number * share)

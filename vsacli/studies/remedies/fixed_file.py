@@ -13,11 +13,12 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
-from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.texts import for_yaml
 from vsacli.base.wrench import wrench_columns
 from vsacli.dynamics.inverse import usual_block
 from vsacli.studies.remedies.fixed_robot import robot_text
+from vsacli.studies.remedies.fixed_text import TableFile, edited_text
 from vsacli.studies.remedies.formulas import formula
 from vsacli.studies.remedies.suggestions import Remedy
 from vsacli.trajectory.file import FORMAT
@@ -60,11 +61,14 @@ def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
     trajectory, names = remedy.declared, remedy.robot.joint_names
     declared = _declared(trajectory, table.name)
     recorded = [signal for signal, keys in declared.items() if keys["type"] == "csv"]
-    contents: dict[Path, Callable[[TextIO], object]] = {
-        document: lambda file: file.writelines(_document(trajectory, remedy.factor, declared))
-    }
+    beside = None
     if recorded:
-        contents[table] = lambda file: _write_table(trajectory, recorded, names, file)
+        beside = TableFile(table.name, lambda file: _write_table(trajectory, recorded, names, file))
+    text = edited_text(remedy, beside, document.parent) if recorded in ([], [STIFFNESS]) else None
+    lines = _document(trajectory, remedy.factor, declared) if text is None else [text]
+    contents: dict[Path, Callable[[TextIO], object]] = {document: lambda file: file.writelines(lines)}
+    if beside is not None:
+        contents[table] = beside.write
     if remedy.preload is not None:
         contents[robot] = lambda file: file.write(robot_text(remedy, robot.parent))
     for target, write in contents.items():
@@ -116,7 +120,8 @@ def _document(
     if any(estimate.resampled for estimate in trajectory.estimates.values()):
         yield f"rate: {(trajectory.samples - 1) / trajectory.duration!r}\n"
     for signal, keys in declared.items():
-        yield f"{signal.key}: {_in_one_line(keys)}\n"
+        yield f"{signal.key}:\n"
+        yield from (f"  {key}: {_in_one_line(value)}\n" for key, value in keys.items())
 
 
 def _in_one_line(content: Any) -> str:

@@ -58,8 +58,8 @@ def _sequence(chain: Chain) -> dict[str, Any] | None:
     return {"type": "sequence", "parts": parts}
 
 
-def _steps(chain: Chain) -> dict[str, Any] | None:
-    """Levels with changes between them that last equally long."""
+def changes_of_steps(chain: Chain) -> list[RestToRest] | None:
+    """The changes between levels that last equally long; None if the parts are something else."""
     changes = [part for part in chain.parts if isinstance(part, RestToRest)]
     held = [part for part in chain.parts if isinstance(part, Constant)]
     durations = list(map(_duration, changes))
@@ -69,12 +69,20 @@ def _steps(chain: Chain) -> dict[str, Any] | None:
         min(durations), max(durations), rel_tol=SAME_TRANSITION
     ):
         return None
+    return changes
+
+
+def _steps(chain: Chain) -> dict[str, Any] | None:
+    """Levels with changes between them."""
+    changes = changes_of_steps(chain)
+    if changes is None:
+        return None
     return {
         "type": "steps",
         "degree": changes[0].degree,
         "levels": [_values(changes[0].start), *(_values(change.end) for change in changes)],
         "times": [change.span[0] - chain.span[0] for change in changes],
-        "transition": min(durations),
+        "transition": min(map(_duration, changes)),
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +54,19 @@ class Passage(NamedTuple):
             motion = motion.mapped(_unstretched(trajectory, motion.time, factor), lambda array, _: array)
         return cls(motion, np.full(len(motion.time), factor))
 
+    @classmethod
+    def between(cls, trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> Passage:
+        """Instants between the steps of a task, or of one that was stretched by a factor.
+
+        Args:
+            trajectory: the task, or the stretched one.
+            elapsed: since the start of the task as it is, s.
+            factor: of the stretching.
+        """
+        motion = motion_between(trajectory, elapsed, factor)
+        unstretched = _unstretched(trajectory, motion.time, factor)
+        return cls(motion.mapped(unstretched, lambda array, _: array), np.full(len(elapsed), factor))
+
     @property
     def instants(self) -> Instants:
         """Where the steps stand in the task."""
@@ -81,6 +94,11 @@ class Passage(NamedTuple):
         """Some of the steps, by index."""
         motion = self.motion.mapped(self.motion.time[steps], lambda array, _: array[steps])
         return Passage(motion, self.factor[steps])
+
+
+def motion_between(trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> Motion:
+    """The motion at instants, as of `Passage.between`, with the times of the trajectory."""
+    return trajectory.at(np.clip(trajectory.start + factor * elapsed, *trajectory.times.span))
 
 
 def evenly_chosen(trajectory: Trajectory, steps: int) -> Passage:
@@ -112,17 +130,20 @@ class Load:
         time: ascending, (samples,) in s, of the task or of one that was stretched.
         command: rows (samples,).
         instants: where they stand in the task.
+        steps: which of the times are steps, by index, where others are among them.
     """
 
     time: FloatArray
     command: Command
     instants: Instants
+    steps: IndexArray | slice = field(default_factory=lambda: slice(None))
 
     @classmethod
     def over(cls, trajectory: Trajectory, factor: float, time: FloatArray, command: Command) -> Load:
-        """At times of a task that was stretched by a factor."""
+        """At times of a task that was stretched by a factor, the steps among them."""
         unstretched = _unstretched(trajectory, time, factor)
-        return cls(time, command, Instants(unstretched, np.full(len(time), factor)))
+        steps = np.searchsorted(time, trajectory.times.block(0, trajectory.samples))
+        return cls(time, command, Instants(unstretched, np.full(len(time), factor)), steps)
 
     def at(self, steps: IndexArray | slice) -> Load:
         """The load at some of the times."""

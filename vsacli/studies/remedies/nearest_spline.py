@@ -65,7 +65,7 @@ class Bounds:
         return np.maximum(self.low - values, values - self.high)
 
 
-def nearest_spline(bounds: Bounds, smoothing: float) -> BSpline[np.float64]:
+def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = None) -> BSpline[np.float64]:
     """The C2 function x between bounds that minimises the integral of x^2 + smoothing^4 x''^2.
 
     Its first and second derivative vanish at both ends, so that what it is added to starts and stops as it
@@ -76,13 +76,14 @@ def nearest_spline(bounds: Bounds, smoothing: float) -> BSpline[np.float64]:
     Args:
         bounds: excluding zero at some instants.
         smoothing: time in s within which it is expensive to change.
+        knots: times that its pieces may begin and end at, both ends among them; any if None.
 
     Raises:
         NoSplineError: the bounds are too narrow or change too fast.
     """
     from scipy.interpolate import BSpline
 
-    knots, free, smoothing = _knots(bounds, smoothing)
+    knots, free, smoothing = _knots(bounds, smoothing, knots)
     shapes = _shapes(free)
     size = float(np.max(bounds.missed_by(np.zeros_like(bounds.time))))
     scaled = Bounds(bounds.time, bounds.low / size, bounds.high / size)
@@ -90,12 +91,16 @@ def nearest_spline(bounds: Bounds, smoothing: float) -> BSpline[np.float64]:
     return BSpline(knots, size * (shapes @ amounts), DEGREE)
 
 
-def _knots(bounds: Bounds, smoothing: float) -> tuple[FloatArray, BoolArray, float]:
+def _knots(
+    bounds: Bounds, smoothing: float, allowed: FloatArray | None
+) -> tuple[FloatArray, BoolArray, float]:
     """Pieces, which coefficients are free, and the smoothing that such pieces can follow."""
     first, last = bounds.time[[0, -1]]
     while True:
         pieces = int(np.ceil(PIECES_PER_SMOOTHING * (last - first) / smoothing))
         ends = _graded(np.linspace(first, last, pieces + 1))
+        if allowed is not None:
+            ends = np.unique(allowed[np.clip(np.searchsorted(allowed, ends), 0, len(allowed) - 1)])
         knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
         near = _pieces_near(ends, bounds.time[bounds.excluding_zero], DECAY_SMOOTHING_TIMES * smoothing)
         # coefficient i belongs to the pieces i-3..i

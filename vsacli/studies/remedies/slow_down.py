@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import evenly
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed
-from vsacli.studies.remedies.motions import Passage, evenly_chosen, joined
+from vsacli.studies.remedies.motions import Passage, joined
+from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 FACTOR_DENOMINATOR = 10_000
-"""Factors are whole multiples of 1/FACTOR_DENOMINATOR, so that the printed one is the confirmed one."""
+"""Factors are whole multiples of 1/FACTOR_DENOMINATOR where steps are recorded one by one: these get further
+apart."""
+
+WHOLE = 1e-9
+"""Relative difference from a whole number of steps that is rounding."""
 
 LARGEST_FACTOR = 1000
 """Up to which slow-downs are tried; beyond, the units of the trajectory are more likely to be wrong."""
@@ -27,11 +33,50 @@ FACTORS_AT_ONCE = 64
 """Factors that are tried at once."""
 
 
+class Factors(NamedTuple):
+    """The factors of slow-downs that are tried: those with a whole number of steps at the rate of the task.
+
+    A controller has one rate; what lasts 577.74 of its periods ends between two of them.
+
+    Attributes:
+        denominator: numbers stand for themselves over this: steps of the task, which need not be whole.
+    """
+
+    denominator: float
+
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> Factors:
+        """Those of a task."""
+        times = trajectory.times
+        if isinstance(times, UniformTimes):
+            return cls(times.duration * times.rate)
+        return cls(float(FACTOR_DENOMINATOR))
+
+    @property
+    def first(self) -> int:
+        """The number that stands for no slow-down."""
+        return round(self.denominator) if self._whole else math.floor(self.denominator)
+
+    @property
+    def last(self) -> int:
+        """The number of the largest factor."""
+        return math.floor(LARGEST_FACTOR * self.denominator)
+
+    @property
+    def _whole(self) -> bool:
+        return math.isclose(self.denominator, round(self.denominator), rel_tol=WHOLE)
+
+    def factor(self, number: int) -> float:
+        """What a number stands for."""
+        denominator = round(self.denominator) if self._whole else self.denominator
+        return 1.0 if number == self.first else number / denominator
+
+
 def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     """The smallest factor by which position, stiffness and wrench must be stretched together in time.
 
-    It is found by a scan upward in steps of 1 %, then bisection to 1e-4, and confirmed on all steps of the
-    stretched trajectory.
+    It is found by a scan upward in steps of 1 %, then bisection to one step, and confirmed on all steps of
+    the stretched trajectory.
 
     Args:
         acceptance: the rule, and the robot.
@@ -40,33 +85,34 @@ def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
     Raises:
         ImpossibleError: with the reason.
     """
-    steps = evenly_chosen(trajectory, WATCHED_STEPS)
+    steps = acceptance.watched(trajectory, WATCHED_STEPS)
     at_rest = steps.slowed(math.inf)
     refused = np.flatnonzero(np.any(acceptance.refused(at_rest), axis=1))
     few = np.union1d(evenly(len(steps.factor), FIRST_STEPS), refused[evenly(len(refused), FIRST_STEPS)])
-    number = _scan_start(acceptance, steps.select(few))
+    factors = Factors.of(trajectory)
+    number = _scan_start(acceptance, steps.select(few), factors)
     if number is not None:
         candidates = SlowDownCandidates(acceptance, trajectory, steps)
-        number = smallest_confirmed(candidates, number, LARGEST_FACTOR * FACTOR_DENOMINATOR)
+        number = smallest_confirmed(candidates, number, factors.last)
     if number is not None:
-        return number / FACTOR_DENOMINATOR
+        return factors.factor(number)
     if refused.size:
         reasons = "; ".join(acceptance.reasons(at_rest))
         raise ImpossibleError(f"even at rest, under gravity alone, {reasons}")
     raise ImpossibleError(f"not even one by a factor {LARGEST_FACTOR} does")
 
 
-def _scan_start(acceptance: Acceptance, few: Passage) -> int | None:
+def _scan_start(acceptance: Acceptance, few: Passage, factors: Factors) -> int | None:
     """A number up to which the scan would find one of a few steps refused; None if it always would.
 
     It tries many factors at once, which costs hardly more than one of them.
     """
-    numbers = [FACTOR_DENOMINATOR]
-    while numbers[-1] < LARGEST_FACTOR * FACTOR_DENOMINATOR:
-        numbers.append(min(numbers[-1] + _stride(numbers[-1]), LARGEST_FACTOR * FACTOR_DENOMINATOR))
+    numbers = [factors.first]
+    while numbers[-1] < factors.last:
+        numbers.append(min(numbers[-1] + _stride(numbers[-1]), factors.last))
     for start in range(0, len(numbers), FACTORS_AT_ONCE):
         tried = numbers[start : start + FACTORS_AT_ONCE]
-        refused = acceptance.refused(joined(few.slowed(number / FACTOR_DENOMINATOR) for number in tried))
+        refused = acceptance.refused(joined(few.slowed(factors.factor(number)) for number in tried))
         accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
         if accepted.size:
             return numbers[max(start + int(accepted[0]) - 1, 0)]
@@ -74,10 +120,11 @@ def _scan_start(acceptance: Acceptance, few: Passage) -> int | None:
 
 
 class SlowDownCandidates:
-    """Stretching by number / FACTOR_DENOMINATOR, judged at watched steps; see `Candidates`."""
+    """Stretching by the factors of a task, judged at watched steps; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: Passage) -> None:
         self._acceptance, self._trajectory, self._watched = acceptance, trajectory, watched
+        self._factors = Factors.of(trajectory)
 
     def stride(self, number: int) -> int:
         """One percent."""
@@ -85,11 +132,11 @@ class SlowDownCandidates:
 
     def accepts(self, number: int) -> bool:
         """Whether every watched step is accepted."""
-        return not self._acceptance.refused(self._watched.slowed(number / FACTOR_DENOMINATOR)).any()
+        return not self._acceptance.refused(self._watched.slowed(self._factors.factor(number))).any()
 
     def confirms(self, number: int) -> bool:
         """Whether every step is accepted; those of the first block with others are watched from now on."""
-        factor = number / FACTOR_DENOMINATOR
+        factor = self._factors.factor(number)
         for passage in self._acceptance.passages(self._trajectory.stretched(factor), factor):
             steps = np.flatnonzero(np.any(self._acceptance.refused(passage), axis=1))
             if steps.size:

@@ -66,7 +66,7 @@ def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: f
     Args:
         acceptance: the rule.
         joint: the joint, at least one of whose steps is refused.
-        load: its steps and the instants half-way between them, all of which are to be accepted.
+        load: its steps and instants between them, all of which are to be accepted.
         constant: the constant that mends the joint, if there is one.
 
     Raises:
@@ -110,7 +110,8 @@ def _change(
     if not bounds.excluding_zero.any():
         return Change.constant(load.time, 0.0)
     try:
-        spline = nearest_spline(bounds, smoothings * _smoothing_time(joint, load))
+        # a piece between two steps is what a file with all derivatives at the steps says of the time between
+        spline = nearest_spline(bounds, smoothings * _smoothing_time(joint, load), load.time[load.steps])
     except NoSplineError:
         return None
     return Change(load.time, np.stack([spline(load.time, nu=order) for order in range(DEGREE)]))
@@ -128,7 +129,7 @@ def _smoothing_time(joint: Joint, load: Load) -> float:
     """sqrt(B/sigma): the motors follow slower changes with little torque of inertia; at least three steps."""
     inertia = max(motor.inertia for motor in variable_stiffness_actuator(joint).motors)
     resonance = math.sqrt(inertia / float(load.command.commanded["stiffness"].min()))
-    step = float(np.median(np.diff(load.time[::2])))
+    step = float(np.median(np.diff(load.time[load.steps])))
     return min(max(resonance, 3 * step), float(load.time[-1] - load.time[0]))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -39,7 +39,7 @@ class SlowDown(Published):
     @property
     def sentence(self) -> str:
         """What to do, without a full stop."""
-        return f"slow down by a factor {self.factor:.10g} ({self.duration:.10g} s -> {self.slower:.10g} s)"
+        return f"slow down by a factor {self.factor:.4g} ({self.duration:.10g} s -> {self.slower:.10g} s)"
 
     @property
     def slower(self) -> float:
@@ -119,6 +119,22 @@ class StiffnessProfile(Published):
 
 
 @dataclass(frozen=True)
+class LongerTransition(Published):
+    """Give the stiffness more time to go from level to level, s; each change begins when it did."""
+
+    before: float
+    after: float
+
+    possible: ClassVar = True
+    shape: ClassVar = {**named("possible", "before", "after"), "text": "sentence"}
+
+    @property
+    def sentence(self) -> str:
+        """What to do, without a full stop."""
+        return f"lengthen the transitions of the stiffness from {self.before:.10g} s to {self.after:.10g} s"
+
+
+@dataclass(frozen=True)
 class OtherPreload(Published):
     """Take the other preload: what it becomes, by joint."""
 
@@ -142,18 +158,21 @@ class Remedy(Published):
         robot: with another preload, if that is among the changes.
         declared: the trajectory with the changes, but for the factor by which it is passed more slowly.
         factor: this factor; formulas are stretched already, see `Task`.
+        asked: the trajectory without the changes.
     """
 
     size: float
     robot: Robot = field(repr=False, compare=False)
     declared: Trajectory = field(repr=False, compare=False)
     factor: float = field(default=1.0, repr=False, compare=False, kw_only=True)
+    asked: Trajectory | None = field(default=None, repr=False, compare=False, kw_only=True)
     slow_down: SlowDown | None = None
     stiffness_offset: StiffnessOffset | None = None
+    transition: LongerTransition | None = None
     stiffness_profile: StiffnessProfile | None = None
     preload: OtherPreload | None = None
 
-    PARTS: ClassVar = ("slow_down", "preload", "stiffness_offset", "stiffness_profile")
+    PARTS: ClassVar = ("slow_down", "preload", "transition", "stiffness_offset", "stiffness_profile")
     shape: ClassVar = {"size": "size", **{f"{part}?": part for part in PARTS}, "text": "sentence"}
 
     @property
@@ -180,13 +199,33 @@ class Remedy(Published):
 
 
 @dataclass(frozen=True)
+class Cause(Published):
+    """Why a joint keeps a task from being possible.
+
+    Attributes:
+        joint: its name.
+        text: what is wrong, and what helps at rest or does not, in a clause.
+        fixable: whether anything that was tried helps.
+    """
+
+    joint: str
+    text: str
+    fixable: bool = True
+
+    def __str__(self) -> str:
+        return f"{self.joint}: {self.text}"
+
+
+@dataclass(frozen=True)
 class Suggestions(Published):
     """What makes a task possible: each kind of change by itself, and combinations.
 
-    Each kind is the smallest change that does, or why there is none; None where nothing needs to change.
+    Each kind is the smallest change that does, or why there is none; None where nothing needs to change, and
+    where the stiffness has no transitions.
 
     Attributes:
         near_singular: the margin that every step shall have.
+        causes: why each joint that falls short does.
         remedies: what to choose from, the smallest first, those with another preload last.
     """
 
@@ -194,13 +233,9 @@ class Suggestions(Published):
     slow_down: SlowDown | NotPossible | None = None
     stiffness_offset: StiffnessOffset | NotPossible | None = None
     stiffness_profile: StiffnessProfile | NotPossible | None = None
+    transition: LongerTransition | NotPossible | None = None
+    causes: tuple[Cause, ...] = ()
     remedies: tuple[Remedy, ...] = ()
-
-    KINDS: ClassVar = {
-        "slow_down": "slow-down",
-        "stiffness_offset": "constant change of stiffness",
-        "stiffness_profile": "other course of stiffness",
-    }
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -211,18 +246,16 @@ class Suggestions(Published):
         if self.slow_down is None:
             yield f"nothing to change: every step has {margin} and keeps every limit"
             return
+        yield from map(str, self.causes)
+        left = [cause.joint for cause in self.causes if not cause.fixable]
+        rest = f"every step of all joints but {and_joined(left)}" if left and self.remedies else "every step"
         if self.remedies:
-            yield f"suggestions, with any one of which every step has {margin} and keeps every limit:"
+            yield f"suggestions, with any one of which {rest} has {margin} and keeps every limit:"
         else:
-            yield f"nothing that was tried gives every step {margin} and keeps every limit:"
+            yield f"nothing that was tried gives {rest} {margin} and keeps every limit"
         yield from (f"{number}. {remedy.sentence}" for number, remedy in enumerate(self.remedies, 1))
-        yield from self._reasons()
 
-    def _reasons(self) -> Iterator[str]:
-        """Why kinds of change do not do by themselves, in one sentence if it is the same for all."""
-        found = {name: getattr(self, kind) for kind, name in self.KINDS.items()}
-        impossible = {name: each.reasons for name, each in found.items() if isinstance(each, NotPossible)}
-        if len(impossible) == len(found) and len(set(impossible.values())) == 1:
-            yield f"- another motion is needed: {'; '.join(impossible.popitem()[1])}"
-        else:
-            yield from (f"- no {name} alone: {'; '.join(reasons)}" for name, reasons in impossible.items())
+
+def and_joined(names: Sequence[str]) -> str:
+    """Names in a sentence."""
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

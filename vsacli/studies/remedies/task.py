@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
+from vsacli.analysis.joint_report import JointReport
 from vsacli.analysis.run import Run
 from vsacli.base import units
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, evenly
 from vsacli.base.signals import STIFFNESS
+from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.joint import Joint
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness, with_raised_stiffness
 from vsacli.studies.remedies.combination import RELATIVE_CHANGE, Combination, Cost, constant_change
-from vsacli.studies.remedies.motions import Load
-from vsacli.studies.remedies.stiffness_offset import smallest_offset
+from vsacli.studies.remedies.longer_transition import smallest_transition
+from vsacli.studies.remedies.motions import Load, Passage
+from vsacli.studies.remedies.stiffness_offset import WATCHED_STEPS, smallest_offset
 from vsacli.studies.remedies.stiffness_profile import Change, nearest_change
 from vsacli.studies.remedies.suggestions import (
     JointChange,
+    LongerTransition,
     Offset,
     OtherPreload,
     Remedy,
@@ -37,6 +41,12 @@ _Found = TypeVar("_Found")
 
 REFUSED = ("infeasible", "singular", "over_limit")
 """Verdicts that no remedy may have; what a record does not determine no remedy changes."""
+
+FINER = 10
+"""Parts into which each step of a remedy is divided to see whether it falls short between them."""
+
+MOST_INSTANTS = 300_000
+"""Instants of a remedy that are looked at: the steps of longer ones are divided into fewer parts."""
 
 STEPS = slice(None, None, 2)
 """The instants of a load that are steps."""
@@ -73,6 +83,7 @@ class Task:
             robot=found.robot(self.acceptance.robot),
             declared=with_raised_stiffness(stretched, found.constants),
             factor=factor,
+            asked=self.trajectory,
             slow_down=self._slow_down(found),
             preload=self._preload(found),
             stiffness_offset=StiffnessOffset(offsets) if found.changes else None,
@@ -86,20 +97,44 @@ class Task:
         """
         slower, acceptance = self.trajectory.stretched(found.factor), self.acceptance_with(found)
         robot = acceptance.robot
-        find = partial(_nearest_change, acceptance)
+        find = partial(_nearest_change, acceptance, slower)
         changes = for_refused_joints(acceptance, slower, find, found.factor)
         summaries = tuple(_summary(robot.joints[index], change) for index, (_, change) in changes.items())
         stretched, factor = self._stretched(found.factor)
         scale = factor ** np.arange(STIFFNESS.orders)[:, None]
-        at_steps = {index: scale * change.rows[:, STEPS] for index, (_, change) in changes.items()}
+        at_steps = {index: scale * change.rows[:, load.steps] for index, (load, change) in changes.items()}
         return Remedy(
             size=self._size(found.factor, [(load, change.rows[0]) for load, change in changes.values()]),
             robot=robot,
             declared=with_changed_stiffness(stretched, at_steps),
             factor=factor,
+            asked=self.trajectory,
             slow_down=self._slow_down(found),
             preload=self._preload(found),
             stiffness_profile=StiffnessProfile(summaries) if summaries else None,
+        )
+
+    def with_transition(self) -> Remedy:
+        """The remedy with the shortest transitions between levels of stiffness that do.
+
+        Raises:
+            ImpossibleError: there are none.
+        """
+        before, after, longer = smallest_transition(self.acceptance, self.trajectory)
+        asked, changed = (
+            each.block(0, each.samples).commanded[STIFFNESS.key].T for each in (self.trajectory, longer)
+        )
+        sizes = [
+            self.cost.of_stiffness(old, new - old)
+            for old, new in zip(asked, changed, strict=True)
+            if not np.isnan(old).any()
+        ]
+        return Remedy(
+            size=math.hypot(*sizes),
+            robot=self.acceptance.robot,
+            declared=longer,
+            asked=self.trajectory,
+            transition=LongerTransition(before, after),
         )
 
     def _stretched(self, factor: float) -> tuple[Trajectory, float]:
@@ -121,9 +156,11 @@ class Task:
         changes = for_refused_joints(
             self.acceptance,
             self.trajectory,
-            lambda joint, load: constant_change(self.acceptance, joint, load.at(STEPS)),
+            lambda joint, load: constant_change(self.acceptance, joint, _counting(load, self.trajectory)),
         )
-        size = self._size(1.0, [(load.at(STEPS), change) for load, change in changes.values()])
+        size = self._size(
+            1.0, [(_counting(load, self.trajectory), change) for load, change in changes.values()]
+        )
         return Combination(1.0, {index: change for index, (_, change) in changes.items()}, {}, size)
 
     def _size(self, factor: float, changes: Iterable[tuple[Load, FloatArray]]) -> float:
@@ -140,16 +177,50 @@ class Task:
         preloads = {names[index]: preload for index, preload in found.preloads.items()}
         return OtherPreload(preloads) if preloads else None
 
-    def confirms(self, remedy: Remedy) -> bool:
-        """Whether a run over the whole of what is suggested keeps margin and limits."""
+    def falls_short(self, remedy: Remedy) -> FloatArray | None:
+        """Instants at which a run over the whole of what is suggested misses margin or limits; None if none.
+
+        They are times since the start of the task as it is, s: the worst ones of the run, which looks between
+        its steps, and those of a grid `FINER` times as fine.
+        """
         run = Run(remedy.robot, remedy.trajectory, near_singular=self.acceptance.near_singular)
         for _ in run:
             pass
         report = run.report()
-        return report.self_check.passed and not any(
-            joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
-            for joint in report.joints
-        )
+        counted = (each for index, each in enumerate(report.joints) if index not in self.acceptance.ignored)
+        short = [joint for joint in counted if self._is_short(joint)]
+        refused = self._refused_between(remedy)
+        if report.self_check.passed and not short and not refused.size:
+            return None
+        worst = [time for joint in short for time in (joint.margin_time, *_times(joint))]
+        elapsed = (np.array(worst) - remedy.trajectory.start) / (1 + remedy.longer)
+        return np.union1d(elapsed[np.isfinite(elapsed)], refused)
+
+    def _is_short(self, joint: JointReport) -> bool:
+        """Whether the report of a joint shows what no remedy may have."""
+        return joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
+
+    def _refused_between(self, remedy: Remedy) -> FloatArray:
+        """Some of the instants between the steps of a remedy that are not accepted."""
+        trajectory, factor = remedy.trajectory, 1 + remedy.longer
+        # what is allowed for the noise of a recording is known at its steps; between them the run looks
+        if not trajectory.known_between or trajectory.estimates:
+            return np.empty(0)
+        acceptance = replace(self.acceptance, robot=remedy.robot, between=np.empty(0))
+        steps = (trajectory.times.block(0, trajectory.samples) - trajectory.start) / factor
+        parts = max(1, min(FINER, MOST_INSTANTS // len(steps)))
+        elapsed = (steps[:-1, None] + np.diff(steps)[:, None] * np.arange(1, parts) / parts).ravel()
+        refused = [
+            part[acceptance.refused(Passage.between(trajectory, part, factor)).any(axis=1)]
+            for part in np.array_split(elapsed, 1 + len(elapsed) // usual_block(trajectory.joints))
+        ]
+        found = np.concatenate(refused)
+        return found[evenly(len(found), WATCHED_STEPS)]
+
+
+def _times(joint: JointReport) -> Iterator[float]:
+    """When each kind of trouble of a joint is worst."""
+    yield from (worst.time for worst in (*joint.worst.values(), *joint.between.values()))
 
 
 def for_refused_joints(
@@ -172,7 +243,7 @@ def for_refused_joints(
     refused = np.flatnonzero(acceptance.refused_joints(trajectory, factor)).tolist()
     found: dict[int, tuple[Load, _Found]] = {}
     reasons: list[str] = []
-    loads = joint_loads(acceptance.robot, trajectory, refused, factor)
+    loads = joint_loads(acceptance.robot, trajectory, refused, factor, acceptance.between)
     for index, load in zip(refused, loads, strict=True):
         try:
             found[index] = load, find(acceptance.robot.joints[index], load)
@@ -183,10 +254,15 @@ def for_refused_joints(
     return found
 
 
-def _nearest_change(acceptance: Acceptance, joint: Joint, load: Load) -> Change:
+def _counting(load: Load, trajectory: Trajectory) -> Load:
+    """The load where it is known: at the steps alone, if the trajectory is known there alone."""
+    return load if trajectory.known_between else load.at(load.steps)
+
+
+def _nearest_change(acceptance: Acceptance, trajectory: Trajectory, joint: Joint, load: Load) -> Change:
     """The nearest profile, or the constant if that is nearer."""
     try:
-        constant = smallest_offset(acceptance, joint, load.at(STEPS))
+        constant = smallest_offset(acceptance, joint, _counting(load, trajectory))
     except ImpossibleError:
         constant = None
     return nearest_change(acceptance, joint, load, constant)

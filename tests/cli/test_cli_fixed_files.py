@@ -1,0 +1,183 @@
+"""`vsacli check-feasibility --write-fixed`: causes, fixes of some joints, transitions, text that is kept."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from samples.command_line import REPOSITORY
+
+from vsacli import load_robot, load_trajectory
+from vsacli.base.flags import LIMITS
+from vsacli.dynamics.inverse import compute_block
+
+ROBOT = REPOSITORY / "robots" / "vsa_3r.yaml"
+FAST = """\
+# Tuned by hand.
+format: vsacli-trajectory/1
+name: fast                        # for the demonstration
+duration: 0.45                    # s
+position:
+  type: polynomial
+  degree: 7
+  start: 0
+  end: [90 deg, 45 deg, -60 deg]  # as in the paper
+stiffness:
+  type: constant
+  value:                          # N m/rad
+    - 850                         # base
+    - 830
+    - 850                         # elbow
+"""
+CHANGING = """\
+format: vsacli-trajectory/1
+name: changing
+duration: 2
+rate: 500
+position: {type: constant, value: [10 deg, 20 deg, 30 deg]}
+stiffness:
+  type: steps
+  degree: 5
+  levels: [900, 1200, 950]
+  times: [0.3, 1.2]
+  transition: 0.05                # s, much too short
+"""
+
+
+def changed_lines(before, after):
+    return [line for line in after.splitlines() if line not in before.splitlines()]
+
+
+def robot_with(folder, **limits):
+    """The arm with limits of its motors: joints with a number in the same place."""
+    robot = load_robot(ROBOT)
+    lines = iter(ROBOT.read_text().splitlines())
+    text, joint = [], -1
+    for line in lines:
+        joint += line.lstrip().startswith("- name:")
+        name = robot.joint_names[joint] if joint >= 0 else ""
+        if name in limits and "motor: {" in line:
+            line = line.replace("motor: {", f"motor: {{max_torque: {limits[name]}, ")
+        text.append(line)
+    path = folder / "robot.yaml"
+    path.write_text("\n".join(text) + "\n")
+    return path
+
+
+def written(vsacli, robot, task, text, kind):
+    """The suggestion that takes one kind of change alone, and the file with it."""
+    task.write_text(text)
+    found = json.loads(vsacli("check-feasibility", robot, task, "--suggest", "--json").out)["suggestions"]
+    numbers = [
+        number for number, each in enumerate(found["remedies"], 1) if each.keys() == {"size", kind, "text"}
+    ]
+    done = vsacli("check-feasibility", robot, task, "--write-fixed", "fixed.yaml", "--remedy", numbers[0])
+    assert done.code == 3, done.err
+    return found["remedies"][numbers[0] - 1]["text"], (task.parent / "fixed.yaml").read_text()
+
+
+def test_values_change_where_they_stand(tmp_path, vsacli):
+    said, text = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_offset")
+    assert said.startswith("raise the stiffness of base by")
+    name, base, shoulder = changed_lines(FAST, text)
+    assert name == 'name: "fast-fixed"                        # for the demonstration'
+    assert base.startswith("    - 90")
+    assert base.endswith(" # base")
+    assert len(base.split()[1]) <= 7, "four decimal places behind the leading digit"
+    assert shoulder.startswith("    - 8")
+    assert vsacli("check-feasibility", ROBOT, "fixed.yaml").code == 0
+
+
+@pytest.mark.slow
+def test_a_slower_motion_lasts_whole_periods(tmp_path, vsacli):
+    text = FAST.replace("duration: 0.45 ", "rate: 500\nduration: 0.45 ")
+    said, fixed = written(vsacli, ROBOT, tmp_path / "fast.yaml", text, "slow_down")
+    assert said.startswith("slow down by a factor ")
+    name, duration = changed_lines(text, fixed)
+    assert name.startswith("name: ")
+    assert duration.endswith("                    # s")
+    periods = float(duration.split()[1]) * 500
+    assert periods == pytest.approx(round(periods), abs=1e-6)
+    assert vsacli("invdyn", ROBOT, "fixed.yaml", "-o", "fixed.h5").code == 0
+    assert vsacli("export", "fixed.h5", "--rate", 500, "-o", "fixed.csv").code == 0
+
+
+def test_another_profile_leaves_the_rest_of_the_file(tmp_path, vsacli):
+    _, fixed = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_profile")
+    assert "  end: [90 deg, 45 deg, -60 deg]  # as in the paper" in fixed
+    assert "# duration: 0.45                    # s" in fixed
+    assert 'stiffness: {type: csv, file: "fixed.csv"}' in fixed
+    assert fixed.startswith("# Tuned by hand.\n")
+    assert vsacli("check-feasibility", ROBOT, "fixed.yaml").code == 0
+
+
+@pytest.mark.slow
+def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli):
+    robot = robot_with(tmp_path, shoulder=2)
+    (tmp_path / "fast.yaml").write_text(FAST)
+    done = vsacli("check-feasibility", robot, "fast.yaml", "--write-fixed", "fixed.yaml")
+    text = done.out.partition("self-check passed")[2]
+    _, base, shoulder, heading, *fixes = text.splitlines()
+    assert base.startswith("base: stiffness is 850 N m/rad at t = 0.12")
+    # statics of the two outer links, with both springs tight, as the report of the arm at rest has it
+    assert shoulder.startswith("shoulder: joint-side torque of motor 1 is ")
+    assert shoulder.endswith(
+        "even at rest, above its limit of 2: no slower motion and no constant stiffness helps"
+    )
+    assert heading.startswith(
+        "suggestions, with any one of which every step of all joints but shoulder has a margin"
+    )
+    assert fixes
+    trajectory = load_trajectory("fixed.yaml", load_robot(ROBOT))
+    block = compute_block(load_robot(ROBOT), trajectory.block(0, trajectory.samples))
+    room = (block.stiffness - block.stiffness_lower) / block.stiffness
+    assert room[:, [0, 2]].min() >= 0.01 - 1e-9
+
+
+@pytest.mark.slow
+def test_what_helps_at_rest_is_said(tmp_path, vsacli):
+    """A motor too weak for its springs is so at any speed, unless they are softer."""
+    robot = robot_with(tmp_path, base=20)
+    task = tmp_path / "slow.yaml"
+    task.write_text(FAST.replace("0.45", "4"))
+    done = vsacli("check-feasibility", robot, task, "--suggest", "--json")
+    (cause,) = json.loads(done.out)["suggestions"]["causes"]
+    what, helps = cause["text"].rsplit(": ", 1)
+    assert what.endswith("at t = 0.000 s, even at rest, above its limit of 20")
+    assert helps.startswith("no slower motion helps, a stiffness of at most ")
+    value = float(helps.split()[-4])
+    still = FAST.replace("0.45", "1").replace("[90 deg, 45 deg, -60 deg]", "0")
+    for softer, kept in ((0.0, True), (-0.05, False)):
+        task.write_text(still.replace("- 850                         # base", f"- {value - softer}"))
+        arm = load_robot(robot)
+        block = compute_block(arm, load_trajectory(task, arm).block(0, 1))
+        assert (block.flags[0, 0] & int(LIMITS) == 0) == kept
+
+
+@pytest.mark.slow
+def test_transitions_that_are_too_short_are_lengthened_alone(tmp_path, vsacli):
+    robot = robot_with(tmp_path, base=120, shoulder=120, elbow=120)
+    said, fixed = written(vsacli, robot, tmp_path / "changing.yaml", CHANGING, "transition")
+    assert said.startswith("lengthen the transitions of the stiffness from 0.05 s to 0.17")
+    name, transition = changed_lines(CHANGING, fixed)
+    assert name == 'name: "changing-fixed"'
+    assert transition.endswith("                # s, much too short")
+    found = float(transition.split()[1])
+    arm = load_robot(robot)
+
+    def kept(length):
+        (tmp_path / "tried.yaml").write_text(CHANGING.replace("transition: 0.05", f"transition: {length}"))
+        trajectory = load_trajectory(tmp_path / "tried.yaml", arm)
+        block = compute_block(arm, trajectory.at(np.linspace(0, 2, 4001)))
+        return not np.any(block.flags & int(LIMITS))
+
+    assert kept(found)
+    assert not any(kept(length) for length in np.linspace(0.05, found - 2e-4, 12))
+
+
+def test_all_joints_that_fail_something_are_counted(tmp_path, vsacli):
+    robot = robot_with(tmp_path, elbow=2)
+    (tmp_path / "fast.yaml").write_text(FAST)
+    done = vsacli("check-feasibility", robot, "fast.yaml")
+    assert done.out.splitlines()[0].endswith("INFEASIBLE (3 of 3 joints)")
