@@ -74,14 +74,15 @@ def test_where_no_step_can_be_done_nothing_is_drawn_and_nothing_is_made_up(vsacl
     assert not (tmp_path / "s.yaml").exists()
 
 
-def test_rotors_that_cannot_be_coupled_so_much_are_not_written(vsacli, tmp_path):
+@pytest.mark.parametrize("written", [[], ["-o", "s.yaml"]])
+def test_rotors_that_cannot_be_coupled_so_much_are_refused_written_or_not(vsacli, tmp_path, written):
     arm, swing = (REPOSITORY / name / "awas_1r.yaml" for name in ("robots", "trajectories"))
     (tmp_path / "m.csv").write_text("name,inertia,max_torque\nm,1e-7,10\n")
-    done = vsacli("size", arm, swing, "--catalogue", "m.csv", "--gear", "10", "-o", "s.yaml")
-    assert done.code == 2
-    assert (
-        "coupled_inertia is 0.001 on the joint's side, that of rotors as those chosen below 1e-05" in done.err
-    )
+    done = vsacli("size", arm, swing, "--catalogue", "m.csv", "--gear", "10", *written)
+    assert (done.code, done.out) == (2, "")
+    assert "coupled_inertia is 0.001 on the joint's side, that of rotors of the catalogue" in done.err
+    assert "must be below 1e-05" in done.err
+    assert not (tmp_path / "s.yaml").exists()
 
 
 def test_limits_of_the_robots_own_motors(vsacli, tmp_path):

@@ -212,8 +212,9 @@ def test_a_wrong_zero_is_told_from_a_biased_torque(tmp_path: Path) -> None:
         path = record.noisy(seed=9).write(tmp_path / "record.csv", joint())
         told = identify(joint(), path, fit=["springs", "motors"])
         assert told.verdict == "misfit"
-        (note,) = told.notes
+        note, *corrected = told.notes
         assert note.startswith(start)
+        assert all(each.startswith("base: with that, joints.base") for each in corrected)
         assert end in note
         off, _, error = note.removeprefix(start).split()[:3]
         # of springs that are not linear, an error is found to first order

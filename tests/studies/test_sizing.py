@@ -26,6 +26,9 @@ from vsacli import (
     size_drives,
 )
 from vsacli.studies.sizing import sized_text
+from vsacli.studies.sizing.catalogue import read_catalogue
+from vsacli.studies.sizing.choices import choices
+from vsacli.studies.sizing.gears import Gears
 
 RUN = 1e-9
 """Relative to peaks: torques of a run are multiplied by the ratio there, here the load is divided by it."""
@@ -206,3 +209,48 @@ def test_ranges_of_gears_against_a_dense_scan(seed, tmp_path):
                 assert largest <= 1.001 if inside else largest >= 0.95
             if not math.isnan(choice.low):
                 assert choice.does, "any gear will do"
+
+
+@pytest.mark.parametrize("criterion", ["copper", "utilisation", "mass"])
+@pytest.mark.parametrize("coupling", [0.001, 0.05, 0.3])
+def test_coupled_motors_are_the_best_pair_with_which_the_robot_can_be_built(criterion, coupling, tmp_path):
+    """All pairs of the catalogue, each tried by building the robot with it."""
+    robot, trajectory = shipped("awas_1r")
+    motor = {"joints.0.actuator.motor": [{"inertia": 2.0, "damping": 0.1}, {"inertia": 0.5, "damping": 0.1}]}
+    robot = robot.replace(motor).replace("joints.0.actuator.coupled_inertia", coupling)
+    columns = {"torque_constant": 0.1, "resistance": 0.2}
+    inertias = {"light": 1e-6, "middle": 3e-6, "heavy": 3e-5, "heaviest": 4e-4}
+    rows = [
+        {"name": name, "inertia": inertia, "max_torque": 8.0, "mass": 1 + place, **columns}
+        for place, (name, inertia) in enumerate(inertias.items())
+    ]
+    path = write(tmp_path / "m.csv", rows)
+    sizing = size_drives(robot, [trajectory], path, ["100"], criterion)
+    motors = read_catalogue(path).records
+    first, second = (choices(each.demand, motors, Gears.read("100"), criterion) for each in sizing.motors)
+
+    def buildable(one, other):
+        motors = [{"inertia": inertias[each.motor], "gear_ratio": 100.0} for each in (one, other)]
+        changes = {"joints.0.actuator.coupled_inertia": coupling / 100**2, "joints.0.actuator.motor": motors}
+        try:
+            robot.replace(changes)
+        except InputError:
+            return False
+        return True
+
+    def key(one, other):
+        costs = [
+            {"copper": each.copper_loss, "utilisation": each.largest[1], "mass": each.mass}[criterion]
+            for each in (one, other)
+        ]
+        return max(costs) if criterion == "utilisation" else sum(costs)
+
+    assert all(choice.does for choice in (*first, *second))
+    pairs = [(one, other) for one in first for other in second if buildable(one, other)]
+    assert 0 < len(pairs) <= len(first) * len(second)
+    best = min(key(*pair) for pair in pairs)
+    chosen = [motor.best for motor in sizing.motors]
+    assert key(*chosen) == pytest.approx(best, rel=1e-12)  # sums in another order
+    assert buildable(*chosen)
+    for motor, other in zip(sizing.motors, reversed(chosen), strict=True):
+        assert all(buildable(choice, other) for choice in motor.choices)

@@ -18,7 +18,7 @@ from vsacli.cli.command_parts import (
     words_of,
 )
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
 from vsacli.cli.identify_plan import USUAL_DURATION, plan
 
 
@@ -68,7 +68,7 @@ from vsacli.cli.identify_plan import USUAL_DURATION, plan
 @click.option(
     "-o",
     "--output",
-    type=FILE,
+    type=YAML_FILE,
     help="Write the robot file with the numbers found; with --plan, the trajectory.",
 )
 @click.option("--plot", "folder", type=FOLDER, help="Save figures of measured and predicted torques there.")

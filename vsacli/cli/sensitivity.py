@@ -13,7 +13,6 @@ import click
 from vsacli.cli.command_parts import (
     Inputs,
     example,
-    hdf5_name,
     json_option,
     load_inputs,
     overwrite_option,
@@ -23,7 +22,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
@@ -64,9 +63,7 @@ SHOWN_FROM = 20_000
     help="Compute so many robots drawn from the tolerances as well.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of these draws.")
-@click.option(
-    "-o", "--output", type=FILE, callback=hdf5_name, help="Write the derivatives over time as HDF5."
-)
+@click.option("-o", "--output", type=HDF5_FILE, help="Write the derivatives over time as HDF5.")
 @click.option("--plot", "folder", type=FOLDER, help="Save figures of the ranking, and of the bands, there.")
 @json_option
 @overwrite_option

@@ -9,7 +9,7 @@ import click
 
 from vsacli.cli.command_parts import example, json_option, overwrite_option, robot_argument, run_stem
 from vsacli.cli.console import EXIT_OF_VERDICT, Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.file_names import FILE, FOLDER, YAML_FILE
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     help="What the best choice has least of: heat in its windings, the share of its limits that it uses, or "
     "mass. By default the first if the catalogue says enough for it, else the second.",
 )
-@click.option("-o", "--output", type=FILE, help="Write the robot file with the motors chosen.")
+@click.option("-o", "--output", type=YAML_FILE, help="Write the robot file with the motors chosen.")
 @click.option("--plot", "folder", type=FOLDER, help="Save a figure of torques over speeds there.")
 @json_option
 @overwrite_option

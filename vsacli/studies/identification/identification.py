@@ -13,7 +13,9 @@ from vsacli.base.wrench import wrench_columns
 from vsacli.documents.columns_file import load_columns
 from vsacli.robot.model import Robot, check_robot
 from vsacli.studies.identification.estimation.solution import Solution, solution
+from vsacli.studies.identification.explanations import Explanation, explanation
 from vsacli.studies.identification.fitted_file import to_write
+from vsacli.studies.identification.gains import Gain, gains
 from vsacli.studies.identification.identification_report import (
     DOUBTFUL,
     MISFIT,
@@ -29,7 +31,6 @@ from vsacli.studies.identification.links.found_links import doubts_of, found_lin
 from vsacli.studies.identification.links.link_system import LINKS, link_system, without_links
 from vsacli.studies.identification.motors.motor_system import motor_systems
 from vsacli.studies.identification.motors.unknowns import FRICTION, GROUPS, SPRINGS, check_fit, with_friction
-from vsacli.studies.identification.offsets import offsets
 from vsacli.studies.identification.records.bandwidth import bandwidth_of, bounds
 from vsacli.studies.identification.records.delays import Delay, delay, without_delay
 from vsacli.studies.identification.records.record_doubts import model_doubts
@@ -82,9 +83,7 @@ def identify(
     first = solutions(sought, joints, fit, signals)
     notes = [*_notes(robot, joints, fit, signals), *(f"{path}: {PUSHED}" for path in pushed)]
     if not first:
-        nothing = "the joints that were recorded have nothing of what is to be found"
-        reasons = "; ".join(notes)
-        raise InputError.one(f"{nothing}{reasons and f' ({reasons})'}")
+        raise _nothing_to_find(notes)
     delays = [delay(first, each) for each in signals]
     late = any(each.matters(record.rate) for each, record in zip(delays, signals, strict=True))
     signals = [_aligned(*each) for each in zip(signals, delays, strict=True)]
@@ -93,20 +92,31 @@ def identify(
     links = next((found_links(robot, each) for each in found if each.system.title == LINKS), None)
     doubts = [tuple(model_doubts(robot, joints, *each)) for each in zip(records, signals, strict=True)]
     used = tuple(map(_used, records, signals, delays, doubts))
+    of_gains, explained = [], []
+    if not any(doubts):
+        of_gains = gains(sought, joints, [each for each in found if each.system.title != LINKS], signals)
+        explained = _explanations(robot, found, reports, signals, of_gains)
     return Identification(
         robot=robot.name,
-        verdict=_verdict(reports, used, links),
+        verdict=_verdict(reports, used, links, explained, of_gains),
         records=used,
         systems=reports,
         notes=(
             *notes,
             *(() if links is None else doubts_of(links)),
-            *_explanations(robot, found, reports, signals),
+            *(sentence for each in explained for sentence in each.sentences),
+            *(each.sentence for each in of_gains),
         ),
         fitted=_fitted(robot, sought, reports, links),
         torques=tuple(torques(robot, found, records, signals)),
         sources=(*robot.sources, *(each.source for each in records)),
     )
+
+
+def _nothing_to_find(notes: Sequence[str]) -> InputError:
+    nothing = "the joints that were recorded have nothing of what is to be found"
+    reasons = "; ".join(notes)
+    return InputError.one(f"{nothing}{reasons and f' ({reasons})'}")
 
 
 def _read(
@@ -164,13 +174,17 @@ def _aligned(signals: Signals, late: Delay) -> Signals:
 
 
 def _verdict(
-    systems: Sequence[SystemReport], records: Sequence[RecordReport], links: ConsistentLinks | None
+    systems: Sequence[SystemReport],
+    records: Sequence[RecordReport],
+    links: ConsistentLinks | None,
+    explained: Sequence[Explanation],
+    of_gains: Sequence[Gain],
 ) -> str:
     residuals = [each for system in systems for each in system.residuals]
-    if any(record.doubts for record in records):
+    if any(record.doubts for record in records) or any(each.doubtful for each in of_gains):
         return DOUBTFUL
     held = all(system.converged for system in systems) and (links is None or links.within)
-    if any(map(_fails, residuals)) or not held:
+    if any(map(_fails, residuals)) or not held or any(each.matters for each in explained):
         return MISFIT
     return OK if all(number.told for system in systems for number in system.numbers) else UNTOLD
 
@@ -211,12 +225,23 @@ def _notes(
 
 
 def _explanations(
-    robot: Robot, found: Sequence[Solution], reports: Sequence[SystemReport], signals: Sequence[Signals]
-) -> Iterator[str]:
-    """What would explain what equations of motors leave, where that is too much."""
+    robot: Robot,
+    found: Sequence[Solution],
+    reports: Sequence[SystemReport],
+    signals: Sequence[Signals],
+    of_gains: Sequence[Gain],
+) -> list[Explanation]:
+    """What would explain what equations leave; of links only if what springs carry is right.
+
+    Links are found by that, so that one fault would be told of both.
+    """
+    explained: list[Explanation] = []
     for system, report in zip(found, reports, strict=True):
-        if system.system.title in robot.joint_names and any(map(_fails, report.residuals)):
-            yield from offsets(robot, system, signals)
+        wrong = any(each.matters for each in explained) or any(each.doubtful for each in of_gains)
+        if system.system.title != LINKS or not wrong:
+            fails = any(map(_fails, report.residuals))
+            explained.append(explanation(robot, system, signals, fails=fails))
+    return explained
 
 
 def _fitted(

@@ -19,8 +19,16 @@ OK, UNTOLD, MISFIT, DOUBTFUL = "ok", "untold", "misfit", "doubtful"
 """Verdicts, the worst last: all numbers are told; some are not; the equations leave more than noise; a record
 looks wrong."""
 
-CHANGED = 2.0
-"""Standard errors by which a number differs from that of the file."""
+CHANGED = 3.0
+"""Standard errors by which a number differs from that of the file. Of a hundred numbers that do not, five are
+beyond two, and less than one beyond three."""
+
+
+TENS = 10
+"""Standard errors of a difference below which it has a decimal."""
+
+LARGEST_SAID = 1e3
+"""Standard errors of a difference up to which their number is said; beyond, none is meant."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +54,7 @@ class Number(Published):
     sum: str = ""
 
     shape: ClassVar = {
-        **named("path", "unit", "before", "value", "standard_error", "changed"),
+        **named("path", "unit", "before", "value", "standard_error", "off", "changed"),
         "note?": "note",
         "sum?": "sum",
     }
@@ -55,6 +63,12 @@ class Number(Published):
     def told(self) -> bool:
         """Whether it was found."""
         return math.isfinite(self.standard_error)
+
+    @property
+    def off(self) -> float:
+        """Standard errors by which it differs from that of the file; NaN if it was not told."""
+        difference = self.value - self.before
+        return difference / self.standard_error if difference and self.told else 0.0 * self.standard_error
 
     @property
     def changed(self) -> bool:
@@ -191,6 +205,7 @@ class Identification(Published):
         return "\n".join(
             [
                 self._headline(),
+                self._summary(),
                 *map(_used, self.records),
                 *(line.rstrip() for line in aligned(self._numbers())),
                 *aligned(self.residual_rows()),
@@ -200,17 +215,28 @@ class Identification(Published):
 
     def as_text(self) -> ReportText:
         """The report in its parts, of its tables the numbers; the other is `residual_rows`."""
-        lines = [*map(_used, self.records), *self._sentences()]
+        lines = [self._summary(), *map(_used, self.records), *self._sentences()]
         return ReportText(self._headline(), self._numbers(), lines)
 
     def _headline(self) -> str:
         count = f"{len(self.records)} record" + ("s" if len(self.records) > 1 else "")
         return f"{self.robot} from {count}: {self.verdict.upper()}"
 
+    def _summary(self) -> str:
+        """How many numbers agree with the file, how many do not, and how many say nothing of it."""
+        told, changed = sum(each.told for each in self.numbers), sum(each.changed for each in self.numbers)
+        counts = {
+            f"{'agrees' if told - changed == 1 else 'agree'} with the file": told - changed,
+            f"{'differs' if changed == 1 else 'differ'} by more than {CHANGED:g} standard errors": changed,
+            "cannot be told": len(self.numbers) - told,
+        }
+        listed = ", ".join(f"{count} {words}" for words, count in counts.items() if count)
+        return f"{len(self.numbers)} number{'s' if len(self.numbers) != 1 else ''}: {listed}"
+
     def _numbers(self) -> list[tuple[str, ...]]:
         rows: list[tuple[str, ...]] = [("number", "file", "found", "+-", "unit", "")]
         for each in self.numbers:
-            said = each.note or ("changed" if each.changed else "as in the file")
+            said = each.note or (_off(each.off) if each.changed else "as in the file")
             found = significant(each.value, each.standard_error)
             error = f"{each.standard_error:.2g}" if each.told else "-"
             rows.append((each.path, f"{each.before:.6g}", found, error, each.unit, said))
@@ -239,6 +265,11 @@ class Identification(Published):
         for record in self.records:
             yield from (f"{record.path}: {doubt}" for doubt in record.doubts)
         yield from self.notes
+
+
+def _off(errors: float) -> str:
+    size = abs(errors)
+    return f"changed, {size:.{int(size < TENS)}f} errors" if size < LARGEST_SAID else "changed"
 
 
 def _used(record: RecordReport) -> str:

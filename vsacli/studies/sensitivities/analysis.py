@@ -76,7 +76,7 @@ def analysed(
     steps = np.array([step_of(each) for each in run.parameters])
     effects = Effects(steps, run.trajectory.times.block(0, run.trajectory.samples), len(robot.joints))
     sizes = np.zeros(len(run.parameters)) if given is None else deviations(given)
-    band = None if given is None else Band(sizes)
+    band = None if given is None else Band(sizes, robot.actuators)
     for part in run:
         effects.add(part)
         if band is not None:

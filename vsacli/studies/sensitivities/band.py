@@ -1,16 +1,22 @@
-"""How far motor torques and margins may be off while the numbers of a robot are uncertain: to first order."""
+"""How far motor torques and margins may be off while the numbers of a robot are uncertain.
+
+To first order, but for dry friction, which jumps where motors reverse.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.actuators.actuator import Actuator
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.json_records import Published, named
-from vsacli.studies.sensitivities.drive_derivatives import MARGIN
+from vsacli.studies.sensitivities.drive_derivatives import MARGIN, SPEED
+from vsacli.studies.sensitivities.reversals import Reversals
 from vsacli.studies.sensitivities.slopes import Derivatives
 
 
@@ -22,6 +28,9 @@ class JointBand(Published):
         torque: largest standard deviation of a motor torque, N m (N).
         share: that over the largest motor torque.
         time: when, s.
+        reverses: whether it is uncertain in which direction a motor with dry friction runs at some time.
+        reversals: share of its variance there that motors make which reverse earlier or later than computed;
+            below 0 if that makes the torque more certain.
         margin: the margin that is the smallest number of its own standard deviations, NaN if there is none.
         margin_deviation: that deviation.
         margin_time: when, s.
@@ -31,12 +40,24 @@ class JointBand(Published):
     torque: float
     share: float
     time: float
+    reverses: bool
+    reversals: float
     margin: float
     margin_deviation: float
     margin_time: float
     lost: float
 
-    shape: ClassVar = named("torque", "share", "time", "margin", "margin_deviation", "margin_time", "lost")
+    shape: ClassVar = named(
+        "torque",
+        "share",
+        "time",
+        "reverses",
+        "reversals",
+        "margin",
+        "margin_deviation",
+        "margin_time",
+        "lost",
+    )
 
 
 class TorqueCurves(NamedTuple):
@@ -52,65 +73,113 @@ class TorqueCurves(NamedTuple):
     deviation: FloatArray
 
 
-class Band:
-    """Variances over a run; independent parameters, first order. `add` its blocks in order."""
+class _Part(NamedTuple):
+    """A block of a run: variables, their standard deviations, and what reversals of motors make of them."""
 
-    def __init__(self, deviations: FloatArray) -> None:
+    time: FloatArray
+    tau_motor: FloatArray
+    margin: FloatArray
+    of_torque: FloatArray
+    of_margin: FloatArray
+    by_reversals: FloatArray
+    uncertain: BoolArray
+
+
+class Band:
+    """Variances over a run; independent parameters. `add` its blocks in order.
+
+    Args:
+        deviations: standard deviations of the parameters.
+        actuators: of the joints.
+    """
+
+    def __init__(self, deviations: FloatArray, actuators: Sequence[Actuator]) -> None:
         self._variances = deviations**2
-        self._parts: list[tuple[FloatArray, ...]] = []
+        self._reversals = Reversals(actuators)
+        self._parts: list[_Part] = []
 
     def add(self, part: Derivatives) -> None:
         """Merge the next block."""
         block = part.block
-        gap = part.margin
-        of_torque, of_margin = np.zeros_like(block.tau_motor), np.zeros_like(gap)
+        of_torque, of_speed, of_both = np.zeros((3, *block.tau_motor.shape))
+        of_margin = np.zeros_like(part.margin)
+        for joint, slopes, variances in self._of_joints(part):
+            torque, of_gap = slopes["tau_motor"], slopes[MARGIN]
+            of_torque[:, joint] += np.einsum("pms,p->sm", torque**2, variances)
+            of_margin[:, joint] += np.einsum("ps,p->s", of_gap**2, variances)
+            if self._reversals.possible:
+                speed = slopes[SPEED]
+                of_speed[:, joint] += np.einsum("pms,p->sm", speed**2, variances)
+                of_both[:, joint] += np.einsum("pms,pms,p->sm", torque, speed, variances)
+        by_reversals, uncertain = np.zeros_like(of_torque), np.zeros(of_margin.shape, dtype=bool)
+        if self._reversals.possible:
+            of_speed = np.sqrt(of_speed)
+            by_reversals = self._reversals.variance(block.dtheta, of_speed, of_both)
+            uncertain = self._reversals.uncertain(block.dtheta, of_speed)
+        of_torque = np.sqrt(np.maximum(of_torque + by_reversals, 0.0))
+        of_run = (part.time, block.tau_motor, part.margin, of_torque, np.sqrt(of_margin))
+        self._parts.append(_Part(*of_run, by_reversals, uncertain))
+
+    def _of_joints(self, part: Derivatives) -> Iterator[tuple[int, dict[str, FloatArray], FloatArray]]:
+        """Slopes of each joint by uncertain parameters, with their variances."""
+        names = ("tau_motor", SPEED, MARGIN) if self._reversals.possible else ("tau_motor", MARGIN)
         for group in part.groups:
             variances = self._variances[group.places]
             known = np.flatnonzero(variances)
             for joint, slopes in enumerate(group.of_joints if known.size else ()):
                 if slopes is not None:
-                    torque, of_gap = (slopes[name][known] ** 2 for name in ("tau_motor", MARGIN))
-                    of_torque[:, joint] += np.einsum("pms,p->sm", torque, variances[known])
-                    of_margin[:, joint] += np.einsum("ps,p->s", of_gap, variances[known])
-        self._parts.append((part.time, block.tau_motor, gap, np.sqrt(of_torque), np.sqrt(of_margin)))
+                    yield joint, {name: slopes[name][known] for name in names}, variances[known]
 
     def curves(self) -> TorqueCurves:
         """Torques and their deviations so far."""
-        time, torque, _, deviation, _ = (np.concatenate(parts) for parts in zip(*self._parts, strict=True))
-        return TorqueCurves(time, torque, deviation)
+        run = self._together()
+        return TorqueCurves(run.time, run.tau_motor, run.of_torque)
 
     def joints(self) -> list[JointBand]:
         """What was found, of each joint."""
-        time, torque, gap, of_torque, of_margin = (
-            np.concatenate(parts) for parts in zip(*self._parts, strict=True)
-        )
+        run = self._together()
         return [
-            _of_joint(time, torque[:, joint], gap[:, joint], of_torque[:, joint], of_margin[:, joint])
-            for joint in range(gap.shape[1])
+            _of_joint(
+                _Part(
+                    time=run.time,
+                    tau_motor=run.tau_motor[:, joint],
+                    margin=run.margin[:, joint],
+                    of_torque=run.of_torque[:, joint],
+                    of_margin=run.of_margin[:, joint],
+                    by_reversals=run.by_reversals[:, joint],
+                    uncertain=run.uncertain[:, joint],
+                )
+            )
+            for joint in range(run.margin.shape[1])
         ]
 
+    def _together(self) -> _Part:
+        return _Part(*map(np.concatenate, zip(*self._parts, strict=True)))
 
-def _of_joint(
-    time: FloatArray, torque: FloatArray, gap: FloatArray, of_torque: FloatArray, of_margin: FloatArray
-) -> JointBand:
-    spread = np.nan_to_num(np.fmax(*of_torque.T))
+
+def _of_joint(run: _Part) -> JointBand:
+    spread = np.nan_to_num(np.fmax(*run.of_torque.T))
     worst = int(spread.argmax())
-    peak = float(np.nanmax(np.abs(torque), initial=0.0))
-    known = np.isfinite(gap) & (of_margin > 0)
+    deviation, motor = float(spread[worst]), int(np.nan_to_num(run.of_torque[worst]).argmax())
+    peak = float(np.nanmax(np.abs(run.tau_motor), initial=0.0))
+    reversing = float(run.by_reversals[worst, motor]) / deviation**2 if deviation > 0 else 0.0
+    of_torque = (
+        deviation,
+        _share(deviation, peak),
+        float(run.time[worst]),
+        bool(run.uncertain.any()),
+        reversing,
+    )
+    known = np.isfinite(run.margin) & (run.of_margin > 0)
     if not known.any():
-        nothing = (math.nan,) * 3 + (0.0,)
-        return JointBand(
-            float(spread[worst]), _share(float(spread[worst]), peak), float(time[worst]), *nothing
-        )
-    distance = np.where(known, gap / np.where(known, of_margin, 1.0), np.inf)
+        return JointBand(*of_torque, math.nan, math.nan, math.nan, 0.0)
+    distance = np.where(known, run.margin / np.where(known, run.of_margin, 1.0), np.inf)
     near = int(distance.argmin())
     return JointBand(
-        float(spread[worst]),
-        _share(float(spread[worst]), peak),
-        float(time[worst]),
-        float(gap[near]),
-        float(of_margin[near]),
-        float(time[near]),
+        *of_torque,
+        float(run.margin[near]),
+        float(run.of_margin[near]),
+        float(run.time[near]),
         math.erfc(float(distance[near]) / math.sqrt(2)) / 2,
     )
 

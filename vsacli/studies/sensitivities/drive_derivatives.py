@@ -21,6 +21,9 @@ from vsacli.studies.sensitivities.implicit import ImplicitSolution
 OF_MOTORS = ("tau_motor", "theta", "motor_power")
 """Variables of the motors that are differentiated."""
 
+SPEED = "dtheta"
+"""Variable that says where dry friction reverses; differentiated as well."""
+
 MARGIN = "margin"
 """Of the stiffness to the nearer end of its corridor, relative."""
 
@@ -61,7 +64,7 @@ def drive_derivatives(
     with np.errstate(invalid="ignore", divide="ignore"):
         driven = driven_by(carrying, command._replace(**torques), NEAR_SINGULAR_MARGIN)
         gap = margin(driven.stiffness, driven.stiffness_lower, driven.stiffness_upper)
-    found = {name: getattr(driven, name) for name in OF_MOTORS} | {MARGIN: gap}
+    found = {name: getattr(driven, name) for name in (*OF_MOTORS, SPEED)} | {MARGIN: gap}
     tangents = {
         name: np.where(np.isnan(each), np.nan, tangent_of(each, directions, np.shape(each)))
         for name, each in found.items()

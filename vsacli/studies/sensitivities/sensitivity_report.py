@@ -148,13 +148,20 @@ class Sensitivity(Published):
             said = []
             if math.isfinite(band.share):
                 size = f"{band.torque:.3g} {self.units[joint]} ({_percent(band.share)} of its peak)"
-                said.append(f"motor torque +- {size} at t = {band.time:.3f} s")
+                mostly = ", mostly by when dry friction reverses" if band.reversals > 1 / 2 else ""
+                said.append(f"motor torque +- {size} at t = {band.time:.3f} s{mostly}")
             if math.isfinite(band.margin):
                 said.append(
                     f"margin {100 * band.margin:.2f} +- {_percent(band.margin_deviation)} at t = "
                     f"{band.margin_time:.3f} s, lost with a probability of {_probability(band.lost)}"
                 )
             yield f"{joint}: {'; '.join(said) or 'no motor torque, since no step is feasible and regular'}"
+        reversing = [joint for joint, band in self.band.items() if band.reverses]
+        if reversing and self.monte_carlo is None:
+            yield (
+                f"{', '.join(reversing)}: dry friction jumps where a motor reverses; when it does is known "
+                "to first order, and --monte-carlo draws robots, which tell more"
+            )
 
     def _drawn(self) -> Iterator[str]:
         if self.monte_carlo is None:

@@ -197,6 +197,11 @@ def _choice(
 
 def _order(choice: Choice, criterion: str) -> tuple[bool, float, str]:
     """What choices are sorted by."""
+    return not choice.does, cost_of(choice, criterion), choice.motor
+
+
+def cost_of(choice: Choice, criterion: str) -> float:
+    """Return what the best choice has least of; of one that does not do, its largest share of a limit."""
     _, largest = choice.largest
     wanted = {"copper": choice.copper_loss, "utilisation": largest, "mass": choice.mass or math.inf}
-    return not choice.does, wanted[criterion] if choice.does else largest, choice.motor
+    return wanted[criterion] if choice.does else largest

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from vsacli.base.errors import InputError
 from vsacli.documents.edited import edited, moved_files
 from vsacli.documents.unaliased import unaliased
-from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.sizing.motor_sizing import MotorSizing
 from vsacli.studies.sizing.sizing_report import Sizing
@@ -31,7 +29,7 @@ def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
         folder: where the text will stand.
 
     Raises:
-        InputError: the robot was not read from a file, or has rotors coupled more than those chosen can be.
+        InputError: the robot was not read from a file.
     """
     source = next(iter(robot.sources), None)
     if source is None or source.text is None:
@@ -43,24 +41,10 @@ def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
         motors = [_as_in_robot_file(each) for each in places]
         values[f"{place}.motor"] = motors[0] if len(motors) == 1 else motors
         if joint.actuator.coupled_rotors:
-            values[f"{place}.coupled_inertia"] = _coupled_inertia(joint, motors)
+            ratios = math.prod(motor["gear_ratio"] for motor in motors)
+            values[f"{place}.coupled_inertia"] = joint.actuator.coupled_rotors / ratios
     files = dict(moved_files(source.text, Path(source.path).parent, Path(folder)))
     return edited(unaliased(source.text, values), {**values, **files})
-
-
-def _coupled_inertia(joint: Joint, motors: Sequence[Mapping[str, Any]]) -> float:
-    """The coupled inertia that is the same on the joint's side as before, of the shafts.
-
-    Raises:
-        InputError: rotors so small cannot be coupled so much.
-    """
-    coupled = joint.actuator.coupled_rotors
-    ratios = float(math.prod(motor["gear_ratio"] for motor in motors))
-    largest = math.sqrt(math.prod(motor["inertia"] for motor in motors)) * ratios
-    if not abs(coupled) < largest:
-        reason = f"coupled_inertia is {coupled:g} on the joint's side, that of rotors as those chosen"
-        raise InputError.one(f"joint {joint.name}: {reason} below {largest:.4g}; correct it and size again")
-    return coupled / ratios
 
 
 def _as_in_robot_file(place: MotorSizing) -> dict[str, Any]:

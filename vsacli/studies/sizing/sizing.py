@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from vsacli.actuators.limit_check import LIMIT_ROUNDING
@@ -13,7 +13,8 @@ from vsacli.base.errors import InputError, check_type
 from vsacli.documents.record_table import RecordTable
 from vsacli.robot.model import Robot, check_robot
 from vsacli.studies.sizing.catalogue import CatalogueMotor, read_catalogue
-from vsacli.studies.sizing.choices import CRITERIA, check_criterion, choices, usual_criterion
+from vsacli.studies.sizing.choices import CRITERIA, Choice, check_criterion, choices, usual_criterion
+from vsacli.studies.sizing.coupled_motors import coupled_choices
 from vsacli.studies.sizing.demand import demanded
 from vsacli.studies.sizing.gears import Gears, gears_of_joints
 from vsacli.studies.sizing.motor_demand import MotorDemand
@@ -49,8 +50,8 @@ def size_drives(
         progress: is told how many further steps are done.
 
     Raises:
-        InputError: there is no trajectory, one does not fit the robot, the catalogue cannot be read, or gears
-            or criterion are none.
+        InputError: there is no trajectory, one does not fit the robot, the catalogue cannot be read or has no
+            rotors that can be coupled as those of the robot are, or gears or criterion are none.
         TypeError: an argument is of another type.
     """
     check_robot(robot)
@@ -62,10 +63,8 @@ def size_drives(
     criterion = _criterion(table, gears, minimize)
     demand = demanded(robot, trajectories, progress)
     own = [motor for joint in robot.joints for motor in joint.actuator.motors]
-    found = [
-        _sized(asked, motor, table, by_joint[asked.joint], criterion)
-        for asked, motor in zip(demand.motors, own, strict=True)
-    ]
+    offered = _offered(robot, demand.motors, table, by_joint, criterion)
+    found = [_sized(*each, table) for each in zip(demand.motors, own, offered, strict=True)]
     warnings = [*robot.warnings, *(warning for motion in trajectories for warning in motion.warnings)]
     return Sizing(
         robot=robot.name,
@@ -95,18 +94,41 @@ def _criterion(
     return minimize
 
 
+def _offered(
+    robot: Robot,
+    demands: Sequence[MotorDemand],
+    table: RecordTable[CatalogueMotor] | None,
+    gears: Mapping[str, Gears],
+    criterion: str | None,
+) -> list[tuple[Choice, ...]]:
+    """Motors of the catalogue in the place of each of the robot, with which the robot can be built."""
+    if table is None or criterion is None:
+        return [()] * len(demands)
+    found = [
+        choices(each, table.records, gears[each.joint], criterion) if each.time.size else ()
+        for each in demands
+    ]
+    motors = {each.name: each for each in table.records}
+    for joint in robot.joints:
+        places = [place for place, each in enumerate(demands) if each.joint == joint.name]
+        if joint.actuator.coupled_rotors and all(found[place] for place in places):
+            first, second = places
+            found[first], found[second] = coupled_choices(
+                joint, found[first], found[second], motors, criterion
+            )
+    return found
+
+
 def _sized(
     demand: MotorDemand,
     motor: JointMotor,
+    found: tuple[Choice, ...],
     table: RecordTable[CatalogueMotor] | None,
-    gears: Gears,
-    criterion: str | None,
 ) -> MotorSizing:
     """One motor of the robot, which nothing is known of if no step can be done."""
     if not demand.time.size:
         return MotorSizing(demand, motor.gear_ratio)
     own = WorkingPoints.as_it_is(demand, motor)
-    found = choices(demand, table.records, gears, criterion) if table and criterion else ()
     best = next((each for each in table.records if each.name == found[0].motor), None) if table else None
     return MotorSizing(
         demand,

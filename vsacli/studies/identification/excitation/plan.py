@@ -11,6 +11,7 @@ from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.variables import Block
+from vsacli.documents.fields import LARGEST
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.allowed import MARGIN, Allowed, allowed
 from vsacli.studies.identification.excitation.design import Design
@@ -69,11 +70,14 @@ def plan_excitation(
         progress: is told how many further ones of `TRIALS` motions were tried.
 
     Raises:
-        InputError: the duration is too short, or the robot cannot execute its own motion.
+        InputError: the duration is too short, the noise out of range, or the robot cannot execute its own
+            motion.
         ImpossibleError: no excitation is feasible.
     """
     if not SHORTEST <= duration < np.inf:
         raise InputError.one(f"an excitation lasts at least {SHORTEST:g} s, not {duration:g} s")
+    if not all(each is None or 0 <= each <= LARGEST for each in noise):
+        raise InputError.one(f"the noise of sensors must lie between 0 and {LARGEST:g}")
     bounds = allowed(robot, None if own is None else _middle(executed(robot, own).q))
     designs = [Design(robot, bounds, duration, each) for each in FREQUENCIES if each * duration >= 1]
     information = Information(robot, [each.block for each in _examples(designs, seed)])

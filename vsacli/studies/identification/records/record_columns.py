@@ -11,13 +11,13 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.simulation_variables import SIMULATION_VARIABLES, measured
+from vsacli.base.simulation_variables import measured
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.source import Source
 from vsacli.documents.table_header import split_heading
 from vsacli.robot.model import Robot
-from vsacli.studies.measured.measured_columns import Measured, known_columns, read_recording
+from vsacli.studies.measured.measured_columns import Measured, known_columns, preferred, read_recording
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 
 POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
@@ -85,8 +85,8 @@ def recorded_columns(
     Raises:
         InputError: there is none, a unit is one of something else, or times do not ascend.
     """
-    wanted = [VARIABLES[name] for name in (*READINGS, CURRENT)]
-    wanted += [SIMULATION_VARIABLES[measured(name)] for name in READINGS]
+    wanted = [(name, 0, VARIABLES[name]) for name in (*READINGS, CURRENT)]
+    wanted += [(measured(name), 1, VARIABLES[name]) for name in READINGS]
     recording = read_recording(path, known_columns(_RobotColumns(robot), wanted), "the robot", mapping)
     united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
     stamps, columns = elapsed_times(recording.time), []
@@ -101,13 +101,9 @@ def recorded_columns(
 
 def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:
     """For each place the column that counts: what sensors read if it is there, torques before currents."""
-    ranks = {CURRENT: (TORQUE, 0)} | {name: (name, 1) for name in READINGS}
-    ranks |= {measured(name): (name, 2) for name in READINGS}
-    best: dict[Where, Measured] = {}
-    for signal in sorted(signals, key=lambda signal: ranks[signal.place.variable][1]):
-        variable, joint, motor, *_ = signal.place
-        best[ranks[variable][0], joint, motor] = signal
-    return best
+    best = preferred(signals)
+    currents = {place: best.pop(place) for place in tuple(best) if place[0] == CURRENT}
+    return {(TORQUE, *place[1:]): signal for place, signal in currents.items()} | best
 
 
 def _torque_of_current(robot: Robot, signal: Measured) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -17,6 +18,9 @@ from vsacli.studies.identification.records.record_columns import MOTOR, POSITION
 from vsacli.studies.identification.records.records import Record
 from vsacli.studies.identification.records.signals import Signals
 from vsacli.studies.measured.agreement import Agreement, straight_line
+from vsacli.studies.measured.exchange import exchanged
+from vsacli.studies.measured.likeness import exactness
+from vsacli.studies.measured.pairing import tame
 from vsacli.studies.measured.slips import slips
 
 ELSEWHERE = 0.5
@@ -27,6 +31,9 @@ FOLLOWS_BETTER = 0.25
 
 FOLLOWS = 0.5
 """The same over the variance of what it follows."""
+
+RESTING = 1e-3
+"""Share of the predicted range below which a measured torque does not move."""
 
 ODD_GAINS: Mapping[str, float] = MappingProxyType(
     {
@@ -52,10 +59,24 @@ def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: S
     sprung = [index for index in joints if robot.joints[index].actuator.sprung]
     sprung = [index for index in sprung if (TORQUE, index, MOTORS[0]) in record.columns]
     torques = [each for index in sprung for each in _torques(robot, index, record, signals)]
-    yield from slips(*zip(*torques, strict=True)) if torques else ()
+    if torques:
+        agreements, ratios = zip(*torques, strict=True)
+        yield from slips(_followed(agreements), ratios)
     for index in sprung:
         yield from _positions(robot, index, record, signals)
         yield from _branch(robot, index, signals)
+
+
+def _followed(torques: Sequence[Agreement]) -> list[Agreement]:
+    """Torques with the columns whose predictions they follow, where columns look exchanged."""
+    found, units = list(torques), {torque.unit for torque in torques}
+    if len(units) > 1 or len({torque.samples for torque in torques}) > 1:
+        return found
+    exact = [exactness(tame(torque.measured)) for torque in torques]
+    predicted = [torque.computed for torque in torques]
+    for row, column in exchanged([torque.measured for torque in torques], exact, lambda _row: predicted):
+        found[row] = replace(torques[row], follows=torques[column].column)
+    return found
 
 
 def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[str]:
@@ -135,6 +156,7 @@ def _agreement(
         time=time,
         computed=computed,
         measured=measured,
+        still="measured" if np.ptp(measured) < RESTING * np.ptp(computed) else None,
     )
 
 
