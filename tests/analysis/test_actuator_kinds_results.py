@@ -113,7 +113,8 @@ def test_a_wrong_derivative_of_any_kind_fails(
     monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
     check = inverse_dynamics(robot, motion).report.self_check
     assert not check.passed
-    assert check.ladder == pytest.approx(1e-6, rel=0.1)  # of the peak, which no probe need meet
+    # Of the peak, which no probe need meet; power has the velocity twice, in kinetic energy and in losses.
+    assert 0.9e-6 < check.ladder < 2.1e-6
 
 
 def test_a_wrong_deflection_of_an_elastic_joint_fails(
@@ -335,6 +336,7 @@ def test_no_stiffness_mends_an_elastic_joint(robot: Robot, motion: Trajectory) -
     weak = replace(shoulder.actuator, motor=replace(shoulder.actuator.motor, max_torque=10.0))
     weaker = replace(robot, joints=(base, replace(shoulder, actuator=weak), elbow))
     found = suggest(weaker, motion)
-    reason = NotPossible(("the actuator of shoulder has no stiffness to choose",))
-    assert (found.stiffness_offset, found.stiffness_profile) == (reason, reason)
+    assert isinstance(found.stiffness_offset, NotPossible)
+    assert found.stiffness_offset == found.stiffness_profile
+    assert found.causes[0].text.endswith("no slower motion helps, and it has no stiffness to choose")
     json.dumps(found.as_json())

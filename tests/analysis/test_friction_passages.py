@@ -86,7 +86,7 @@ def test_blocks_do_not_matter() -> None:
 
 def test_where_nothing_is_known_between_the_steps_it_is_said() -> None:
     motion = swing(500.0).block(0, 1001)
-    given = {name: motion.of_joints[name] for name in ("dq", "ddq", "d3q", "d4q")}
+    given = {name: motion.of_joints[name] for name in ("dq", "ddq", "d3q")}
     trajectory = Trajectory.from_samples(
         motion.time, motion.q, motion.commanded["stiffness"], **given, name="given"
     )

@@ -321,11 +321,11 @@ def test_warnings_and_notes_about_the_inputs_follow_the_table():
 
 
 def test_failed_self_check_warns_against_the_torques():
-    text = render(report(self_check=SelfCheck(spring_residual=1e-15, ladder=3.3e-3)))
+    text = render(report(self_check=SelfCheck(spring_residual=1e-15, ladder=3.3e-3, shaft_residual=2e-2)))
     assert text.splitlines()[0].endswith("SELF CHECK FAILED")
     assert text.splitlines()[-1] == (
         "SELF-CHECK FAILED: derivatives are off by 3.3e-03 (bound 1e-08), "
-        "springs by 1.0e-15 (bound 1e-11); do not use these torques"
+        "motors by 2.0e-02 (bound 1e-11), springs by 1.0e-15 (bound 1e-11); do not use these torques"
     )
 
 

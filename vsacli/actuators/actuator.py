@@ -57,12 +57,14 @@ class Carried(NamedTuple):
         tau_e: torque on the link.
         size: of the torques that it is the sum of.
         stiffness: of the joint.
+        stiffness_size: of what that is the sum of; rounding of the deflections changes it by eps times this.
         tau_spring: torque against each motor, (motors, samples).
     """
 
     tau_e: FloatArray
     size: FloatArray
     stiffness: FloatArray
+    stiffness_size: FloatArray
     tau_spring: FloatArray
 
 

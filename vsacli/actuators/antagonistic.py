@@ -199,7 +199,8 @@ class Antagonistic(Actuator):
         tau = np.stack([law.torque(deflection) for law, deflection in sides])
         sigma = np.stack([law.stiffness(deflection) for law, deflection in sides])
         against = tau if self.coupling is None else tau + _between(self.coupling, of_joint["phi"])
-        return Carried(tau.sum(axis=0), np.abs(tau).sum(axis=0), sigma.sum(axis=0), against)
+        stiffness = sigma.sum(axis=0)
+        return Carried(tau.sum(axis=0), np.abs(tau).sum(axis=0), stiffness, stiffness, against)
 
     @property
     def spring_group(self) -> Hashable:

@@ -182,8 +182,8 @@ class Elastic(Actuator):
     def carried(self, of_joint: OfJoint) -> Carried:
         """Torque and stiffness by the law."""
         phi = of_joint["phi"][0]
-        tau_e = self.law.torque(phi)
-        return Carried(tau_e, np.abs(tau_e), self.law.stiffness(phi), tau_e[None])
+        tau_e, stiffness = self.law.torque(phi), self.law.stiffness(phi)
+        return Carried(tau_e, np.abs(tau_e), stiffness, stiffness, tau_e[None])
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:

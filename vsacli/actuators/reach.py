@@ -16,7 +16,9 @@ from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN, Flag, marke
 
 def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
     """Relative distance of the stiffness to the nearer end of its corridor; negative outside, NaN if none."""
-    return np.minimum(stiffness - lower, upper - stiffness) / stiffness
+    with np.errstate(divide="ignore", invalid="ignore"):  # a stiffness of zero has none
+        relative: FloatArray = np.minimum(stiffness - lower, upper - stiffness) / stiffness
+    return relative
 
 
 def nearer_end(stiffness: float, lower: float, upper: float) -> float:

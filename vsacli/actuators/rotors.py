@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.base.arrays import BoolArray, FloatArray
+
+
+def largest_coupling(first: float, second: float) -> float:
+    """Return what the size of a coupled inertia must be below, or B is not positive definite.
+
+    Args:
+        first: inertia of one rotor, on the same side of its gear as the coupled one.
+        second: that of the other.
+    """
+    return math.sqrt(first * second)
 
 
 class Rotors:

@@ -5,7 +5,6 @@ The springs' potential takes the place of (14) and (61)-(72); a mechanism says w
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
@@ -21,6 +20,7 @@ from vsacli.actuators.mechanisms.mechanism import Mechanism
 from vsacli.actuators.mechanisms.state import MechanismState
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.reach import deflections_within_reach
+from vsacli.actuators.rotors import largest_coupling
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base import units
@@ -58,7 +58,7 @@ class Serial(Actuator):
     def __post_init__(self) -> None:
         problems = []
         first, second = (motor.inertia for motor in self.motors)
-        largest = math.sqrt(first * second)
+        largest = largest_coupling(first, second)
         if not abs(self.coupled_rotors) < largest:
             reason = (
                 f"is {self.coupled_rotors:g} on the joint side of the gears; its size must be below "
@@ -178,10 +178,17 @@ class Serial(Actuator):
         return self._state_of(of_joint).spring_rates(np.stack(rates, axis=-1)).T
 
     def carried(self, of_joint: OfJoint) -> Carried:
-        """What the mechanism carries."""
-        state = self._state_of(of_joint)
+        """What the mechanism carries.
+
+        Its stiffness may be a difference, next to zero while neither part is; phi and the setting then
+        decide on it by their last digits.
+        """
+        state, rows = self._state_of(of_joint), self._state_of(of_joint).rows
         size = np.abs(state.tau_e) + SMALL_DEFLECTION * state.stiffness
-        return Carried(state.tau_e, size, state.stiffness, state.tau_spring.T)
+        turned = np.abs(rows.stiffness_1 * of_joint["phi"][0]) + np.abs(
+            rows.stiffness_2 * of_joint["theta"][1]
+        )
+        return Carried(state.tau_e, size, state.stiffness, state.stiffness + turned, state.tau_spring.T)
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:

@@ -1,21 +1,32 @@
-"""The part of the self-check that holds derivatives against differences of what they derive."""
+"""The part of the self-check that holds derivatives against differences of what they derive.
+
+Powers are derivatives, too: that of motors, links and losses changes the energy in rotors, springs and links.
+
+What rounding leaves of a difference is measured. Over a stencil of seven times a smooth value has hardly any
+sixth difference, so what there is comes from rounding, with the condition of all that was computed. Hamming
+read noise from tables so; Moré and Wild (2011) made a method of it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.reach import margin
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import AnyArray, BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.inverse import block_of, usual_block
+from vsacli.dynamics.link_energy import link_energy, link_powers
+from vsacli.dynamics.shaft_balances import shaft_energy, shaft_powers
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -83,6 +94,18 @@ MIDDLE = len(OFFSETS) // 2
 WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
 """Central first difference of sixth order over these offsets."""
 
+SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / math.sqrt(924)
+"""The sixth difference over them, scaled so that independent errors are passed on with their size."""
+
+NEIGHBORS = 5
+"""Probes to either side from which the noise at one is taken: one sixth difference may be small by
+chance, of 11 that are drawn from a normal distribution the largest is below a third of its width once in 10^7
+times."""
+
+NOISE_GAIN = 12.0
+"""Errors beyond so many times that noise fail. Of 10^6 that are drawn from a normal distribution the largest
+lies at 5 of its widths, and the largest of 11 sixth differences may be a third of the noise."""
+
 SMALL_JOINT = 1e-3
 """Share of the largest joint's peak against which smaller joints are measured: what is below may be nothing
 but rounding of the larger torques."""
@@ -94,7 +117,7 @@ def ladder(
     engine: Engine = NUMPY,
     internal: InternalMotions | None = None,
 ) -> tuple[float, float]:
-    """Largest error of a derivative of `RUNGS` against first differences, relative to its peak; its bound.
+    """Largest error of a derivative of `RUNGS`, or of a power, relative to its peak; its bound.
 
     Differences are taken at about 200 times with steps of their own, over which the trajectory is analytic.
     Motor motion is compared where it is smooth over the difference. Of the errors that is the largest which
@@ -113,34 +136,35 @@ def ladder(
         inside = {} if internal is None else internal.at(time)
         return block_of(kernel, trajectory.at(time), engine, internal=inside)
 
-    errors, everywhere = _ladder(robot, trajectory, compute, times, FIRST_SCALES[:, None] * steps)
+    errors, bounds, everywhere = _ladder(kernel, trajectory, compute, times, FIRST_SCALES[:, None] * steps)
     if not (everywhere and errors.max() <= CLEAR):
-        errors, _ = _ladder(robot, trajectory, compute, times, STEP_SCALES[:, None] * steps)
+        errors, bounds, _ = _ladder(kernel, trajectory, compute, times, STEP_SCALES[:, None] * steps)
     rounding = ROUNDING_GAIN * np.finfo(float).eps * trajectory.duration / (FIRST_SCALES[-1] * steps)
-    bounds = np.maximum(LADDER_BOUND, rounding)
-    worst = int(np.argmax(errors / bounds))
+    bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding))
+    worst = np.unravel_index(np.argmax(errors / bounds), errors.shape)
     return float(errors[worst]), float(bounds[worst])
 
 
 def _ladder(
-    robot: Robot,
+    kernel: BalancedDynamics,
     trajectory: Trajectory,
     compute: Callable[[FloatArray], Block],
     times: FloatArray,
     steps: FloatArray,
-) -> tuple[FloatArray, bool]:
-    """The errors at times by the best of some difference steps; whether all motors were compared at each.
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Errors (derivatives, times) by the best of some steps, what noise admits, and whether all was compared.
 
     So many times are computed together as fill a block, since a run has the memory for one.
 
     Args:
-        robot: the robot.
+        kernel: of the robot.
         trajectory: what it is asked to do.
         compute: gives everything at times.
         times: (times,), s.
         steps: (scales, times), s.
     """
-    errors, everywhere = [_RungErrors() for _ in RUNGS], True
+    robot, everywhere = kernel.robot, True
+    found = [_RungErrors(steps) for _ in (*RUNGS, "energy")]
     together = max(1, usual_block(len(robot.joints)) // (len(steps) * len(OFFSETS)))
     for start in range(0, len(times), together):
         part = slice(start, start + together)
@@ -148,14 +172,40 @@ def _ladder(
         block = compute(grid.ravel())
         smooth = _motors_move_smoothly(block, grid.shape)
         everywhere = everywhere and bool(smooth.any(axis=0).all())
-        for rung, found in zip(RUNGS, errors, strict=True):
+        for rung, of_rung in zip(RUNGS, found, strict=False):
             value, derivative, whole = (
                 _on_grid(robot, block, name, grid.shape) for name in (rung.value, rung.derivative, rung.whole)
             )
             compared = np.ones_like(smooth) if rung.value.endswith("tau_e") else smooth
             slowest = np.abs(whole[0, MIDDLE]) / trajectory.duration**rung.order
-            found.add(value, derivative, steps[:, part], compared, slowest)
-    return np.max([found.relative() for found in errors], axis=0), everywhere
+            of_rung.add(value, derivative, compared, np.maximum(np.abs(derivative[0, MIDDLE]), slowest))
+        energy, power, size, grain = (
+            each.reshape(*grid.shape, -1, 1) for each in _energy_balances(kernel, block)
+        )
+        compared = np.concatenate((smooth, np.ones_like(smooth[..., :1])), axis=-1)
+        slowest = np.abs(energy[0, MIDDLE]) / trajectory.duration
+        found[-1].add(energy, power, compared, np.maximum(size[0, MIDDLE], slowest), grain[:, MIDDLE])
+    relative = [each.relative() for each in found]
+    return np.stack([error for error, _ in relative]), np.stack([bound for _, bound in relative]), everywhere
+
+
+def _energy_balances(kernel: BalancedDynamics, block: Block) -> Iterator[FloatArray]:
+    """Energy, the power that changes it, the size of its terms, and the grain; each (samples, joints + 1).
+
+    Rotors and springs of each joint, then all links together. The grain is what rounding may leave of the
+    energy in springs, which formulas compute as differences of terms as large as stiffness times a radian
+    squared, say K (1 - cos(2 phi)). The result then changes by leaps, between which it shows no noise.
+    """
+    robot = kernel.robot
+    of_joints = [block.of_joint(index) for index in range(len(robot.joints))]
+    pairs = list(zip(robot.joints, of_joints, strict=True))
+    powers = [shaft_powers(*pair) for pair in pairs] + [link_powers(robot, block, kernel.frame)]
+    yield np.stack([*(shaft_energy(*pair) for pair in pairs), link_energy(robot, block)], axis=-1)
+    yield np.stack([np.sum(terms, axis=0) for terms in powers], axis=-1)
+    yield np.stack([np.sum(np.abs(terms), axis=0) for terms in powers], axis=-1)
+    grains = [np.finfo(float).eps * np.nan_to_num(of_joint["stiffness"]) for of_joint in of_joints]
+    turns = [1.0 if joint.is_revolute else of_joint["q"] ** 2 for joint, of_joint in pairs]
+    yield np.stack([*map(np.multiply, grains, turns), 0 * block.time], axis=-1)
 
 
 def _on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> FloatArray:
@@ -184,41 +234,87 @@ def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
 
 
 class _RungErrors:
-    """Errors of a derivative over its peak; `add` times in order, then ask for the errors at all of them."""
+    """Errors of a derivative over its peak; `add` times in order, then ask for the errors at all of them.
 
-    def __init__(self) -> None:
-        self._errors: list[FloatArray] = []
+    Args:
+        steps: (scales, times), s, of all times.
+    """
+
+    def __init__(self, steps: FloatArray) -> None:
+        self._steps = steps
+        self._found: list[tuple[AnyArray, ...]] = []
         self._peak: FloatArray | float = 0.0
 
     def add(
         self,
         values: FloatArray,
         derivatives: FloatArray,
-        steps: FloatArray,
         compared: BoolArray,
-        slowest: FloatArray,
+        size: FloatArray,
+        grain: FloatArray | float = 0.0,
     ) -> None:
         """Merge some times.
 
         Args:
             values: of what is derived, (scales, offsets, times, joints, motors).
             derivatives: that are to be checked, likewise.
-            steps: (scales, times), s.
             compared: (scales, times, joints).
-            slowest: |derivative| if the change took the whole trajectory, (times, joints, motors); below may
-                be only rounding.
+            size: what errors are measured against, if it is the largest; (times, joints, motors).
+            grain: least noise of the values, (scales, times, joints, motors).
         """
-        difference = np.einsum("o,sotjm->stjm", WEIGHTS, values) / steps[:, :, None, None]
-        derivative = derivatives[:, MIDDLE]
-        error = np.where(compared[..., None], np.abs(difference - derivative), np.inf).min(axis=0)
-        valid: BoolArray = np.any(compared, axis=0)[..., None]
-        self._errors.append(np.where(valid, error, 0.0))
-        for size in (np.abs(derivative[0]), slowest):
-            self._peak = np.maximum(self._peak, np.max(size, axis=0, where=valid, initial=0.0))
+        difference, *noise = (
+            _combined(weights, each)
+            for weights, each in (
+                (WEIGHTS, values),
+                (SIXTH_DIFFERENCE, values),
+                (SIXTH_DIFFERENCE, derivatives),
+            )
+        )
+        there = np.broadcast_to(compared[..., None], difference.shape)
+        of_value, of_derivative = (np.where(there, np.abs(each), 0.0) for each in noise)
+        found = difference, derivatives[:, MIDDLE], np.maximum(of_value, grain), of_derivative, there
+        self._found.append(found)
+        valid: BoolArray = np.any(there, axis=0)
+        self._peak = np.maximum(self._peak, np.max(size, axis=0, where=valid, initial=0.0))
 
-    def relative(self) -> FloatArray:
-        """The largest error of any joint at each time, (times,)."""
-        error = np.concatenate(self._errors)
+    def relative(self) -> tuple[FloatArray, FloatArray]:
+        """The error nearest to its bound of any joint at each time, and that bound, (times,) each.
+
+        Of the steps that counts at which error and noise are least: noise grows as steps shrink, and a
+        wrong derivative is wrong at each of them.
+        """
+        difference, derivative, *noise, there = map(
+            partial(np.concatenate, axis=1), zip(*self._found, strict=True)
+        )
+        steps = self._steps[..., None, None]
+        of_value, of_derivative = map(_largest_near, noise)
+        admitted = NOISE_GAIN * (of_value / steps + of_derivative)
+        error = np.abs(difference / steps - derivative)
+        best = np.argmin(np.where(there, error + admitted, np.inf), axis=0)[None]
+        valid = there.any(axis=0)
+        error, admitted = (
+            np.where(valid, np.take_along_axis(each, best, axis=0)[0], 0.0) for each in (error, admitted)
+        )
         scale = np.maximum(self._peak, SMALL_JOINT * np.max(self._peak))
-        relative = np.divide(error, scale, out=np.zeros_like(error), where=scale != 0)
-        return np.asarray(np.max(relative, axis=(1, 2)))
+        error, bound = (
+            np.divide(each, scale, out=np.zeros_like(each), where=scale != 0).reshape(len(each), -1)
+            for each in (error, admitted)
+        )
+        worst = np.argmax(error / np.maximum(bound, LADDER_BOUND), axis=1)[:, None]
+        error, bound = (np.take_along_axis(each, worst, axis=1)[:, 0] for each in (error, bound))
+        return error, bound
+
+
+def _combined(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """A weighted sum over the offsets of values (scales, offsets, ...)."""
+    scales, offsets, *rest = values.shape
+    return (weights @ values.reshape(scales, offsets, -1)).reshape(scales, *rest)
+
+
+def _largest_near(noise: FloatArray) -> FloatArray:
+    """The largest of each time (axis 1) and its neighbors."""
+    largest = noise.copy()
+    for shift in range(1, min(NEIGHBORS + 1, noise.shape[1])):
+        np.maximum(largest[:, shift:], noise[:, :-shift], out=largest[:, shift:])
+        np.maximum(largest[:, :-shift], noise[:, shift:], out=largest[:, :-shift])
+    return largest

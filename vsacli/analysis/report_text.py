@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.joint_report import JointDrift, JointReport
-from vsacli.analysis.self_check import SelfCheck
+from vsacli.analysis.self_check import SHAFT_BOUND, SelfCheck
 from vsacli.base.texts import together
 from vsacli.base.units import POSITION, TORQUE, VELOCITY, time_text
 
@@ -42,7 +42,7 @@ def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
     """What was run at the left, the verdict in capitals at the right."""
     words = verdict.upper().replace("_", " ")
     if verdict in TROUBLE:
-        concerned = sum(joint.shows(verdict) for joint in joints)
+        concerned = sum(any(map(joint.shows, TROUBLE)) for joint in joints)
         words = f"{words} ({concerned} of {len(joints)} joints)"
     return f"{left:<{WIDTH - 32}} {words:>31}".rstrip()
 
@@ -224,5 +224,6 @@ def self_check_line(check: SelfCheck) -> str:
         return f"self-check passed ({check.ladder:.1g}, bound {check.ladder_bound:.0e})"
     return (
         f"SELF-CHECK FAILED: derivatives are off by {check.ladder:.1e} (bound {check.ladder_bound:.0e}), "
+        f"motors by {check.shaft_residual:.1e} (bound {SHAFT_BOUND:.0e}), "
         f"springs by {check.spring_residual:.1e} (bound {check.spring_bound:.0e}); do not use these torques"
     )

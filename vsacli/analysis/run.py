@@ -14,7 +14,7 @@ from vsacli.analysis.friction_passages import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.ladder import ladder
 from vsacli.analysis.report import Report
-from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck, SpringCheck
+from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, BalanceCheck, SelfCheck
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
@@ -103,7 +103,7 @@ class Run:
         self._passages = FrictionPassages(robot)
         self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
         self._between = Between(robot, trajectory, near_singular, self._compute, self._judged)
-        self._springs = SpringCheck(robot, trajectory.samples)
+        self._balances = BalanceCheck(robot, trajectory.samples)
         self._samples = 0
 
     def __iter__(self) -> Iterator[Block]:
@@ -146,7 +146,7 @@ class Run:
             for index in set(minima.joint.tolist()):
                 self._summaries[index].add_bounded(minima.of_joint(index))
         self._passages.add(block)
-        self._springs.add(block)
+        self._balances.add(block)
         for summary in self._summaries:
             summary.add(block)
         for drift in self._drifts:
@@ -204,7 +204,8 @@ class Run:
         """Followed deflections satisfy (14) up to their drift, the rest is held to the same bound."""
         bound = SPRING_BOUND if self._deflections is None else DRIFT_BOUND
         error, error_bound = ladder(self.robot, self.trajectory, self.choice.engine, self._internal)
-        return SelfCheck(self._springs.residual, error, bound, error_bound)
+        of_springs, of_shafts = self._balances.residuals()
+        return SelfCheck(of_springs, error, bound, error_bound, of_shafts)
 
 
 def _is_long(robot: Robot) -> bool:

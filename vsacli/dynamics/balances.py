@@ -1,4 +1,4 @@
-"""What a run keeps account of at each step: whether (14) is satisfied, and the power its motors pass on."""
+"""Balances at each step of a run: of springs (14), of the motors' shafts, and power that motors pass on."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from vsacli.compute.control_flow import call
 from vsacli.compute.vector import Scalar
 from vsacli.dynamics.dampers import motor_torques
 from vsacli.dynamics.inverse import InverseDynamics, behind_link, rows_of_joints
+from vsacli.dynamics.shaft_balances import SHAFT_VARIABLES, shaft_error
 from vsacli.robot.joint import Joint
 
 BALANCES = {
@@ -26,6 +27,7 @@ BALANCES = {
         Variable("passed_power", ("joint", "motor"), units.POWER, "power passed on", "(73)-(74)"),
         Variable("passed_rate", ("joint", "motor"), units.POWER, "its rate, W/s", "(73)-(74)"),
         Variable("spring_error", (), units.DIMENSIONLESS, "largest residual of springs, scaled", "(14)"),
+        Variable("shaft_error", (), units.DIMENSIONLESS, "largest residual of shafts, scaled", "(73)-(74)"),
         Variable("damped_error", ("damped",), units.TORQUE, "residual of springs beside a damper", "(14)"),
         Variable("damped_size", ("damped",), units.TORQUE, "size of the torques that are balanced", "(14)"),
     )
@@ -33,8 +35,8 @@ BALANCES = {
 """What is computed beside the variables of a result, and is not stored."""
 
 
-BALANCED = ("q", "dq", "theta", "phi", "tau_e", "stiffness", "damping", "tau_damper", "flags")
-"""The variables from which springs are balanced."""
+BALANCED = {*SHAFT_VARIABLES, "phi", "flags"}
+"""The variables from which springs and shafts are balanced."""
 
 
 class BalancedBlock(Block):
@@ -51,7 +53,10 @@ class BalancedDynamics(InverseDynamics):
     def shapes(self) -> dict[str, tuple[int, ...]]:
         """Of the variables it gives, at one instant, by name."""
         motors, damped = (len(self.robot.joints), SIDES), (len(damped_joints(self.robot.joints)),)
-        return {**super().shapes(), **dict(zip(BALANCES, (motors, motors, (), damped, damped), strict=True))}
+        return {
+            **super().shapes(),
+            **dict(zip(BALANCES, (motors, motors, (), (), damped, damped), strict=True)),
+        }
 
     def rows_of(self, rows: Sequence[Scalar], of_joints: Sequence[OfJoint]) -> dict[str, Iterable[Any]]:
         """The rows of each result by name, from the kernel's arguments and the variables of the joints."""
@@ -62,7 +67,7 @@ class BalancedDynamics(InverseDynamics):
         ]
         powers, rates = zip(*passed, strict=True)
         by_motor = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
-        return {**super().rows_of(rows, of_joints), **by_motor, **spring_balances(joints, of_joints)}
+        return {**super().rows_of(rows, of_joints), **by_motor, **balances(joints, of_joints)}
 
 
 def damped_joints(joints: Sequence[Joint]) -> list[int]:
@@ -70,41 +75,51 @@ def damped_joints(joints: Sequence[Joint]) -> list[int]:
     return [index for index, joint in enumerate(joints) if joint.damper_at("transmission")]
 
 
-def spring_balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str, list[FloatArray]]:
-    """The balances of (14) by the springs' laws at phi, zero at steps that are not regular, by name.
+def balances(joints: Sequence[Joint], of_joints: Sequence[OfJoint]) -> dict[str, list[FloatArray]]:
+    """The balances of (14) by the springs' laws at phi, and of the shafts, by name.
 
-    Scaled as |sum tau_k - tau_e| / sum |tau_k| and |sum sigma_k - sigma| / sigma. An elastic joint has one
+    Zero at steps that are not regular. Springs are scaled as |sum tau_k - tau_e| / sum |tau_k| and
+    |sum sigma_k - sigma| / sum |sigma_k|. An elastic joint has one
     law; a rigid one has none, and so no residual. Beside a damper the torque of the springs may be zero where
     nothing else is small, so that only a whole run says what residuals are to be measured against.
     """
-    errors, missing, sizes = [np.zeros_like(of_joints[0]["tau_e"])], [], []
+    springs, shafts, missing, sizes = [np.zeros_like(of_joints[0]["tau_e"])], [], [], []
     for joint, of_joint in zip(joints, of_joints, strict=True):
-        if not joint.actuator.sprung:
-            continue
-        of_stiffness, of_torque, size = call(of_joint["tau_e"], behind_link(_balance, joint), of_joint)
-        errors.append(of_stiffness)
-        if size is None:
-            errors.append(of_torque)
-        else:
+        found = call(of_joint["tau_e"], behind_link(_balance, joint), of_joint)
+        of_stiffness, of_torque, size, of_shafts = found
+        shafts.append(of_shafts)
+        if of_stiffness is not None:
+            springs.append(of_stiffness)
+        if size is not None:
             missing.append(of_torque)
             sizes.append(size)
-    return {"spring_error": [reduce(np.maximum, errors)], "damped_error": missing, "damped_size": sizes}
+        elif of_torque is not None:
+            springs.append(of_torque)
+    largest = {"spring_error": [reduce(np.maximum, springs)], "shaft_error": [reduce(np.maximum, shafts)]}
+    return {**largest, "damped_error": missing, "damped_size": sizes}
 
 
-def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """Errors of stiffness and of torque, both scaled; beside a damper the latter in N m, and its size."""
+def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
+    """Errors of stiffness and torque of the springs, both scaled, and of the shafts.
+
+    Beside a damper that of the torque is in N m, with its size, which is None elsewhere.
+    """
     regular = ~has(of_joint["flags"], Flag.INFEASIBLE | Flag.SINGULAR)
     tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
+    if not joint.actuator.sprung:
+        return None, None, None, shaft_error(joint, of_joint, tau_e[None], regular)
     carried = joint.actuator.carried(of_joint)
-    size = np.maximum(carried.size, np.finfo(float).tiny)
-    of_stiffness = np.abs(carried.stiffness - stiffness) / np.where(regular, stiffness, 1.0)
+    of_shafts = shaft_error(joint, of_joint, carried.tau_spring, regular)
+    of_stiffness = np.abs(carried.stiffness - stiffness) / np.where(regular, carried.stiffness_size, 1.0)
     of_stiffness = np.where(regular, of_stiffness, 0.0)
+    size = np.maximum(carried.size, np.finfo(float).tiny)
     if not joint.damper_at("transmission"):
-        return of_stiffness, np.where(regular, np.abs(carried.tau_e - tau_e) / size, 0.0), None
+        of_torque = np.where(regular, np.abs(carried.tau_e - tau_e) / size, 0.0)
+        return of_stiffness, of_torque, None, of_shafts
     residual = np.abs(carried.tau_e + of_joint["tau_damper"] - tau_e)
     residual = np.maximum(residual - _rounding_of_damper(of_joint), 0.0)
     size = np.where(regular, np.maximum(size, np.abs(tau_e)), 0.0)
-    return of_stiffness, np.where(regular, residual, 0.0), size
+    return of_stiffness, np.where(regular, residual, 0.0), size, of_shafts
 
 
 def _rounding_of_damper(of_joint: OfJoint) -> FloatArray:

@@ -22,12 +22,13 @@ from vsacli.actuators.mechanisms.potentials.level_curve import (
 )
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat
+from vsacli.compute.rounding import OfRounding
 
 CLOSE, NEWTON_STEPS = 1e-4, 4
 """Length of Newton's step to a torque and a stiffness, as a part of the ranges and for a sine of one, from
 which on so many steps leave rounding: it is squared by each."""
 
-LEAST_SINE = 1e-8
+LEAST_SINE = OfRounding(1e-8, power=0.5)
 """Sine that is zero; the stiffness then differs from that of the critical point by the square of this."""
 
 LEAST_STIFFNESS = 1e-9
@@ -36,7 +37,7 @@ LEAST_STIFFNESS = 1e-9
 MAX_STEPS = 400
 """Some 60 do; more only where the level curve winds."""
 
-RESIDUAL = 1e-10
+RESIDUAL = OfRounding(1e-10, power=0.75)
 """Largest error of a solution: of the stiffness; of the torque, as a part of its change over the ranges."""
 
 
@@ -175,10 +176,10 @@ class Branch:
 
     def _is_met(self, spot: Spot, demand: FloatArray, tau_e: FloatArray) -> BoolArray:
         met: BoolArray = (np.abs(tau_e - spot.tau_e) <= RESIDUAL * spot.steepness) & (
-            np.abs(demand - spot.stiffness) <= RESIDUAL * self.start.stiffness + RESIDUAL * demand
+            np.abs(demand - spot.stiffness) <= RESIDUAL * (self.start.stiffness + demand)
         )
         return met
 
     def _is_critical(self, spot: Spot) -> BoolArray:
-        critical: BoolArray = np.abs(spot.sine) <= 10 * LEAST_SINE
+        critical: BoolArray = np.abs(spot.sine) / 10 <= LEAST_SINE
         return critical

@@ -13,6 +13,7 @@ import numpy as np
 
 from vsacli.actuators.mechanisms.potentials.potential_energy import ROWS, PotentialEnergy
 from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.rounding import OfRounding
 
 # With the bounds below no step left its branch on any of 4,000 level curves of 100 random potentials, of the
 # kind that tests/actuators/test_potential_mechanism.py draws.
@@ -20,7 +21,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 MAX_STEP = 0.1
 """Longest step, as a part of the ranges."""
 
-LEAST_STEP = 1e-13
+LEAST_STEP = OfRounding(1e-13, power=0.9)
 """Length at which a step is none."""
 
 LEAST_COSINE = 0.95
@@ -37,7 +38,7 @@ MOST_UNEXPLAINED = 0.1
 """Part of the change of stiffness that its slopes at both ends of a step need not explain; where the slope
 changes its sign twice in between, they explain little."""
 
-LEVEL_ERROR = 1e-5
+LEVEL_ERROR = OfRounding(1e-5, power=0.25)
 """Distance from the level curve, as a part of the ranges, that the next step makes up for."""
 
 CONTRACTION = 0.1

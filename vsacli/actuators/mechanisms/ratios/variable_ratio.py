@@ -42,11 +42,13 @@ class _Limit(NamedTuple):
         phi: the last deflection, infinite if there is none.
         torque: g there.
         critical: whether the stiffness turns around there, and A is singular; else the law ends.
+        stiffness: g' there, exactly zero at the maximum of a sine, where rounding may give it any sign.
     """
 
     phi: float
     torque: float
     critical: bool
+    stiffness: float
 
 
 class _End(NamedTuple):
@@ -159,9 +161,10 @@ class VariableRatio(Mechanism):
         inside = np.minimum(np.maximum(torque, below.torque), above.torque)
         phi = np.where(under, below.phi, np.where(over, above.phi, self.torque.deflection(inside)))
         state = self.torque.state(phi)
+        sigma = np.where(under, below.stiffness, np.where(over, above.stiffness, state.sigma))
         factor = np.where(under | over, tau_e / state.tau, scale)
         critical = (under & below.critical) | (over & above.critical)
-        return _End(phi, factor * state.sigma, under | over, critical)
+        return _End(phi, factor * sigma, under | over, critical)
 
     @cached_property
     def _limits(self) -> tuple[_Limit, _Limit]:
@@ -182,7 +185,10 @@ def _limit(law: SpringLaw | Sine, end: float, torque: float) -> _Limit:
     with np.errstate(all="ignore"):  # laws that grow beyond all numbers
         turned = np.flatnonzero(falling(phi) < 0)
     if not turned.size:
-        return _Limit(end, torque, critical=False)
+        with np.errstate(all="ignore"):
+            stiffness = 0.0 if isinstance(law, Sine) else float(law.state(np.array([end])).sigma[0])
+        return _Limit(end, torque, critical=False, stiffness=stiffness)
     first = max(int(turned[0]), 1)
     turn = bracketed_root(falling, phi[first - 1 : first], phi[first : first + 1])
-    return _Limit(float(turn[0]), float(law.state(turn).tau[0]), critical=True)
+    state = law.state(turn)
+    return _Limit(float(turn[0]), float(state.tau[0]), critical=True, stiffness=float(state.sigma[0]))

@@ -1,0 +1,337 @@
+"""Formulas of inverse dynamics with one term off by 1 %, or of the wrong sign, and motions that need it."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+import textwrap
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from samples.robots import random_robot
+from samples.shipped import shipped_run
+from vsacli import Trajectory
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.damper import Damper
+from vsacli.actuators.elastic import Elastic
+from vsacli.actuators.friction import Friction
+from vsacli.actuators.laws.cubic import Cubic
+from vsacli.actuators.mechanisms.ratios.awas import Awas
+from vsacli.actuators.motor import Motor
+from vsacli.actuators.rigid import Rigid
+from vsacli.actuators.serial import Serial
+from vsacli.robot.model import Robot
+
+Run = tuple[Robot, Trajectory]
+
+
+class Mutation(NamedTuple):
+    """A change of one term.
+
+    Attributes:
+        term: as the theory names it.
+        run: name in `RUNS` of the motion in which it counts.
+        home: module and function, `vsacli.` left out.
+        old: the term in the source.
+        new: what takes its place.
+    """
+
+    term: str
+    run: str
+    home: str
+    old: str
+    new: str
+
+    def apply(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Put the function with the changed term in place of the right one, wherever that was imported."""
+        module_name, _, path = self.home.partition(":")
+        module = import_module(f"vsacli.{module_name}")
+        *owners, name = path.split(".")
+        owner: Any = vars(module)[owners[0]] if owners else module
+        original = vars(owner)[name]
+        function: Any = original.fget if isinstance(original, property) else original
+        source = textwrap.dedent(inspect.getsource(function))
+        assert source.count(self.old) == 1, f"{self.home} has {source.count(self.old)} times {self.old!r}"
+        space = dict(vars(module))
+        exec("from __future__ import annotations\n" + source.replace(self.old, self.new), space)
+        users = [owner] if owners else _users_of(name, original)
+        for user in users:
+            monkeypatch.setattr(user, name, space[name])
+
+
+def _users_of(name: str, function: Any) -> list[Any]:
+    """The modules that have a function under its name."""
+    modules = [module for key, module in sys.modules.items() if key.startswith("vsacli")]
+    return [module for module in modules if vars(module).get(name) is function]
+
+
+BETA, SOLVE = "actuators.pairs.decoupling_matrix:beta", "actuators.pairs.decoupling_matrix:solve"
+DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:motor_torques"
+FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.windings:Windings.variables"
+RATIO, STATE = (
+    "actuators.mechanisms.ratios.ratio:ratio_partials",
+    "actuators.mechanisms.state:DeflectionState",
+)
+CUBIC, LOSS = "actuators.laws.cubic:Cubic", "dynamics.losses:dissipated_power"
+DAMPER, ELASTIC = "dynamics.drive:_damper_torques", "actuators.elastic:Elastic"
+MOVED = "actuators.antagonistic:Antagonistic._moved"
+
+MUTATIONS = (
+    Mutation("tau_k (62)", "pair", f"{CUBIC}.torque", "return phi", "return 1.01 * phi"),
+    Mutation("tau_k (62), by the motor alone", "pair", MOVED, "(one.tau,", "(1.01 * one.tau,"),
+    Mutation("sigma_k (63)", "pair", f"{CUBIC}.stiffness", "3 * self", "3.03 * self"),
+    Mutation("zeta_k (64)", "pair", f"{CUBIC}.slope", "6 *", "6.06 *"),
+    Mutation("eta_k (66)", "pair", f"{CUBIC}.curvature", "6 *", "6.06 *"),
+    Mutation("energy of a spring", "pair", f"{CUBIC}.energy", "self.k / 2", "1.01 * self.k / 2"),
+    Mutation(
+        "det A (67), its first product",
+        "pair",
+        "actuators.pairs.decoupling_matrix:determinant",
+        "one.sigma * two",
+        "1.01 * one.sigma * two",
+    ),
+    *(
+        Mutation(f"A^-1 (68), (72), {place}", "pair", SOLVE, old, f"1.01 * {old}")
+        for place, old in {
+            "zeta_2 in row 1": "two.zeta * torque_row",
+            "sigma_2 in row 1": "two.sigma * stiffness_row",
+            "sigma_1 in row 2": "one.sigma * stiffness_row",
+            "zeta_1 in row 2": "one.zeta * torque_row",
+        }.items()
+    ),
+    Mutation(
+        "phi_k + q (69)",
+        "pair",
+        "actuators.actuator:Actuator.motor_positions",
+        "phi + q",
+        "phi + 1.01 * q",
+    ),
+    *(
+        Mutation(f"{term} in beta ({70 + row})", "pair", BETA, old, new)
+        for row, term, old, new in (
+            (0, "tau_e''", "ddtau_e - (", "1.01 * ddtau_e - ("),
+            (0, "zeta_1 phi_1'^2", "(one.zeta * squared_1", "(1.01 * one.zeta * squared_1"),
+            (0, "zeta_2 phi_2'^2", "two.zeta * squared_2", "1.01 * two.zeta * squared_2"),
+            (0, "sigma q''", "(one.sigma + two.sigma) * ddq", "1.01 * (one.sigma + two.sigma) * ddq"),
+            (1, "sigma''", "ddstiffness - (", "1.01 * ddstiffness - ("),
+            (1, "eta_1 phi_1'^2", "(one.eta * squared_1", "(1.01 * one.eta * squared_1"),
+            (1, "eta_2 phi_2'^2", "two.eta * squared_2", "1.01 * two.eta * squared_2"),
+            (1, "zeta q''", "(one.zeta + two.zeta) * ddq", "1.01 * (one.zeta + two.zeta) * ddq"),
+        )
+    ),
+    Mutation(
+        "B_k theta_k'' (73)-(74)",
+        "pair",
+        "dynamics.drive:_rotor_torques",
+        "for motor in actuator.motors]) * ddtheta",
+        "for motor in actuator.motors]) * (1.01 * ddtheta)",
+    ),
+    Mutation("D_m,k theta_k' (73)-(74)", "pair", TORQUES, "damping * dtheta", "1.01 * damping * dtheta"),
+    Mutation("tau_k (73)-(74)", "pair", TORQUES, "+ tau_spring", "+ 1.01 * tau_spring"),
+    Mutation(
+        "B_12 theta_k''", "serial", "dynamics.drive:_rotor_torques", "own + coupling", "own + 1.01 * coupling"
+    ),
+    Mutation("B_12 theta_k'', sign", "serial", "dynamics.drive:_rotor_torques", "own + coup", "own - coup"),
+    Mutation(
+        "spring between the motors",
+        "pair",
+        "actuators.antagonistic:_between",
+        "coupling.t",
+        "1.01 * coupling.t",
+    ),
+    Mutation("motor friction", "pair", TORQUES, "+ friction.with", "+ 1.01 * friction.with"),
+    Mutation("motor friction, sign", "pair", TORQUES, "+ friction.with", "- friction.with"),
+    Mutation("law of friction, Coulomb", "pair", f"{FRICTION}.torque", "return self", "return 1.01 * self"),
+    Mutation("law of friction, offset", "pair", f"{FRICTION}.torque", "self.offset", "1.01 * self.offset"),
+    Mutation(
+        "law of friction, width", "pair", f"{FRICTION}.torque", "np.tanh(velocity", "np.tanh(1.01 * velocity"
+    ),
+    Mutation(
+        "law of friction, direction",
+        "pair",
+        f"{FRICTION}._size",
+        "self.backward, self.forward",
+        "self.forward, self.backward",
+    ),
+    Mutation("current", "pair", WINDINGS, "torque / self", "1.01 * torque / self"),
+    Mutation(
+        "voltage, R i", "pair", WINDINGS, "self.resistance * current +", "1.01 * self.resistance * current +"
+    ),
+    Mutation("voltage, of the velocity", "pair", WINDINGS, "* velocity", "* (1.01 * velocity)"),
+    Mutation("copper loss", "pair", WINDINGS, "current * current", "current * (1.01 * current)"),
+    Mutation("motor power", "pair", DRIVE, "tau_motor * dtheta", "1.01 * tau_motor * dtheta"),
+    Mutation("dissipated power, joint", "pair", LOSS, "_taken(joint.damping", "_taken(1.01 * joint.damping"),
+    Mutation("dissipated power, motors", "pair", LOSS, "_taken(motor.damping", "_taken(1.01 * motor.damping"),
+    Mutation(
+        "friction between links",
+        "pair",
+        "dynamics.joint_friction:joint_friction",
+        "tau=mul(size, tanh)",
+        "tau=mul(size, tanh * 1.01)",
+    ),
+    Mutation(
+        "damper between links",
+        "pair",
+        "dynamics.dampers:damper_torque",
+        "tau=mul(d, v)",
+        "tau=mul(d, v * 1.01)",
+    ),
+    Mutation(
+        "tau_damper between links", "pair", DAMPER, "damping * command.dq", "1.01 * damping * command.dq"
+    ),
+    Mutation("damper beside springs", "damped", DAMPER, "[damping * rate if", "[1.01 * damping * rate if"),
+    Mutation(
+        "damper beside springs, velocity",
+        "damped",
+        "actuators.damped_springs:DampedSprings.driven",
+        "command.tau_e - springs",
+        "1.01 * command.tau_e - springs",
+    ),
+    Mutation("T of a mechanism", "serial", RATIO, "T=value", "T=1.01 * value"),
+    Mutation("U_s of a mechanism", "serial", RATIO, "setting_torque=slope", "setting_torque=1.01 * slope"),
+    Mutation("T_p of a mechanism", "serial", RATIO, "T_p=value", "T_p=1.01 * value"),
+    Mutation("T_s of a mechanism", "serial", RATIO, "T_s=slope", "T_s=1.01 * slope"),
+    *(
+        Mutation(f"{name} of a mechanism", "serial", RATIO, f"{name}=", f"{name}=1.01 * ")
+        for name in ("T_pp", "T_ps", "T_ss", "T_ppp", "T_pps", "T_pss")
+    ),
+    Mutation("energy of a mechanism", "serial", RATIO, "energy=value", "energy=1.01 * value"),
+    Mutation(
+        "torque against motor 2",
+        "serial",
+        f"{STATE}.tau_spring",
+        "self._partials.setting",
+        "1.01 * self._partials.setting",
+    ),
+    Mutation(
+        "theta_1'' = phi'' + q''",
+        "serial",
+        f"{STATE}.motor_accelerations",
+        "ddphi + ddq",
+        "ddphi + 1.01 * ddq",
+    ),
+    Mutation("phi'', one motor", "spring", f"{ELASTIC}._nonlinear", "ddq + ddphi", "ddq + 1.01 * ddphi"),
+    Mutation(
+        "zeta phi'^2, one motor", "spring", f"{ELASTIC}._nonlinear", "- spring.zeta", "- 1.01 * spring.zeta"
+    ),
+    Mutation(
+        "sigma phi' = tau_e', one motor",
+        "spring",
+        f"{ELASTIC}._nonlinear",
+        "dphi = command",
+        "dphi = 1.01 * command",
+    ),
+    Mutation(
+        "tau_e''/K, linear spring",
+        "spring",
+        f"{ELASTIC}._linear",
+        "command.ddtau_e /",
+        "1.01 * command.ddtau_e /",
+    ),
+    Mutation(
+        "tau_e, linear spring",
+        "spring",
+        f"{ELASTIC}._linear",
+        "tau_spring=command",
+        "tau_spring=1.01 * command",
+    ),
+    Mutation(
+        "tau_e, rigid",
+        "spring",
+        "actuators.rigid:Rigid.transmit",
+        "tau_spring=command",
+        "tau_spring=1.01 * command",
+    ),
+    Mutation(
+        "q'', rigid",
+        "spring",
+        "actuators.rigid:Rigid.transmit",
+        "ddtheta=command.ddq",
+        "ddtheta=1.01 * command.ddq",
+    ),
+)
+
+
+def _motor(inertia: float, **further: Any) -> Motor:
+    return Motor(inertia=inertia, damping=0.4, **further)
+
+
+def _pair(coupled: bool) -> Antagonistic:
+    friction = Friction(coulomb=(0.8, 1.2), offset=0.3, width=0.05)
+    sharp = Friction(coulomb=(0.6, 1.1))
+    electrical = {"torque_constant": 0.05, "resistance": 0.4, "gear_ratio": 50.0}
+    geared = {"coulomb": (0.02, 0.03), "offset": 0.005, "width": 2.0}
+    motors = (
+        Motor(inertia=2e-4, damping=1e-4, friction=Friction(**geared), **electrical),  # type: ignore[arg-type]
+        _motor(0.6, friction=sharp if coupled else friction),
+    )
+    springs = (Cubic(k=400, k_c=2000), Cubic(k=500, k_c=2500))
+    return Antagonistic(motor=motors, spring=springs, coupling=Cubic(k=60, k_c=200) if coupled else None)
+
+
+def _motion(robot: Robot, stiffness: tuple[float, float]) -> Trajectory:
+    """A second of sines, fast enough that every term counts."""
+    time = np.arange(501) / 500
+    phase = np.arange(len(robot.joints))
+    q = 0.4 * np.sin(5 * time[:, None] + phase)
+    low, high = stiffness
+    varied = low + (high - low) * (1 + np.sin(4 * time[:, None] + phase)) / 2
+    return Trajectory.from_samples(time, q, varied, fit="interpolate")
+
+
+def _pairs() -> Run:
+    robot = random_robot("RP", 3)
+    first, second = robot.joints
+    joints = (
+        replace(
+            first,
+            actuator=_pair(coupled=False),
+            friction=Friction(coulomb=(0.7, 0.7), width=0.1),
+        ),
+        replace(second, actuator=_pair(coupled=True), damper=Damper(location="link", range=(2.0, 2.0))),
+    )
+    robot = replace(robot, joints=joints, gravity=(0.0, -2.0, 1.0))
+    return robot, _motion(robot, (3000.0, 4000.0))
+
+
+def _serial() -> Run:
+    motors = _motor(0.3), _motor(0.02)
+    robot = random_robot("R", 4)
+    awas = Awas(k=50000, arm=(0.02, 0.12), lead=0.01)
+    actuator = Serial(motor=motors, coupled_inertia=0.03, mechanism=awas)
+    robot = replace(robot, joints=(replace(robot.joints[0], actuator=actuator),), gravity=(0.0, -2.0, 1.0))
+    return robot, _motion(robot, (400.0, 800.0))
+
+
+def _springs() -> Run:
+    robot = random_robot("RRR", 5)
+    actuators = (
+        Elastic(motor=_motor(0.5), spring=Cubic(k=400, k_c=20000)),
+        Elastic(motor=_motor(0.5), stiffness=900.0),
+        Rigid(motor=_motor(0.5)),
+    )
+    joints = (replace(joint, actuator=each) for joint, each in zip(robot.joints, actuators, strict=True))
+    robot = replace(robot, joints=tuple(joints), gravity=(0.0, -2.0, 1.0))
+    time = np.arange(501) / 500
+    q = 0.4 * np.sin(5 * time[:, None] + np.arange(3))
+    return robot, Trajectory.from_samples(time, q, fit="interpolate")
+
+
+_RUNS: dict[str, Callable[[], Run]] = {
+    "pair": _pairs,
+    "serial": _serial,
+    "spring": _springs,
+    "damped": lambda: shipped_run("compact_1r", "compact_1r"),
+}
+
+
+@cache
+def mutated_run(name: str) -> Run:
+    """Robot and trajectory by the name that a mutation has for them."""
+    return _RUNS[name]()
