@@ -43,7 +43,8 @@ def test_a_record_that_determines_the_torques(vsacli, tmp_path, noisy):
         assert file["tau_motor_std"].attrs["long_name"].startswith("standard deviation of the motor torque")
         assert "stiffness_std" not in file
         deviations = file["tau_motor_std"][:]
-    assert sorted(path.name for path in (tmp_path / "figures").iterdir())[-1] == "r-motor-torque.png"
+    figures = sorted(path.name for path in (tmp_path / "figures").iterdir())
+    assert figures[-2:] == ["r-motor-torque.png", "r-recording.png"]
     header, first, *_ = vsacli("export", "r.h5", "--variables", "tau_motor_std").out.splitlines()
     assert header.startswith("time,base.tau_motor_std_1,base.tau_motor_std_2,shoulder.")
     assert [float(cell) for cell in first.split(",")[1:]] == deviations[0].ravel().tolist()

@@ -6,6 +6,7 @@ import os
 import re
 import resource
 import subprocess
+import sys
 
 import click
 import pytest
@@ -175,15 +176,55 @@ def test_head_of_a_table(printing):
     assert done.stdout.count("\n") == 1
 
 
-def test_result_is_computed_without_a_standard_output(tmp_path, motion):
+CLOSED = "standard output: cannot be written: it is closed\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        slow("export result.h5"),
+        "info result.h5",
+        "info result.h5 --json",
+        slow("info result.h5 --field verdict"),
+        slow("validate result.h5"),
+        slow(f"check-feasibility {ROBOT} move.yaml"),
+        slow("new robot --joints R"),
+        slow("schema robot"),
+        slow("examples"),
+        slow("--help"),
+        slow("--version"),
+        slow("plot --help"),
+    ],
+)
+def test_what_a_closed_standard_output_loses_is_told(printing, arguments):
+    done = shell(f"{COMMAND} {arguments} >&-", printing)
+    assert (done.returncode, done.stderr) == (4, CLOSED)
+
+
+@pytest.mark.parametrize("arguments", ["export result.h5 -o t.csv -q", slow("plot result.h5 -q -o .")])
+def test_a_command_that_prints_nothing_needs_no_standard_output(printing, arguments):
+    done = shell(f"{COMMAND} {arguments} >&-", printing)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_result_is_whole_although_its_report_is_lost(tmp_path, motion):
     done = shell(f"{COMMAND} invdyn {ROBOT} {motion} -o r.h5 >&-", tmp_path)
-    assert (done.returncode, done.stderr) == (0, "wrote r.h5\n")
+    assert (done.returncode, done.stderr) == (4, CLOSED)
+    assert shell(f"{COMMAND} validate r.h5", tmp_path).returncode == 0
 
 
-def test_table_needs_a_standard_output(tmp_path, feasible_result):
-    done = shell(f"{COMMAND} export {feasible_result} >&-", tmp_path)
-    assert done.returncode == 4
-    assert done.stderr == "standard output: is closed; name a file with -o\n"
+def test_what_a_library_prints_never_goes_into_a_file(tmp_path):
+    """A file would get the number of the standard output that was closed."""
+    code = (
+        "import os, sys; sys.argv = ['vsacli', 'new', 'robot', '--joints', 'R', '-o', 'arm.yaml']\n"
+        "from vsacli.base import outputs\n"
+        "def sync(path, mode):\n"
+        "    with open(path, 'rb') as file: assert file.fileno() > 2, file.fileno()\n"
+        "outputs._sync = sync\n"
+        "from vsacli.cli.main import main; main()"
+    )
+    done = shell(f'{sys.executable} -c "{code}" <&- >&-', tmp_path)
+    assert (done.returncode, done.stderr) == (0, "wrote arm.yaml\n")
 
 
 @pytest.mark.parametrize(
@@ -209,9 +250,39 @@ def test_name_with_letters_that_the_terminal_has_not(tmp_path, motion):
     assert done.stdout.startswith("\\u03c6-arm, rest-to-rest: 401 steps")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            "plot r.h5 -o fig.pdf",
+            "'fig.pdf' is the name of a file; name a folder, and the format by --format pdf",
+        ),
+        ("plot r.h5 -o fig.csv", "'fig.csv' is the name of a file; name a folder"),
+        ("invdyn a b --plot fig.png", "'fig.png' is the name of a file; name a folder"),
+        ("codegen a -o arm.c", "'arm.c' is the name of a file; name a folder"),
+        ("info r.h5 --extract arm.yaml", "'arm.yaml' is the name of a file; name a folder"),
+        ("examples --copy arm.yaml", "'arm.yaml' is the name of a file; name a folder"),
+        ("invdyn a b -o r.mat", "'r.mat': the file is HDF5; name it .h5"),
+        ("study s -o s.yaml", "'s.yaml': the file is HDF5; name it .h5"),
+        ("new robot --joints R -o arm.urdf", "'arm.urdf': the file is YAML; name it .yaml"),
+        ("optimize a b -o best.h5", "'best.h5': the file is YAML; name it .yaml"),
+    ],
+)
+def test_a_name_that_promises_something_else_is_refused(vsacli, tmp_path, arguments, message):
+    done = vsacli(*arguments.split())
+    assert (done.code, done.out, list(tmp_path.iterdir())) == (2, "", [])
+    assert re.search(rf"{re.escape(message)}$", done.err, re.MULTILINE)
+
+
+def test_a_folder_that_is_called_as_files_are_may_be_used(vsacli, tmp_path):
+    (tmp_path / "v1.c").mkdir()
+    assert vsacli("codegen", ROBOT, "-o", "v1.c", "-q").code == 0
+    assert (tmp_path / "v1.c").is_dir()
+
+
 @pytest.mark.parametrize("command", ["invdyn", "simulate"])
 def test_a_csv_name_for_an_hdf5_file_is_refused(vsacli, tmp_path, command):
     done = vsacli(command, ROBOT, REST_TO_REST, "-o", "torques.csv")
     assert done.code == Exit.USAGE
-    assert "'torques.csv': the file is HDF5; `vsacli export` makes CSV of it" in done.err
+    assert "'torques.csv': the file is HDF5; name it .h5; `vsacli export` makes CSV of it" in done.err
     assert not list(tmp_path.iterdir())

@@ -142,7 +142,7 @@ def test_overwrite_replaces_result_and_figures(vsacli, tmp_path, motion):
 
 
 @pytest.mark.usefixtures("no_computing")
-@pytest.mark.parametrize("output", ["move.yaml", "link.h5"])
+@pytest.mark.parametrize("output", ["link.h5"])
 def test_an_input_is_not_replaced_even_with_overwrite(vsacli, tmp_path, motion, output):
     (tmp_path / "link.h5").symlink_to(motion)
     before = motion.read_bytes()

@@ -13,10 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.codegen import clear, commands, expected_of, motion_of, with_springs
+from samples.command_line import REPOSITORY
 from samples.generated_code import STRICT, compile_c, compiled_robot, write_files
 from samples.marks import COMPILERS, needs, needs_compiler, slow, slow_but
+from samples.mechanisms import DEVICES
 from samples.robots import random_robot
-from samples.shipped import shipped_robot
+from samples.shipped import shipped_robot, shipped_run
 from samples.springs import SPRINGS
 
 from vsacli.base.errors import InputError
@@ -36,6 +38,11 @@ ROBOTS: dict[str, Robot] = {
     "mixed": shipped_robot("mixed_3r"),
     **{law: with_springs(law) for law in SPRINGS},
 }
+
+BUNDLED = sorted(
+    str(path.relative_to(REPOSITORY / "robots").with_suffix(""))
+    for path in (REPOSITORY / "robots").rglob("*.yaml")
+)
 
 SANITIZED = ("one joint", "prismatic", "mixed", "sinh", "table")
 
@@ -83,6 +90,51 @@ def test_no_undefined_behaviour(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["3R", *map(slow, ("mixed", "sinh", "table", "four_bar"))])
 def test_single_precision_compiles_without_a_warning_and_passes(name: str, tmp_path: Path) -> None:
     assert self_test(name, tmp_path, compiler=COMPILERS[-1], precision="float") == "all values agree\n"
+
+
+@needs_compiler
+@pytest.mark.parametrize("path", slow_but(["sliding_anchor_1r"], BUNDLED))
+@pytest.mark.parametrize("precision", slow_but(["float"], ["double", "float"]))
+def test_every_bundled_robot_passes_its_own_test_in_both_precisions(
+    path: str, precision: str, tmp_path: Path
+) -> None:
+    robot = shipped_robot(path)
+    write_files(generate(robot, precision), tmp_path)
+    sources = [f"{prefix_of(robot)}{ending}.c" for ending in ("", "_test")]
+    compile_c(tmp_path, *STRICT, *sources, "-o", "self_test", "-lm")
+    done = subprocess.run(["./self_test"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("all values agree\n", "")
+
+
+@needs_compiler
+def test_a_sine_passes_in_single_precision_at_its_largest_torque(tmp_path: Path) -> None:
+    """Its stiffness there is zero, and not what rounding makes of the cosine of pi/2."""
+    arm = shipped_robot("awas_1r")
+    joint = replace(arm.joints[0], actuator=DEVICES["variable_ratio, sine"].actuator)
+    robot = replace(
+        arm, gravity=(0.0, -1000.0, 0.0), joints=(joint,)
+    )  # which it does not carry at all settings
+    write_files(generate(robot, "float"), tmp_path)
+    compile_c(tmp_path, *STRICT, "awas_1r.c", "awas_1r_test.c", "-o", "self_test", "-lm")
+    done = subprocess.run(["./self_test"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout == "all values agree\n"
+
+
+@needs_compiler
+def test_a_potential_in_single_precision_is_feasible_along_its_trajectory(tmp_path: Path) -> None:
+    """Tolerances of the continuation lay below single precision: 908 of 1001 samples were infeasible."""
+    robot, trajectory = shipped_run("sliding_anchor_1r", "sliding_anchor_1r")
+    motion = trajectory.at(np.linspace(0, trajectory.duration, 101))
+    expected = compute_block(robot, motion)
+    function = inverse_dynamics_function(robot)
+    command = {
+        name: motion.variables()[name] for _, given in function.arguments for name in given.layout.shapes
+    }
+    found, returned = compiled_robot(tmp_path / "c", robot, [function], "float")(function, command)
+    assert not np.any(returned)
+    # 2e-3 of the peak, as the self-test has it; 2e-4 is seen.
+    error = np.abs(found["tau_motor"] - expected.tau_motor).max()
+    assert error <= 2e-3 * np.abs(expected.tau_motor).max()
 
 
 @needs_compiler

@@ -40,13 +40,6 @@ def words_of(example: str) -> Callable[..., tuple[str, ...] | None]:
     return words
 
 
-def hdf5_name(_context: click.Context, _parameter: click.Parameter, name: str | None) -> str | None:
-    """A callback for the name of an HDF5 file to write: not one that promises CSV."""
-    if name is not None and name.lower().endswith(".csv"):
-        raise click.BadParameter(f"{name!r}: the file is HDF5; `vsacli export` makes CSV of it")
-    return name
-
-
 def variables_option(default: str) -> Callable[[Any], Any]:
     """`--variables`, of a command that otherwise takes those that `default` says."""
     return click.option(

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import click
 
 from vsacli.cli.command_parts import (
+    Inputs,
     compute,
     deflections_option,
     engine_options,
     example,
-    hdf5_name,
     json_option,
     load_inputs,
     overwrite_option,
@@ -27,13 +27,13 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Talk, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.file_names import FOLDER, HDF5_FILE
 from vsacli.cli.plot import draw_staged
+from vsacli.cli.plot_recording import RECORDING, recording_figure
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
     from vsacli.results.plots import FigureFiles
-    from vsacli.robot.model import Robot
 
 
 @click.command(
@@ -45,10 +45,16 @@ if TYPE_CHECKING:
 @trajectory_argument
 @set_option
 @click.option(
+    "--rate",
+    metavar="HZ",
+    type=float,
+    help="Samples per second, as --set rate=HZ: of TRAJECTORY, or of a recording without times, at which it "
+    "was made.",
+)
+@click.option(
     "-o",
     "--output",
-    type=FILE,
-    callback=hdf5_name,
+    type=HDF5_FILE,
     help="Result file; by default ROBOT-TRAJECTORY.h5 in this folder.",
 )
 @variables_option("all")
@@ -73,6 +79,7 @@ def invdyn(
     robot: str,
     trajectory: str,
     changes: tuple[str, ...],
+    rate: float | None,
     output: str | None,
     variables: tuple[str, ...] | None,
     precision: str,
@@ -91,6 +98,8 @@ def invdyn(
     singular or over a limit, and by how much.
     """
     path = Path(f"{run_stem(robot, trajectory)}.h5" if output is None else output)
+    if rate is not None:
+        changes = (*changes, f"rate={rate!r}")
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.analysis.joint_report import JUDGED
     from vsacli.analysis.run import Run
@@ -100,9 +109,7 @@ def invdyn(
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
         figures = (
-            None
-            if plot_folder is None
-            else _figures(inputs.robot, plot_folder, path.stem, variables, outputs)
+            None if plot_folder is None else _figures(inputs, plot_folder, path.stem, variables, outputs)
         )
         run = Run(
             *inputs,
@@ -118,17 +125,22 @@ def invdyn(
         report = compute(run, talk, writer)
         if figures is not None:
             draw_staged(file, figures, talk)
+            if inputs.trajectory.estimates:
+                figures.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
     code = show_report(report, as_json)
     talk.wrote(outputs)
     return code
 
 
 def _figures(
-    robot: Robot, folder: str, stem: str, variables: tuple[str, ...] | None, outputs: Outputs
+    inputs: Inputs, folder: str, stem: str, variables: tuple[str, ...] | None, outputs: Outputs
 ) -> FigureFiles:
-    """Those that the variables which are stored allow."""
+    """Stage those that the variables which are stored allow, and that of a recording."""
     from vsacli.base.variables import VARIABLES
     from vsacli.results.plots import FigureFiles, drawable_figures, result_drawings
 
-    drawn = drawable_figures(result_drawings(robot.has), VARIABLES if variables is None else variables)
+    stored = VARIABLES if variables is None else variables
+    drawn = drawable_figures(result_drawings(inputs.robot.has), stored)
+    if inputs.trajectory.estimates:
+        drawn.append(RECORDING)
     return FigureFiles(drawn, folder, stem, "png", outputs)

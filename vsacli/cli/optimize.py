@@ -20,7 +20,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.file_names import FOLDER, YAML_FILE
 
 if TYPE_CHECKING:
     from vsacli.analysis.result import Result
@@ -76,7 +76,7 @@ def _share(_context: click.Context, _parameter: click.Parameter, text: str | Non
 @click.option(
     "-o",
     "--output",
-    type=FILE,
+    type=YAML_FILE,
     help="Write the best trajectory, with a CSV beside it for what is no formula.",
 )
 @click.option(

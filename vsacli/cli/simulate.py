@@ -17,7 +17,6 @@ from vsacli.cli.command_parts import (
     Inputs,
     engine_option,
     example,
-    hdf5_name,
     json_option,
     load_inputs,
     numbers,
@@ -28,7 +27,7 @@ from vsacli.cli.command_parts import (
     trajectory_argument,
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
-from vsacli.cli.file_names import FILE, FOLDER
+from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
 from vsacli.cli.plot import draw_staged
 
 if TYPE_CHECKING:
@@ -128,8 +127,7 @@ FEEDBACK = "feedback-linearization"
 @click.option(
     "-o",
     "--output",
-    type=FILE,
-    callback=hdf5_name,
+    type=HDF5_FILE,
     help="Result; by default ROBOT-TRAJECTORY-simulation.h5 in this folder.",
 )
 @click.option(

@@ -84,11 +84,11 @@ class Cache:
             raise CacheError(f"the cache folder {self.folder} cannot be written: {error.strerror}") from None
 
     def entries(self) -> list[Entry]:
-        """All libraries, that which was not used for the longest time first."""
+        """All libraries, that which was not used for the longest time first; not other folders."""
         found = []
         for path in self.folder.iterdir():
             with suppress(FileNotFoundError):  # removed meanwhile
-                if is_folder(path) and owner_of(path.name) is None:
+                if is_folder(path) and owner_of(path.name) is None and _holds_a_library(path):
                     found.append(Entry(path.stat().st_mtime, size_of(path), path.name))
         return sorted(found)
 
@@ -166,6 +166,10 @@ def _cache_folder() -> Path:
 def key_of(*parts: str) -> str:
     """What a library is stored under: a digest of all that it depends on."""
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+def _holds_a_library(folder: Path) -> bool:
+    return {path.name for path in folder.iterdir()} <= {LIBRARY, CHECKSUM}
 
 
 def _checksum(path: Path) -> str:
