@@ -36,7 +36,9 @@ def noisy(tmp_path):
 def test_a_record_that_determines_the_torques(vsacli, tmp_path, noisy):
     done = vsacli("invdyn", ROBOT, noisy("lsq"), "-o", "r.h5", "--plot", "figures")
     assert done.code == 0
-    assert any(line.startswith("motor torque: base +- 0.0") for line in done.out.splitlines())
+    assert any(
+        line.startswith("motor torque, random noise only: base +- 0.0") for line in done.out.splitlines()
+    )
     with h5py.File(tmp_path / "r.h5") as file:
         assert file["tau_motor_std"].shape == (401, 3, 2)
         assert file["d4q_std"].attrs["units"] == "rad/s^4"

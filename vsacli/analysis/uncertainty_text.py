@@ -20,7 +20,9 @@ def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
         yield from (f"{joint.name}: {sentence}" for sentence in _sentences(joint, uncertainty))
     torques = [(joint.name, each.variables[JUDGED]) for joint, each in found if JUDGED in each.variables]
     if torques:
-        yield by_joint("motor torque: ", [_spread(name, spread) for name, spread in torques])
+        yield by_joint(
+            "motor torque, random noise only: ", [_spread(name, spread) for name, spread in torques]
+        )
 
 
 def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[str]:

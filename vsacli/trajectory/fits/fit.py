@@ -13,6 +13,7 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.trajectory.fits.covariance import local_basis, of_derivatives, of_least_squares
 from vsacli.trajectory.fits.information import Posterior
 from vsacli.trajectory.fits.smoothing import Smoothing
+from vsacli.trajectory.fits.spectrum import FollowedNoise
 from vsacli.trajectory.times import stretch
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ class Part:
         exact: whether it goes through the samples, rather than near them.
         smoothing: what is known of it if it is a smoothing spline, or was compared with one.
         smooth: whether it is a smoothing spline.
+        noise: that it follows, since a filter made it smooth; the deviation in `smoothing` counts it.
     """
 
     members: IndexArray
@@ -42,6 +44,7 @@ class Part:
     exact: bool
     smoothing: Smoothing | None = None
     smooth: bool = False
+    noise: FollowedNoise | None = None
 
     @property
     def knots(self) -> FloatArray:
@@ -105,7 +108,10 @@ class Part:
 
         knots = stretch(self.spline.t, self.knots[0], factor)
         known = None if self.smoothing is None else self.smoothing.stretched(factor)
-        return replace(self, spline=BSpline(knots, self.spline.c, self.spline.k), smoothing=known)
+        noise = None if self.noise is None else self.noise.stretched(factor)
+        return replace(
+            self, spline=BSpline(knots, self.spline.c, self.spline.k), smoothing=known, noise=noise
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,13 +208,14 @@ class Fit:
             start, end = part.knots[[0, -1]]
             return known.units_at((time - start) / (end - start))[None]
         units = self.noise[part.members]
-        if known is not None:
+        # relative to the derivative without this error, which the size of this spline's includes
+        share = 0.0 if known is None else known.relative / np.hypot(1.0, known.relative)
+        share = max(share, 0.0 if part.noise is None else part.noise.share)
+        if share > 0:
             order, probes = ORDERS[self.degree] - 1, np.linspace(*part.inside, PROBES)
             basis = local_basis(part.spline.t, self.degree, probes, order + 1)
             found = units * np.sqrt(np.mean(of_derivatives(posterior, basis)[order, order]))
             size = np.sqrt(np.mean(part.spline(probes, nu=order) ** 2, axis=0))
-            # relative to the derivative without this error, which the size of this spline's includes
-            share = known.relative / np.hypot(1.0, known.relative)
             units = units * np.maximum(1.0, share * size / found)
         return np.asarray(units[:, None, None])
 

@@ -18,6 +18,9 @@ from vsacli.trajectory.fits.selection import (
 )
 from vsacli.trajectory.fits.smoothing import Smoothing
 
+TOLD = 0.01
+"""Share of the highest derivative from which on filtered noise in it is told."""
+
 LISTED_LINES = 5
 """Frequencies that a sentence names."""
 
@@ -72,11 +75,21 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
                 " frequency there is no motion"
             )
         elif not known.determined:
-            remedy = "record it with less noise, or slower" if part.smooth else "try it with fit: smooth"
             yield (
                 f"{highest} of {label} is not determined by the record to 10 %: its standard deviation is"
-                f" {100 * known.relative:.2g} % of its root mean square; {remedy}"
+                f" {100 * known.relative:.2g} % of its root mean square; {_remedy(part)}"
             )
+
+
+def _remedy(part: Part) -> str:
+    """What would determine the highest derivative of a component."""
+    if part.noise is not None:
+        return (
+            f"above {part.noise.above:.2g} Hz it is noise that a filter made smooth: record it without the"
+            f" filter, or set bandwidth: {part.noise.above:.2g}; if it is motion, set bandwidth:"
+            f" {2 * part.noise.peak:.2g}"
+        )
+    return "record it with less noise, or slower" if part.smooth else "try it with fit: smooth"
 
 
 def _vibration(known: Smoothing) -> str:
@@ -106,6 +119,11 @@ def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
         if known is not None and known.lines.hum:
             hum = ", ".join(f"{frequency:.4g}" for frequency in known.lines.hum[:LISTED_LINES])
             yield f"mains hum of {hum} Hz in {value} of {_members([part], labels)} is taken for noise"
+        if part.noise is not None and part.noise.share > TOLD and (known is None or known.determined):
+            yield (
+                f"{value} of {_members([part], labels)} has noise above {part.noise.above:.2g} Hz that a"
+                " filter made smooth, which counts as uncertainty"
+            )
 
 
 def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
@@ -128,11 +146,21 @@ def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
                 "residual": {"rms": float(fit.residual[member]), "max": float(fit.largest[member])},
                 "noise": float(fit.noise[member]),
                 "doubtful": dict(zip(("start", "end"), part.doubtful, strict=True)),
-                **({} if part.smoothing is None else {"deviation": part.smoothing.relative}),
+                **_judgement(part),
             }
             for member, part in sorted(parts.items(), key=itemgetter(0))
         ],
     }
+
+
+def _judgement(part: Part) -> dict[str, Any]:
+    """What a smoothing spline and the spectrum say of a component, if they say anything."""
+    found: dict[str, Any] = {}
+    if part.smoothing is not None:
+        found["deviation"] = part.smoothing.relative
+    if part.noise is not None:
+        found["filtered_noise"] = {"share": part.noise.share, "above": part.noise.above}
+    return found
 
 
 def _method(part: Part) -> str:

@@ -14,6 +14,7 @@ from vsacli.trajectory.fits.fit import Fit, Part
 from vsacli.trajectory.fits.least_squares import fit_spline
 from vsacli.trajectory.fits.resolution import KnownNoise
 from vsacli.trajectory.fits.smoothing import smoothing_spline
+from vsacli.trajectory.fits.spectrum import FollowedNoise, followed_noise
 
 SUSPECT = 0.01
 """Share of the highest derivative of the interpolating spline that noise may make up without being judged."""
@@ -61,7 +62,8 @@ def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | No
     if found is None:
         return Part(members, fit_spline(record.time, row[None], 1, degree), exact=False)
     spline, smoothing = found
-    return Part(members, spline, exact=False, smoothing=smoothing, smooth=True)
+    part = Part(members, spline, exact=False, smoothing=smoothing, smooth=True)
+    return _following(part, _noise_of(record, part, 0), record)
 
 
 def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part]:
@@ -88,26 +90,41 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
     """What stands for a component of a part; None if it needs no judge, or there is none."""
     member, degree = int(part.members[column]), part.spline.k
     wanted = not chosen and record.known[member].bandwidth is not None
-    suspect = record.spoilt[member] > SUSPECT or record.filtered[member]
-    if part.exact and not suspect and not wanted:
-        return None
+    noise = _noise_of(record, part, column)
+    filtered = bool(record.filtered[member]) or noise.share > SUSPECT
+    single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], degree)
+    if part.exact and record.spoilt[member] <= SUSPECT and not filtered and not wanted:
+        more = noise.share > record.spoilt[member]
+        return Part(np.array([member]), single, exact=True, noise=noise) if more else None
     judge = _judge(record, member, degree)
     if judge.smoothing is None:
         return None
     difference = _difference(part, column, judge, record)
-    if wanted or (not chosen and _better(judge, difference, record)):
+    if wanted or (not chosen and _better(judge, difference, record, filtered)):
         return judge
-    if judge.smoothing.resolved or _disagrees(record, member) or not part.exact:
-        single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], degree)
+    # noise alone speaks against a spline through the samples
+    if judge.smoothing.resolved or record.spoilt[member] > DISAGREEMENT or filtered or not part.exact:
         relative = float(np.hypot(judge.smoothing.relative, difference))
         known = replace(judge.smoothing, relative=relative, follows_lines=True)
-        return Part(judge.members, single, part.exact, known)
+        return _following(Part(judge.members, single, part.exact, known), noise, record)
     return None
 
 
-def _disagrees(record: Record, member: int) -> bool:
-    """Whether noise alone speaks against a spline through the samples."""
-    return bool(record.spoilt[member] > DISAGREEMENT or record.filtered[member])
+def _noise_of(record: Record, part: Part, column: int) -> FollowedNoise:
+    """Noise that one component of a part follows."""
+    step = float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
+    bandwidth = record.known[int(part.members[column])].bandwidth
+    return followed_noise(part.spline, column, part.inside, step, record.order, bandwidth)
+
+
+def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
+    """The part of one component, which follows noise: an error like any other."""
+    known = part.smoothing
+    if known is None or noise.relative <= known.relative:
+        return part
+    probes = np.linspace(*part.inside, PROBES)
+    size = float(np.sqrt(np.mean(part.spline(probes, nu=record.order) ** 2)))
+    return replace(part, smoothing=known.following(noise, size), noise=noise)
 
 
 def _judge(record: Record, member: int, degree: int) -> Part:
@@ -122,7 +139,7 @@ def _judge(record: Record, member: int, degree: int) -> Part:
     return replace(follower, smoothing=replace(follower.smoothing, lines=lines, follows_lines=True))
 
 
-def _better(judge: Part, difference: float, record: Record) -> bool:
+def _better(judge: Part, difference: float, record: Record, filtered: bool) -> bool:
     """Whether a smoothing spline is to stand for a component instead of one through its samples.
 
     If no resolution is accepted, noise must spoil the latter. If noise was filtered, it must differ by more
@@ -133,9 +150,7 @@ def _better(judge: Part, difference: float, record: Record) -> bool:
         return False
     if record.spoilt[member] > (SUSPECT if known.resolved else DISAGREEMENT):
         return True
-    return (
-        bool(record.filtered[member]) and difference > DISAGREEMENT + DISAGREEING_DEVIATIONS * known.relative
-    )
+    return filtered and difference > DISAGREEMENT + DISAGREEING_DEVIATIONS * known.relative
 
 
 def _difference(part: Part, column: int, smooth: Part, record: Record) -> float:

@@ -13,6 +13,7 @@ from vsacli.trajectory.fits.cutoff import falls
 from vsacli.trajectory.fits.information import Posterior
 from vsacli.trajectory.fits.resolution import KnownNoise, Resolution, find_resolution
 from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding, spectral_lines
+from vsacli.trajectory.fits.spectrum import FollowedNoise
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -55,6 +56,23 @@ class Smoothing:
     def determined(self) -> bool:
         """Whether the record determines the highest derivative to 10 %."""
         return self.resolved and self.relative <= DETERMINED
+
+    def following(self, noise: FollowedNoise, size: float) -> Smoothing:
+        """That of a spline that follows noise, too.
+
+        Args:
+            noise: in its highest derivative.
+            size: of this derivative, root mean square away from the ends.
+        """
+        # of what is unresolved the error is relative to the spline's derivative with all that it follows
+        relative = float(np.hypot(self.relative, noise.relative if self.resolved else noise.share))
+        factor = max(1.0, noise.share * size / max(self.deviations[-1], np.finfo(float).tiny))
+        return replace(
+            self,
+            deviations=factor * self.deviations,
+            units=factor * self.units,
+            relative=relative,
+        )
 
     def units_at(self, place: FloatArray) -> FloatArray:
         """Units of the posterior's deviations, (orders, places).
