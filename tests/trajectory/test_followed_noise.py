@@ -24,7 +24,7 @@ deviations."""
 def share_of(time, row, bandwidth=None, degree=7, order=4):
     spline = make_interp_spline(time, row[:, None], k=degree)
     inside = time[50], time[-50]
-    return followed_noise(spline, 0, inside, time[1], order, bandwidth)
+    return followed_noise(spline, inside, time[1], order, bandwidth)
 
 
 def filtered(seed, time, cutoff, size):

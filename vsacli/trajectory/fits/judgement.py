@@ -45,6 +45,7 @@ class Record(NamedTuple):
         filtered: whether there is noise that was filtered, (components,).
         order: of the highest derivative that is needed.
         known: what the user says of the noise of each component.
+        least: derivative below which a component rests beside others that move, root mean square.
     """
 
     time: FloatArray
@@ -53,6 +54,7 @@ class Record(NamedTuple):
     filtered: BoolArray
     order: int
     known: Sequence[KnownNoise]
+    least: float = 0.0
 
 
 def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | None = None) -> Part:
@@ -63,7 +65,7 @@ def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | No
         return Part(members, fit_spline(record.time, row[None], 1, degree), exact=False)
     spline, smoothing = found
     part = Part(members, spline, exact=False, smoothing=smoothing, smooth=True)
-    return _following(part, _noise_of(record, part, 0), record)
+    return _following(part, _noise_of(record, part), record)
 
 
 def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part]:
@@ -90,9 +92,9 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
     """What stands for a component of a part; None if it needs no judge, or there is none."""
     member, degree = int(part.members[column]), part.spline.k
     wanted = not chosen and record.known[member].bandwidth is not None
-    noise = _noise_of(record, part, column)
-    filtered = bool(record.filtered[member]) or noise.share > SUSPECT
     single = type(part.spline)(part.spline.t, part.spline.c[:, [column]], degree)
+    noise = _noise_of(record, Part(np.array([member]), single, part.exact))
+    filtered = bool(record.filtered[member]) or noise.share > SUSPECT
     if part.exact and record.spoilt[member] <= SUSPECT and not filtered and not wanted:
         more = noise.share > record.spoilt[member]
         return Part(np.array([member]), single, exact=True, noise=noise) if more else None
@@ -110,11 +112,14 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
     return None
 
 
-def _noise_of(record: Record, part: Part, column: int) -> FollowedNoise:
-    """Noise that one component of a part follows."""
+def _noise_of(record: Record, part: Part) -> FollowedNoise:
+    """Noise that the part of one component follows."""
     step = float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
-    bandwidth = record.known[int(part.members[column])].bandwidth
-    return followed_noise(part.spline, column, part.inside, step, record.order, bandwidth)
+    bandwidth = record.known[int(part.members[0])].bandwidth
+    noise = followed_noise(part.spline, part.inside, step, record.order, bandwidth)
+    if not noise.share or not record.least:
+        return noise
+    return noise._replace(share=noise.share * min(1.0, _size(part, record.order) / record.least))
 
 
 def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
@@ -122,9 +127,12 @@ def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
     known = part.smoothing
     if known is None or noise.relative <= known.relative:
         return part
-    probes = np.linspace(*part.inside, PROBES)
-    size = float(np.sqrt(np.mean(part.spline(probes, nu=record.order) ** 2)))
-    return replace(part, smoothing=known.following(noise, size), noise=noise)
+    return replace(part, smoothing=known.following(noise, _size(part, record.order)), noise=noise)
+
+
+def _size(part: Part, order: int) -> float:
+    """Of a derivative of one component, root mean square away from the ends."""
+    return float(np.sqrt(np.mean(part.spline(np.linspace(*part.inside, PROBES), nu=order) ** 2)))
 
 
 def _judge(record: Record, member: int, degree: int) -> Part:

@@ -120,7 +120,8 @@ def fit_samples(
     if present.size and method != LEAST_SQUARES and len(time) >= FEWEST_JUDGED:
         typical = typical_noise(time, values[present], degree + 1)
         expected = np.where(np.isnan(given[present]), typical, given[present])
-        record.spoilt[present] = _spoilt(parts[0].spline, time, values[present], expected, order)
+        record.spoilt[present], least = _spoilt(parts[0].spline, time, values[present], expected, order)
+        record = record._replace(least=least)
         record.filtered[present] = filtered_noise(time, values[present], degree + 1)
     fit = join(degree, parts, time, values, estimate, given)
     with progress(len(time) * len(present)) as bar:
@@ -136,16 +137,21 @@ def _interpolation(time: FloatArray, values: FloatArray, members: IndexArray, de
 
 def _spoilt(
     spline: BSpline[np.float64], time: FloatArray, rows: FloatArray, noise: FloatArray, order: int
-) -> FloatArray:
-    """Share of the highest derivative of a spline through samples that noise makes up, (components,)."""
+) -> tuple[FloatArray, float]:
+    """Share of the highest derivative of a spline through samples that noise makes up, (components,).
+
+    Returns:
+        It, and the least derivative that counts as one, root mean square.
+    """
     degree, duration = spline.k, time[-1] - time[0]
     step = duration / (len(time) - 1)
     inside = time[degree:-degree] if len(time) > 4 * degree else time
     derivative = np.sqrt(np.mean(spline(inside, nu=order) ** 2, axis=0))
     least = np.abs(rows).max(axis=1) / duration**order
-    scale = np.maximum(np.maximum(derivative, least), SMALLEST_SHARE * derivative.max())
+    smallest = SMALLEST_SHARE * float(derivative.max())
+    scale = np.maximum(np.maximum(derivative, least), smallest)
     error = INTERPOLATION_GAIN[degree][order] * noise / step**order
-    return np.asarray(error / np.maximum(scale, np.finfo(float).tiny))
+    return np.asarray(error / np.maximum(scale, np.finfo(float).tiny)), smallest
 
 
 def _least_squares(time: FloatArray, values: FloatArray, members: IndexArray, degree: int) -> Iterator[Part]:

@@ -135,7 +135,6 @@ class _Bands(NamedTuple):
 
 def followed_noise(
     spline: BSpline[np.float64],
-    column: int,
     inside: tuple[float, float],
     step: float,
     order: int,
@@ -144,18 +143,17 @@ def followed_noise(
     """Filtered noise in a derivative of a spline; none is found in fewer than some hundred samples.
 
     Args:
-        spline: near or through the samples.
-        column: of the spline.
+        spline: near or through the samples, with one column.
         inside: first and last time of the stretch that is not doubtful, s.
         step: mean distance of samples, s.
         order: of the derivative.
         bandwidth: up to which there is motion, Hz, if it is known: what is below is no noise.
     """
-    spectrum = _spectrum(spline, column, inside, step, order)
-    if spectrum.lines.shape[1] <= 2 * (FIRST_LINE + FEWEST_LINES):
+    spectrum = _spectrum(spline, inside, step, order)
+    total = float(np.sum(spectrum.power))
+    if not total or spectrum.lines.shape[1] <= 2 * (FIRST_LINE + FEWEST_LINES):
         return FollowedNoise()
     bands = _bands(spectrum)
-    total = float(np.sum(spectrum.power))
     # of several humps that pass for noise the one from the lowest valley on has them all
     valleys, descends = _valleys(bands, spectrum.motion)
     for valley in np.flatnonzero(valleys).tolist():
@@ -170,9 +168,7 @@ def followed_noise(
     return FollowedNoise()
 
 
-def _spectrum(
-    spline: BSpline[np.float64], column: int, inside: tuple[float, float], step: float, order: int
-) -> _Spectrum:
+def _spectrum(spline: BSpline[np.float64], inside: tuple[float, float], step: float, order: int) -> _Spectrum:
     first, last = inside
     samples = int((last - first) / step) + 1
     count = max(2, min(samples, SEGMENT_SAMPLES))
@@ -180,7 +176,7 @@ def _spectrum(
     starts = np.linspace(first, last - (count - 1) * step, stretches)
     time = starts[:, None] + step * np.arange(count)
     window = np.hanning(count)
-    values, rows = (spline(time, nu=each)[:, :, column] for each in (0, order))
+    values, rows = (spline(time, nu=each)[..., 0] for each in (0, order))
     power = np.abs(np.fft.rfft(window * (values - values.mean()))) ** 2
     frequency = np.asarray(np.fft.rfftfreq(count, step), dtype=np.float64)
     weight = np.maximum(frequency, frequency[1]) ** (2 * order)
