@@ -117,7 +117,7 @@ def _noise_of(record: Record, part: Part) -> FollowedNoise:
     step = float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
     bandwidth = record.known[int(part.members[0])].bandwidth
     noise = followed_noise(part.spline, part.inside, step, record.order, bandwidth)
-    if not noise.share or not record.least:
+    if not (noise.share and part.exact and record.least):
         return noise
     return noise._replace(share=noise.share * min(1.0, _size(part, record.order) / record.least))
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 
 LINE_RATIO = 100.0
 """Of the power at a frequency to the median near it, from which on it is a line. White noise never reaches
@@ -22,6 +22,9 @@ a motion that was repeated ten times."""
 
 NEIGHBOURS = 40
 """Frequencies on each side that the median is taken of."""
+
+FEW_NEIGHBOURS = 10
+"""The same of frequencies that have fewer below them: a slow sine that a coarse spline leaves out."""
 
 BLOCK_FREQUENCIES = 16384
 """Whose medians are taken at a time, to bound the memory."""
@@ -83,17 +86,9 @@ def spectral_lines(
     if len(time) < 4 * NEIGHBOURS or np.abs(steps - step).max() > UNEVEN * step:
         return Lines()
     power = np.abs(np.fft.rfft(residual * np.hanning(len(residual)))) ** 2
-    count = len(power)
-    windows = np.lib.stride_tricks.sliding_window_view(power, NEIGHBOURS)
-    starts = range(0, len(windows), BLOCK_FREQUENCIES)
-    medians = np.concatenate([np.median(windows[at : at + BLOCK_FREQUENCIES], axis=1) for at in starts])
-    centre = np.arange(NEIGHBOURS + LEAKAGE, count - NEIGHBOURS - LEAKAGE)
-    below = medians[centre - NEIGHBOURS - LEAKAGE]
-    # of a spectrum that falls steeply, the side below has the larger median
-    beside = np.maximum(below, medians[centre + LEAKAGE + 1])
-    here = power[centre]
-    peak = (here >= power[centre - 1]) & (here >= power[centre + 1])
-    found = centre[peak & (here > LINE_RATIO * beside)]
+    narrow, wide = _standing_out(power, FEW_NEIGHBOURS), _standing_out(power, NEIGHBOURS)
+    slow = NEIGHBOURS + LEAKAGE  # below it there are fewer neighbours
+    found = np.concatenate([narrow[narrow < slow], wide])
     frequencies = found / (len(time) * step)
     # a Hann window leaves a quarter of a line's amplitude times the number of samples
     derivatives = 4 * np.sqrt(power[found] / 2) / len(time) * (2 * np.pi * frequencies) ** order
@@ -106,6 +101,20 @@ def spectral_lines(
     near = np.unique(found[unclear, None] + np.arange(-LEAKAGE, LEAKAGE + 1))
     share = float(np.sum(power[near]) / max(np.sum(power), np.finfo(float).tiny))
     return Lines(tuple(frequencies[mains].tolist()), tuple(frequencies[unclear].tolist()), share)
+
+
+def _standing_out(power: FloatArray, neighbours: int) -> IndexArray:
+    """Indices of lines, of those that have so many neighbours to both sides."""
+    windows = np.lib.stride_tricks.sliding_window_view(power, neighbours)
+    starts = range(0, len(windows), BLOCK_FREQUENCIES)
+    medians = np.concatenate([np.median(windows[at : at + BLOCK_FREQUENCIES], axis=1) for at in starts])
+    centre = np.arange(neighbours + LEAKAGE, len(power) - neighbours - LEAKAGE)
+    below = medians[centre - neighbours - LEAKAGE]
+    # of a spectrum that falls steeply, the side below has the larger median
+    beside = np.maximum(below, medians[centre + LEAKAGE + 1])
+    here = power[centre]
+    peak = (here >= power[centre - 1]) & (here >= power[centre + 1])
+    return np.asarray(centre[peak & (here > LINE_RATIO * beside)])
 
 
 def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
