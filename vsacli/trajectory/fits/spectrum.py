@@ -46,8 +46,8 @@ FLAT = 0.2
 HUMP = 0.1
 """Share of the largest density of a hump that its lines have at least."""
 
-FEWEST_LINES = 16
-"""Of a hump that can be told from a few sines."""
+FEWEST_LINES, FEW_LINES = 16, 12
+"""Of a hump that can be told from a few sines; of a high one."""
 
 PEAKED = 2.5
 """Power of a hump over what its medians have, from which on lines make it up."""
@@ -55,8 +55,13 @@ PEAKED = 2.5
 SCATTER = (0.6, 1.8)
 """Standard deviation of the logarithms of a hump's lines about their medians; 1.28 of Gaussian noise."""
 
-BURSTS = 5.0
-"""Kurtosis of a hump's course in time from which on it happens now and then; 3 of Gaussian noise."""
+BURSTS, RESTING = 5.0, 15.0
+"""Kurtosis of a hump's course in time from which on it happens now and then; 3 of Gaussian noise. That of an
+encoder rests when the joint does, which a high hump may."""
+
+HIGH = 30.0
+"""Rise of a high hump; the square of it, if no motion is seen in the bands below. Humps of a smooth motion
+were seen to rise by 6, and by 550 beyond the slowest lines."""
 
 LINE_RATIO = 30.0
 """Of the power of a line to the medians near it, from which on it is motion."""
@@ -237,10 +242,13 @@ def _end_of_motion(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) ->
 def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool:
     """Whether what is beyond a valley is random, and there all the time."""
     density = bands.derivative
+    motion = np.max(density[:valley], initial=0.0)
+    rise = density[top] / density[valley]
+    high = rise > (HIGH if motion > RISE * density[valley] else HIGH**2)
     chosen = np.flatnonzero(density[valley:] >= HUMP * density[top]) + valley
     first, last = int(bands.line[chosen[0]]), int(bands.line[chosen[-1]]) + 1
     power = spectrum.power[:, first:last]
-    if (last - first) * len(power) < FEWEST_LINES:
+    if (last - first) * len(power) < (FEW_LINES if high else FEWEST_LINES):
         return False
     medians = _medians(spectrum, bands, first, last)
     scatter = np.std(np.log(np.maximum(power, np.finfo(float).tiny) / medians))
@@ -251,4 +259,4 @@ def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool
     ends = max(1, spectrum.samples // TAPERED)
     window = np.hanning(spectrum.samples)[ends:-ends]
     course = np.fft.irfft(lines, spectrum.samples)[:, ends:-ends] / window
-    return bool(np.mean(course**4) < BURSTS * np.mean(course**2) ** 2)
+    return bool(np.mean(course**4) < (RESTING if high else BURSTS) * np.mean(course**2) ** 2)
