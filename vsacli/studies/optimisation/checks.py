@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import STIFFNESS
 from vsacli.robot.model import Robot
@@ -71,7 +72,10 @@ def checked_criterion(robot: Robot, name: str, joints: Sequence[int]) -> Criteri
     return criterion
 
 
-def confirmed(what: Optimum, trajectory: Trajectory) -> bool:
-    """Whether a run keeps margin and limits."""
+def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
+    """Return times since the start, s, at which a run misses margin or limits; None if it keeps them.
+
+    Between the steps, too; empty if it is the self-check alone that fails.
+    """
     task = Task(Acceptance(what.robot, what.margin), trajectory)
-    return task.falls_short(Remedy(0.0, what.robot, trajectory)) is None
+    return task.falls_short(Remedy(0.0, what.robot, trajectory))

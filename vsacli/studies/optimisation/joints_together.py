@@ -11,11 +11,11 @@ from vsacli.base.texts import as_name
 from vsacli.base.units import ENERGY
 from vsacli.robot.model import Robot
 from vsacli.studies.optimisation.cheapest_pace import CheapestPaceSearch
-from vsacli.studies.optimisation.checks import confirmed
+from vsacli.studies.optimisation.checks import falls_short
 from vsacli.studies.optimisation.countdown import Countdown
 from vsacli.studies.optimisation.criteria import Criterion, Scale
 from vsacli.studies.optimisation.joint_by_joint import CheapestStiffness
-from vsacli.studies.optimisation.joint_costs import asked_cost, asked_size
+from vsacli.studies.optimisation.joint_costs import asked_size, run_costs
 from vsacli.studies.optimisation.optimum import JointOptimum, Optimum, TimingOptimum, TotalCost
 from vsacli.studies.optimisation.paced_joints import PacedJoint
 from vsacli.studies.optimisation.paced_motion import PacedMotion
@@ -81,7 +81,8 @@ def cheapest_pace(
     try:
         if varied:
             acceptance = Acceptance(what.robot, what.margin)
-            _, path = CheapestStiffness(acceptance, trajectory, criterion, seed, progress).best()
+            stiffness = CheapestStiffness(acceptance, trajectory, criterion, seed, progress)
+            path = stiffness.confirmed(what).trajectory
         bar = Countdown(progress)
         motion = PacedMotion(what.robot, path, instants_of(path, path.duration / max(count, 1)))
         costed = _costed(what, motion, criterion, loads)
@@ -91,7 +92,7 @@ def cheapest_pace(
     except ImpossibleError as error:
         return replace(what, reasons=error.reasons)
     bar.finish()
-    joints = _joints(what.robot, criterion, found, loads, best)
+    joints = _joints(what.robot, criterion, found, trajectory, best)
     together, pace = _together(criterion, joints), found.pace(max(count, 1))
     return replace(what, joints=joints, together=together, trajectory=best, pace=pace)
 
@@ -128,22 +129,23 @@ def _costed(
 
 
 def _joints(
-    robot: Robot, criterion: Criterion, found: Pacing, loads: Sequence[Load], best: Trajectory
+    robot: Robot, criterion: Criterion, found: Pacing, asked: Trajectory, best: Trajectory
 ) -> dict[str, JointOptimum]:
     """What each joint costs before and after, by name."""
-    after = joint_loads(robot, best, list(range(len(robot.joints))))
+    criteria = dict.fromkeys(range(len(robot.joints)), criterion)
+    before, after = (run_costs(robot, each, criteria) for each in (asked, best))
     return {
         joint.name: JointOptimum(
-            before=asked_cost(joint, asked, criterion),
+            before=before[index],
             constant=math.nan,
-            after=asked_cost(joint, load, criterion),
+            after=after[index],
             unit=criterion.quantity.unit(joint.type),
             found=found.found,
             starts=found.starts,
             agreeing=found.agreeing,
             bounding=found.bounding.get(joint.name, {}),
         )
-        for joint, asked, load in zip(robot.joints, loads, after, strict=True)
+        for index, joint in enumerate(robot.joints)
     }
 
 
@@ -169,6 +171,6 @@ def _confirmed(what: Optimum, path: Trajectory, found: Pacing, count: int = 1) -
     best, between = (
         retimed(path, found.pace(count), found.stiffness(count), name, refined) for refined in (1, BETWEEN)
     )
-    if not (confirmed(what, best) and confirmed(what, between)):
+    if not (falls_short(what, best) is None and falls_short(what, between) is None):
         raise ImpossibleError("what keeps every limit at some instants exceeds one between them")
     return best

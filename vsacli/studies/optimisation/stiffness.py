@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -53,7 +53,9 @@ class Profile:
     """A stiffness over the instants of a load.
 
     Attributes:
-        rows: stiffness, rate and second derivative, (3, instants), N m/rad (N/m) per s^k.
+        rows: stiffness, rate and second derivative at the instants of the load, (3, instants), N m/rad (N/m)
+            per s^k.
+        steps: which of these instants are steps.
         found: whether the conditions for a local optimum hold.
         starts: of how many different profiles the search began.
         agreeing: from how many of them it came to this optimum.
@@ -61,14 +63,20 @@ class Profile:
     """
 
     rows: FloatArray = field(repr=False)
+    steps: IndexArray | slice = field(repr=False)
     found: bool
     starts: int
     agreeing: int
     bounding: dict[str, float]
 
+    @property
+    def at_steps(self) -> FloatArray:
+        """The rows at the steps alone, (3, steps)."""
+        return self.rows[:, self.steps]
 
-Spaces = Callable[[tuple[float, float], int], SplineSpace]
-"""The splines over a span of so many pieces."""
+
+Spaces = Callable[[tuple[float, float], int, FloatArray], SplineSpace]
+"""The splines over a span of so many pieces, which begin and end at some of these times."""
 
 
 class _Attempt(NamedTuple):
@@ -89,7 +97,8 @@ class StiffnessSearch:
     Args:
         acceptance: the rule for every step.
         joint: whose stiffness can be chosen.
-        load: what it carries.
+        load: what it carries. Pieces of splines begin and end at its steps, so that the quintic between two
+            steps with given derivatives, which a file describes, is the spline itself.
         criterion: what is minimised.
         spaces: among which splines is searched.
         seed: of the starts that are drawn.
@@ -115,7 +124,9 @@ class StiffnessSearch:
         self._joint, self._load, self._criterion = joint, load, criterion
         self._spaces, self._seed, self._progress = spaces, seed, progress
         self._span = float(load.time[0]), float(load.time[-1])
-        self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale())
+        self._steps = load.time[load.steps]
+        self._most = min(MOST_PIECES, len(self._steps) - 1)
+        self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale(), acceptance.reserve)
 
     def best(self) -> Profile:
         """The best profile that is found from several starts.
@@ -124,7 +135,7 @@ class StiffnessSearch:
             ImpossibleError: none was found.
         """
         pieces, starts = self._starts()
-        space = self._spaces(self._span, pieces)
+        space = self._space(pieces)
         self._scale_by(space, starts[0])
         attempts = [(self._attempt(space, pieces, start), start) for start in starts]
         kept = [(attempt, start) for attempt, start in attempts if attempt is not None]
@@ -151,21 +162,29 @@ class StiffnessSearch:
     def _asked(self) -> FloatArray:
         return self._load.command.commanded[STIFFNESS.key]
 
+    def _space(self, pieces: int) -> SplineSpace:
+        return self._spaces(self._span, pieces, self._steps)
+
     def _starts(self) -> tuple[int, list[FloatArray]]:
         """The pieces of splines of which some lie within what is admissible, and these."""
-        time, pieces = self._load.time, FIRST_PIECES
+        time, coarsest = self._load.time, min(FIRST_PIECES, self._most)
         chosen = evenly(len(time), INSTANTS_PER_PIECE * MOST_PIECES)
         admissible = Range(*(row[chosen] for row in self._admissible))
         wanted = [target[chosen] for target in targets(self._asked, self._admissible, time, self._seed)]
-        while pieces <= MOST_PIECES:
-            space = self._spaces(self._span, pieces)
+        for pieces in self._finer_than(coarsest // 2):
+            space = self._space(pieces)
             found = [nearest_profile(space, time[chosen], target, admissible) for target in wanted]
             if starts := [amounts for amounts in found if amounts is not None]:
                 return pieces, starts
-            pieces *= 2
         raise ImpossibleError(
             f"what {self._joint.name} may have is too narrow, or changes too fast, for a smooth profile"
         )
+
+    def _finer_than(self, pieces: int) -> Iterator[int]:
+        """Numbers of pieces, each twice as large as the one before, up to the most that there may be."""
+        while pieces < self._most:
+            pieces = min(max(2 * pieces, 1), self._most)
+            yield pieces
 
     def _scale_by(self, space: SplineSpace, amounts: FloatArray) -> None:
         """Scale the cost by that of a profile."""
@@ -244,11 +263,10 @@ class StiffnessSearch:
     def _refined(self, best: _Attempt, pieces: int, start: FloatArray) -> _Attempt:
         """The same with finer pieces, as long as these lower the cost."""
         coarse = best.space
-        while 2 * pieces <= MOST_PIECES:
-            pieces *= 2
-            space = self._spaces(self._span, pieces)
+        for finer_pieces in self._finer_than(pieces):
+            space = self._space(finer_pieces)
             inside = space.fitted(self._load.time, coarse.basis(self._load.time, 1)[0] @ start)
-            finer = self._attempt(space, pieces, inside, best)
+            finer = self._attempt(space, finer_pieces, inside, best)
             if finer is None or finer.minimum.cost > best.minimum.cost:
                 break
             gained, best = best.minimum.cost - finer.minimum.cost, finer
@@ -261,6 +279,7 @@ class StiffnessSearch:
         rows = attempt.space.basis(self._load.time, STIFFNESS.orders) @ amounts
         return Profile(
             rows=rows,
+            steps=self._load.steps,
             found=attempt.minimum.found,
             starts=starts,
             agreeing=agreeing,
