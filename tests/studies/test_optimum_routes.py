@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
-from samples.remedies import written
+from samples.remedies import pendulum, rest_to_rest, written
 
 from vsacli import Robot, Trajectory, inverse_dynamics, load_robot, load_trajectory, optimize
 from vsacli.studies.remedies import Remedy
@@ -81,3 +81,88 @@ def test_few_steps_have_the_optimum_of_many(tmp_path: Path, rate: int, criterion
     assert joint.after == pytest.approx(expected, rel=1e-3)
     assert joint.before == pytest.approx(reported(robot, motion, criterion), rel=1e-12)
     check_routes(robot, found, criterion, tmp_path, MARGIN)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("criterion", "vary"), [("peak", "timing"), ("torque", "both"), ("time", "timing"), ("time", "both")]
+)
+def test_few_steps_have_another_timing(tmp_path: Path, criterion: str, vary: str) -> None:
+    """At 10 Hz a pace has more detail than steps; the result has as many as describe it."""
+    robot = load_robot(TENDON)
+    found = optimize(robot, load_trajectory(PULL, robot, {"rate": 10}), criterion, vary, margin=MARGIN)
+    check_routes(robot, found, criterion, tmp_path, MARGIN)
+    if criterion == "time":
+        # of the same at 1000 Hz, where the search ends within 1e-3 of its optimum
+        expected = {"timing": 0.6034, "both": 0.5872}[vary]
+        assert found.timing.after == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_costs_of_all_joints_are_those_of_runs(tmp_path: Path) -> None:
+    """Heat and energy of an arm whose joints repeat themselves not at all, before and after."""
+    numbers = {"gear_ratio": 1.0, "torque_constant": 2.0, "resistance": 3.0}
+    robot = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml").replace(
+        {f"joints.*.actuator.motor.{name}": value for name, value in numbers.items()}
+    )
+    motion = load_trajectory(REPOSITORY / "trajectories" / "rest_to_rest.yaml", robot, {"rate": 100})
+    for criterion in ("copper", "energy"):
+        folder = tmp_path / criterion
+        folder.mkdir()
+        found = optimize(robot, motion, criterion)
+        check_routes(robot, found, criterion, folder, 0.01)
+        for index, joint in enumerate(found.joints.values()):
+            assert joint.before == pytest.approx(reported(robot, motion, criterion, index), rel=1e-12)
+
+
+@pytest.mark.slow
+def test_limits_hold_between_samples_of_random_motions() -> None:
+    """Pendulums with motors of limited torque, from 8 to 300 steps a second; some motions are too much."""
+    draw, kept = np.random.default_rng(5), 0
+    for _ in range(12):
+        start, end = draw.uniform(-1.5, 1.5, 2)
+        rate, duration = float(np.exp(draw.uniform(*np.log([8, 300])))), draw.uniform(0.8, 2.0)
+        motion = rest_to_rest(duration, (1000.0,), start=(start,), end=(end,), rate=rate)
+        limit = draw.uniform(28.0, 50.0)
+        robot = pendulum().replace({"joints.0.actuator.motor.max_torque": limit})
+        criterion = draw.choice(["torque", "peak", "energy", "time"])
+        vary = "timing" if criterion == "time" else "stiffness"
+        found = optimize(robot, motion, criterion, vary, margin=MARGIN)
+        if found.trajectory is None:
+            assert "between" not in str(found)  # steps have nothing to do with what motors can do
+            continue
+        run = inverse_dynamics(robot, finer(found.trajectory))
+        assert run.report.verdict == "ok", (rate, duration, limit, criterion, vary, run.report)
+        assert run.report.joints[0].margin >= MARGIN
+        assert np.abs(run.tau_motor).max() <= limit
+        kept += 1
+    assert kept >= 6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("shorter", "slow_down"), [(0.62, 1.0), (0.3, 2.66)])
+def test_what_has_no_stiffness_as_commanded_has_one_at_another_pace(shorter: float, slow_down: float) -> None:
+    """Beyond the largest velocity at half the duration; at a third of it no pace keeps to that."""
+    robot = load_robot(TENDON)
+    motion = load_trajectory(PULL, robot, {"rate": 500}).stretched(shorter)
+    assert not optimize(robot, motion, "torque").possible
+    found = optimize(robot, motion, "torque", "both", margin=MARGIN)
+    assert found.slow_down == pytest.approx(slow_down, rel=0.01)
+    assert found.trajectory is not None
+    assert found.pace is not None
+    assert found.trajectory.duration == pytest.approx(found.slow_down * motion.duration)
+    # the pace is that along the path as commanded
+    assert found.pace.integrate(0, motion.duration) == pytest.approx(found.trajectory.duration)
+    assert ("slowed down by a factor" in str(found)) == (slow_down > 1)
+    assert inverse_dynamics(robot, finer(found.trajectory)).report.verdict == "ok"
+
+
+@pytest.mark.slow
+def test_a_stiffness_that_is_out_of_reach_at_any_pace_is_where_a_search_begins_elsewhere() -> None:
+    """What the motors cost as commanded is not known then, and the fastest motion is the same."""
+    robot = load_robot(TENDON)
+    motion = load_trajectory(PULL, robot, {"rate": 500, "stiffness.start": 8, "stiffness.end": 38})
+    found = optimize(robot, motion, "time", "both", margin=MARGIN)
+    assert found.timing is not None
+    assert np.isnan(found.timing.uniform)
+    assert found.timing.after == pytest.approx(0.5872, rel=2e-3)

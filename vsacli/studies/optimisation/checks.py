@@ -10,7 +10,6 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.robot.model import Robot
 from vsacli.studies.optimisation.criteria import CRITERIA, Criterion
 from vsacli.studies.optimisation.optimum import Optimum
-from vsacli.studies.optimisation.periods import rests
 from vsacli.studies.remedies.acceptance import Acceptance
 from vsacli.studies.remedies.suggestions import Remedy
 from vsacli.studies.remedies.task import Task
@@ -31,19 +30,14 @@ def varied_joints(robot: Robot, vary: str) -> list[int]:
     return [] if vary == TIMING else chosen_joints(robot)
 
 
-def check_time_can_vary(trajectory: Trajectory, vary: str) -> None:
-    """Refuse to minimise the time of a motion whose timing cannot vary.
+def check_timing_varies(vary: str) -> None:
+    """Refuse to minimise the time where the timing does not vary.
 
     Raises:
-        InputError: it cannot, or it is not what varies.
+        InputError: it does not.
     """
     if vary == STIFFNESS.key:
         raise InputError.one(f"time is what {TIMING!r} varies for, or {BOTH!r}, not {vary!r}")
-    if not rests(trajectory):
-        raise InputError.one(
-            f"{trajectory.name} begins or ends in motion, and another timing would change how fast; vary the "
-            "stiffness, or let it begin and end at rest, sinusoids by a ramp"
-        )
 
 
 def chosen_joints(robot: Robot) -> list[int]:

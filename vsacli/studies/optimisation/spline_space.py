@@ -73,6 +73,16 @@ class SplineSpace:
         whole = cls.at_rest(span, 1)
         return cls(whole.knots, np.ones((len(whole.shapes), 1)))
 
+    def one_at(self, first: bool, last: bool) -> SplineSpace:
+        """Those of `free` splines that are one at an end, or both, where three derivatives vanish.
+
+        They do where the first four coefficients are equal.
+        """
+        if not (first or last):
+            return self
+        fixed = FLAT_ENDS + 2
+        return replace(self, shapes=self.shapes[:, fixed * first : self.size - fixed * last], offset=1.0)
+
     def of_mean(self, mean: float) -> SplineSpace:
         """Those of them with a mean over the span, the constant among them."""
         from scipy.interpolate import BSpline

@@ -38,8 +38,11 @@ WORTH_HALVING = 1e-3
 SAME_COST = 1e-4
 """Relative difference of costs up to which two starts came to the same optimum."""
 
-MOST_ROUNDS = 6
-"""Rounds of adding instants at which bounds are missed; one or two are usual."""
+MOST_ROUNDS = 12
+"""Rounds of adding instants at which bounds are missed; one or two are usual, seven were needed."""
+
+SAME_LEVEL = 1e-5
+"""Share of a level by which what it bounds may exceed it at some instants: a tenth of `SAME_COST`."""
 
 FIRST_LEVEL = 1.05
 """Multiple of what a level bounds, to begin with."""
@@ -137,8 +140,12 @@ class StiffnessSearch:
         pieces, starts = self._starts()
         space = self._space(pieces)
         self._scale_by(space, starts[0])
-        attempts = [(self._attempt(space, pieces, start), start) for start in starts]
-        kept = [(attempt, start) for attempt, start in attempts if attempt is not None]
+        kept: list[tuple[_Attempt, FloatArray]] = []
+        for start in starts:
+            # most starts come to the same optimum, where bounds are missed at the same instants
+            attempt = self._attempt(space, pieces, start, known=kept[-1][0].instants if kept else None)
+            if attempt is not None:
+                kept.append((attempt, start))
         if not kept:
             raise ImpossibleError(
                 f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
@@ -194,7 +201,12 @@ class StiffnessSearch:
         self._whole.scale = Scale(size, self._span[1] - self._span[0], self._criterion.smoothings[0])
 
     def _attempt(
-        self, space: SplineSpace, pieces: int, start: FloatArray, nearby: _Attempt | None = None
+        self,
+        space: SplineSpace,
+        pieces: int,
+        start: FloatArray,
+        nearby: _Attempt | None = None,
+        known: IndexArray | None = None,
     ) -> _Attempt | None:
         """Search from a start, with as many instants as it takes; None if nothing keeps all bounds.
 
@@ -203,8 +215,11 @@ class StiffnessSearch:
             pieces: of each.
             start: amounts of the shapes, within what is admissible.
             nearby: a minimum among coarser splines, from which the search goes on.
+            known: instants that another search took.
         """
         instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1)
+        if known is not None:
+            instants = np.union1d(instants, known)
         every = self._group(space, np.arange(len(self._load.time)))
         inside = unknowns = self._with_level(every, start)
         if nearby is not None:
@@ -257,8 +272,9 @@ class StiffnessSearch:
 
     def _missed(self, every: Group, unknowns: FloatArray) -> IndexArray:
         """The worst instant of each stretch at which any bound is missed."""
-        missed = every.bounds(every.rows(unknowns))
-        return np.unique(np.concatenate([peaks(row - CLEARANCE) for row in missed]))
+        missed = every.bounds(every.rows(unknowns)) - CLEARANCE
+        missed[len(self._whole.bound_names) :] -= SAME_LEVEL
+        return np.unique(np.concatenate([peaks(row) for row in missed]))
 
     def _refined(self, best: _Attempt, pieces: int, start: FloatArray) -> _Attempt:
         """The same with finer pieces, as long as these lower the cost."""
