@@ -69,8 +69,9 @@ def check_routes(robot: Robot, found: Any, criterion: str, folder: Path, margin:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("criterion", ["peak", "torque", "energy"])
-@pytest.mark.parametrize("rate", [8, 10, 12, 20])
+@pytest.mark.parametrize(
+    ("rate", "criterion"), [(8, "torque"), (8, "energy"), (10, "peak"), (12, "peak"), (20, "peak")]
+)
 def test_few_steps_have_the_optimum_of_many(tmp_path: Path, rate: int, criterion: str) -> None:
     robot = load_robot(TENDON)
     motion = load_trajectory(PULL, robot, {"rate": rate})
@@ -84,9 +85,7 @@ def test_few_steps_have_the_optimum_of_many(tmp_path: Path, rate: int, criterion
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("criterion", "vary"), [("peak", "timing"), ("torque", "both"), ("time", "timing"), ("time", "both")]
-)
+@pytest.mark.parametrize(("criterion", "vary"), [("peak", "timing"), ("torque", "both"), ("time", "timing")])
 def test_few_steps_have_another_timing(tmp_path: Path, criterion: str, vary: str) -> None:
     """At 10 Hz a pace has more detail than steps; the result has as many as describe it."""
     robot = load_robot(TENDON)
@@ -94,8 +93,7 @@ def test_few_steps_have_another_timing(tmp_path: Path, criterion: str, vary: str
     check_routes(robot, found, criterion, tmp_path, MARGIN)
     if criterion == "time":
         # of the same at 1000 Hz, where the search ends within 1e-3 of its optimum
-        expected = {"timing": 0.6034, "both": 0.5872}[vary]
-        assert found.timing.after == pytest.approx(expected, rel=2e-3)
+        assert found.timing.after == pytest.approx(0.6034, rel=2e-3)
 
 
 @pytest.mark.slow
@@ -144,7 +142,7 @@ def test_limits_hold_between_samples_of_random_motions() -> None:
 def test_what_has_no_stiffness_as_commanded_has_one_at_another_pace(shorter: float, slow_down: float) -> None:
     """Beyond the largest velocity at half the duration; at a third of it no pace keeps to that."""
     robot = load_robot(TENDON)
-    motion = load_trajectory(PULL, robot, {"rate": 500}).stretched(shorter)
+    motion = load_trajectory(PULL, robot, {"rate": 100}).stretched(shorter)
     assert not optimize(robot, motion, "torque").possible
     found = optimize(robot, motion, "torque", "both", margin=MARGIN)
     assert found.slow_down == pytest.approx(slow_down, rel=0.01)
