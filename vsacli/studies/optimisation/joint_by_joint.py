@@ -26,11 +26,8 @@ from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
 from vsacli.studies.remedies.motions import Load
+from vsacli.studies.remedies.smallest_changes import STRICTER
 from vsacli.trajectory.trajectory import Trajectory
-
-STRICTER = (0.0, 0.0, 0.0, 1e-6, 1e-4, 0.01)
-"""Shares by which the rule is stricter, one search after the other. Instants at which a run falls short count
-in the searches that follow, so that two do as a rule."""
 
 HALVES = 2
 """Parts into which a load divides each step by itself."""

@@ -18,7 +18,7 @@ from vsacli.studies.optimisation.checks import falls_short
 from vsacli.studies.optimisation.countdown import Countdown
 from vsacli.studies.optimisation.criteria import Criterion, Scale
 from vsacli.studies.optimisation.divided_steps import reads_back
-from vsacli.studies.optimisation.joint_by_joint import STRICTER, CheapestStiffness
+from vsacli.studies.optimisation.joint_by_joint import CheapestStiffness
 from vsacli.studies.optimisation.joint_costs import asked_size, run_costs
 from vsacli.studies.optimisation.optimum import JointOptimum, Optimum, TimingOptimum, TotalCost
 from vsacli.studies.optimisation.paced_joints import PacedJoint
@@ -33,6 +33,7 @@ from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_raised_stiffness
 from vsacli.studies.remedies.combination import Combination
 from vsacli.studies.remedies.combined_search import CombinedSearch
+from vsacli.studies.remedies.smallest_changes import STRICTER
 from vsacli.studies.remedies.task import Task
 from vsacli.trajectory.trajectory import Trajectory
 
