@@ -51,9 +51,6 @@ FINER = 10
 MOST_INSTANTS = 300_000
 """Instants of a remedy that are looked at: the steps of longer ones are divided into fewer parts."""
 
-STEPS = slice(None, None, 2)
-"""The instants of a load that are steps."""
-
 
 @dataclass(frozen=True)
 class Task:
