@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
+from samples.marks import slow
 
 from vsacli import load_robot, load_trajectory
 from vsacli.base.flags import LIMITS
@@ -43,6 +44,23 @@ stiffness:
   times: [0.3, 1.2]
   transition: 0.05                # s, much too short
 """
+
+
+COURSE = np.polynomial.Polynomial([0, 0, 0, 0, 35, -84, 70, -20])
+"""From 0 to 1 at rest."""
+
+
+def recorded_motion(path, rate, start=0.0, derivatives=0):
+    """The motion of the paper in 0.45 s, too fast for 850 N m/rad, as a recording with even stamps."""
+    time = np.arange(round(0.45 * rate) + 1) / rate
+    columns = {"time": start + time}
+    for order, name in enumerate(("q", "dq", "ddq", "d3q", "d4q")[: derivatives + 1]):
+        for joint, end in (("base", np.pi / 2), ("shoulder", np.pi / 4), ("elbow", -np.pi / 3)):
+            columns[f"{joint}.{name}"] = end * COURSE.deriv(order)(time / 0.45) / 0.45**order
+    for joint, stiffness in (("base", 850), ("shoulder", 830), ("elbow", 850)):
+        columns[f"{joint}.stiffness"] = np.full(len(time), float(stiffness))
+    table = np.stack(list(columns.values()), axis=1)
+    np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
 
 
 def changed_lines(before, after):
@@ -103,6 +121,52 @@ def test_a_slower_motion_lasts_whole_periods(tmp_path, vsacli):
     assert vsacli("export", "fixed.h5", "--rate", 500, "-o", "fixed.csv").code == 0
 
 
+@pytest.mark.parametrize(
+    ("rate", "start", "derivatives", "asked"),
+    [
+        (500, 0.0, 0, None),
+        slow(963, 1.7e9, 0, None),
+        slow(500, 0.0, 4, None),
+        slow(1000, 0.0, 0, 500),
+    ],
+    ids=["record", "963 Hz since 1970", "all derivatives", "with a rate"],
+)
+def test_a_slower_recording_keeps_its_rate_over_whole_periods(
+    tmp_path, vsacli, rate, start, derivatives, asked
+):
+    """It had as many samples, further apart: 500 Hz became 487.013 Hz, at which nothing runs."""
+    recorded_motion(tmp_path / "fast.csv", rate, start, derivatives)
+    task, recorded = "fast.csv", rate
+    if asked:
+        task, rate = "fast.yaml", asked
+        (tmp_path / task).write_text(
+            f"format: vsacli-trajectory/1\nname: fast\nrate: {asked}\n"
+            "position: {type: csv, file: fast.csv}\nstiffness: {type: csv, file: fast.csv}\n"
+        )
+    done = vsacli("check-feasibility", ROBOT, task, "--suggest", "--json")
+    remedies = json.loads(done.out)["suggestions"]["remedies"]
+    slower = [number for number, each in enumerate(remedies, 1) if "slow_down" in each]
+    assert {"slow_down", "stiffness_offset"} <= {key for number in slower for key in remedies[number - 1]}
+    for number in slower:
+        written = ("--write-fixed", f"fixed-{number}.yaml", "--remedy", number)
+        assert vsacli("check-feasibility", ROBOT, task, *written).code == 3
+        assert vsacli("check-feasibility", ROBOT, f"fixed-{number}.yaml").code == 0
+        assert vsacli("invdyn", ROBOT, f"fixed-{number}.yaml", "-o", f"fixed-{number}.h5").code == 0
+        export = vsacli("export", f"fixed-{number}.h5", "--rate", rate, "-o", f"fixed-{number}.csv.gz")
+        assert export.code == 0, export.err
+        trajectory = load_trajectory(tmp_path / f"fixed-{number}.yaml", load_robot(ROBOT))
+        periods = remedies[number - 1]["slow_down"]["duration"] * rate
+        assert periods == pytest.approx(round(periods), abs=1e-6)
+        assert trajectory.samples == round(periods) + 1
+        if not asked:  # then a changed stiffness makes known steps of it
+            assert bool(trajectory.estimates) == (not derivatives)
+        # through the same positions, later: stamps since 1970 are off by 1e-7 s, the motion has 8 rad/s
+        moved = trajectory.at(trajectory.times.block(0, trajectory.samples)).q[:, 0]
+        lasted = round(0.45 * recorded) / recorded / 0.45
+        expected = np.pi / 2 * COURSE(np.linspace(0, lasted, trajectory.samples))
+        np.testing.assert_allclose(moved, expected, rtol=0, atol=2e-6)
+
+
 def test_another_profile_leaves_the_rest_of_the_file(tmp_path, vsacli):
     _, fixed = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_profile")
     assert "  end: [90 deg, 45 deg, -60 deg]  # as in the paper" in fixed
@@ -122,9 +186,10 @@ def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli)
     assert base.startswith("base: stiffness is 850 N m/rad at t = 0.12")
     # statics of the two outer links, with both springs tight, as the report of the arm at rest has it
     assert shoulder.startswith("shoulder: joint-side torque of motor 1 is ")
-    assert shoulder.endswith(
-        "even at rest, above its limit of 2: no slower motion and no constant stiffness helps"
-    )
+    assert "even at rest, above its limit of 2: no slower motion and no constant stiffness helps" in shoulder
+    # of the 819.4 N m/rad that gravity asks for at rest, with a margin of 1 %
+    assert ", since with 827.7 N m/rad, the least it may have, joint-side torque of motor 1 is " in shoulder
+    assert shoulder.endswith(" s, above its limit of 2")
     assert heading.startswith(
         "suggestions, with any one of which every step of all joints but shoulder has a margin"
     )

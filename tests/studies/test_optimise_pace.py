@@ -6,17 +6,17 @@ import math
 
 import numpy as np
 import pytest
-from samples.command_line import ROBOT
 from samples.marks import slow
 from samples.remedies import pendulum, rest_to_rest
 
-from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
+from vsacli import inverse_dynamics, load_trajectory, optimize
 from vsacli.studies.optimisation.cheapest_pace import CheapestPaceSearch
 from vsacli.studies.optimisation.criteria import CRITERIA, Scale
 from vsacli.studies.optimisation.paced_joints import PacedJoint
 from vsacli.studies.optimisation.paced_motion import PacedMotion
 from vsacli.studies.optimisation.paced_search import instants_of
 from vsacli.studies.optimisation.paced_splines import PacedSpaces
+from vsacli.studies.optimisation.periods import Ends
 from vsacli.studies.optimisation.retimed import retimed
 from vsacli.studies.optimisation.spline_space import SplineSpace
 
@@ -43,7 +43,7 @@ def search(robot, trajectory, criterion, space):
 
     motion = PacedMotion(robot, trajectory, instants_of(trajectory, DURATION))
     joint = PacedJoint(motion, 0, 0.01, CRITERIA[criterion](), Scale(SIZE, DURATION))
-    return InSpace(motion, [joint], [], False, 0, lambda: None).best()
+    return InSpace(motion, [joint], [], Ends(), 0, lambda: None).best()
 
 
 def cost(robot, trajectory, criterion, pace):
@@ -130,12 +130,29 @@ def test_a_motion_that_repeats_itself_goes_on_doing_so(tmp_path):
     assert found.trajectory.duration == pytest.approx(0.25, rel=1e-12)
 
 
-def test_what_neither_rests_nor_repeats_itself_keeps_its_timing(tmp_path):
-    arm = load_robot(ROBOT)
+@pytest.mark.slow
+@pytest.mark.parametrize("criterion", ["torque", "time"])
+def test_ends_that_move_go_on_as_commanded(tmp_path, criterion):
+    """Three tenths of a swing: position and four derivatives at both ends are no one's to choose."""
     path = tmp_path / "part.yaml"
     path.write_text(
-        "format: vsacli-trajectory/1\nname: part\nduration: 0.3\nstiffness: {type: constant, value: 1000}\n"
-        "position: {type: sinusoids, frequency: 1, offset: 0, sine: [0.1]}\n"
+        "format: vsacli-trajectory/1\nname: part\nduration: 0.3\nrate: 800\n"
+        "stiffness: {type: constant, value: 2000}\n"
+        "position: {type: sinusoids, frequency: 1, offset: 0.2, sine: [0.4]}\n"
     )
-    with pytest.raises(InputError, match=r"part begins or ends in motion.* or end as it begins"):
-        optimize(arm, load_trajectory(path, arm), "torque", "timing")
+    robot = pendulum().replace({"joints.0.actuator.motor.max_torque": 250.0})
+    asked = load_trajectory(path, robot)
+    found = optimize(robot, asked, criterion, "timing", margin=0.03)
+    before, after = (inverse_dynamics(robot, each) for each in (asked, found.trajectory))
+    assert after.report.verdict == "ok"
+    for name in ("q", "dq", "ddq", "d3q", "d4q"):
+        rows, expected = (getattr(run, name)[[0, -1], 0] for run in (after, before))
+        # three derivatives of the pace vanish there but for the rounding of a spline over 1/24 of the path
+        np.testing.assert_allclose(rows, expected, rtol=1e-6, err_msg=name)
+    if criterion == "time":
+        assert found.timing.after == pytest.approx(found.trajectory.duration)
+        assert found.timing.after < 0.7 * asked.duration
+        assert math.isnan(found.timing.uniform)
+    else:
+        assert found.trajectory.duration == pytest.approx(asked.duration, rel=1e-12)
+        assert found.together.after < 1 + 1e-6  # next to nothing to gain here

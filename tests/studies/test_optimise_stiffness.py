@@ -15,7 +15,6 @@ from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, op
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.drive import drive
 from vsacli.studies.optimisation.criteria import CRITERIA
-from vsacli.studies.optimisation.joint_costs import cost
 from vsacli.studies.optimisation.spline_space import SplineSpace
 from vsacli.studies.optimisation.stiffness import StiffnessSearch
 from vsacli.studies.remedies.acceptance import Acceptance
@@ -59,6 +58,12 @@ def search(arm, load, criterion, space):
     return found.best()
 
 
+def driven(robot, load, rows):
+    """What the motors of the shoulder do with a stiffness and its derivatives, (3, instants)."""
+    commanded = {**load.command.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
+    return drive(robot.joints[SHOULDER], load.command._replace(commanded=commanded))
+
+
 def costs(arm, load, criterion, rows):
     """Of many profiles at once, rows (3, profiles, instants); infinite where one is not admitted."""
     joint, profiles = arm.joints[SHOULDER], rows.shape[1]
@@ -86,7 +91,7 @@ def costs(arm, load, criterion, rows):
 @pytest.mark.parametrize("criterion", ["torque", slow("peak"), slow("energy")])
 def test_no_profile_of_a_dense_grid_is_better(arm, load, criterion):
     """Of splines with two shapes, so that the grid has two dimensions; refined about its best four times."""
-    spaces = lambda span, _: SplineSpace.at_rest(span, 1)  # noqa: E731
+    spaces = lambda span, *_: SplineSpace.at_rest(span, 1)  # noqa: E731
     found = search(arm, load, CRITERIA[criterion](), spaces)
     basis = SplineSpace.at_rest((load.time[0], load.time[-1]), 1).basis(load.time, 3)
     centre, width = np.array([3000.0, 3000.0]), 2500.0
@@ -105,7 +110,7 @@ def test_scipys_optimiser_comes_to_the_same_cost(arm, load):
     """Without bounds, since none of them holds this motion back."""
     from scipy.optimize import minimize
 
-    found = search(arm, load, CRITERIA["torque"](), lambda span, _: SplineSpace.periodic(span, 8))
+    found = search(arm, load, CRITERIA["torque"](), lambda span, *_: SplineSpace.periodic(span, 8))
     basis = SplineSpace.periodic((load.time[0], load.time[-1]), 8).basis(load.time, 3)
 
     def other_cost(amounts):
@@ -142,7 +147,7 @@ def test_like_motors_heat_least_where_their_torques_are_least(arm, load):
         for robot, name in ((wound, "copper"), (arm, "torque"))
     )
     heat, torque = (
-        cost(wound.joints[SHOULDER], load, CRITERIA["copper"](), coolest.rows),
+        CRITERIA["copper"]().of(wound.joints[SHOULDER], driven(wound, load, coolest.rows), load.time),
         costs(arm, load, "torque", least.rows[:, None]),
     )
     # R/K^2 times the squares of both motors over the time; the step sums differ by less than the tolerance.

@@ -172,8 +172,35 @@ def test_corridor_and_stiffness_limit_exclude_each_other():
     robot = changed(SHOULDER, limits=Limits(stiffness=(0.0, 820.0)))
     assert reason(robot, rest_to_rest(4.0, (850.0, 790.0, 850.0))) == (
         "shoulder: stiffness is 790 N m/rad at t = 0.000 s, even at rest, below the 827.7 its load allows: "
-        "no slower motion and no constant stiffness helps"
+        "no slower motion and no constant stiffness helps, since with 827.7 N m/rad, the least it may have, "
+        "stiffness is 827.7 N m/rad at t = 0.000 s, above its limit of 820"
     )
+
+
+@pytest.mark.parametrize(
+    ("asked", "change", "what", "limit"),
+    [
+        (900.0, {"limits": Limits(stiffness=(0.0, 820.0))}, "stiffness is 900 N m/rad", 820),
+        slow(830.0, {"motor": {"max_torque": 2.0}}, "joint-side torque of motor 1 is 28.", 2),
+        (
+            900.0,
+            {"spring": (dataclasses.replace(CUBIC, max_deflection=0.02),) * 2},
+            "deflection of spring 1 is 0.1",
+            0.02,
+        ),
+    ],
+    ids=["stiffness", "torque", "deflection"],
+)
+def test_the_limit_in_the_way_is_named(asked, change, what, limit):
+    """It is the first that a stiffness which the load allows exceeds, with its value and time."""
+    found = reason(changed(SHOULDER, **change), rest_to_rest(4.0, (850.0, asked, 850.0)))
+    at_rest, softest = found.split(": no slower motion and no constant stiffness helps, since with ")
+    assert at_rest.startswith(f"shoulder: {what}")
+    assert at_rest.endswith(f", even at rest, above its limit of {limit}")
+    # 819.4 N m/rad at rest, of which the margin is 1 %
+    assert softest.startswith("827.7 N m/rad, the least it may have, ")
+    assert " at t = " in softest
+    assert softest.endswith(f" s, above its limit of {limit}")
 
 
 @pytest.mark.parametrize(

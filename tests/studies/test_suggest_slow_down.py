@@ -30,7 +30,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def step_of(trajectory):
-    """By how much the next factor is larger: a period of the rate, or 1e-4 where steps are recorded."""
+    """By how much the next factor is larger: a period of the rate, or 1e-4 where stamps are not even."""
     return 1 / Factors.of(trajectory).denominator
 
 
@@ -160,8 +160,9 @@ def test_recorded_steps_are_stretched():
     slower = trajectory.stretched(factor)
     assert slower.times.span == (2.0, pytest.approx(2.0 + 0.5 * factor))
     check_smallest(vsa_3r(), trajectory, factor)
-    # interpolation between 201 samples moves the accelerations by less than a thousandth
-    assert factor == pytest.approx(slow_down(vsa_3r(), rest_to_rest(0.5, rate=20_000.0)), rel=1e-3)
+    # the next whole period of 2.5 ms; interpolation between 201 samples moves accelerations by a thousandth
+    finest = slow_down(vsa_3r(), rest_to_rest(0.5, rate=20_000.0))
+    assert factor == pytest.approx(math.ceil(200 * finest) / 200, rel=1e-12)
 
 
 def test_wrench_counts_and_is_stretched_too():

@@ -11,7 +11,7 @@ from samples.clean_records import MOTIONS, SENSORS, clean_records
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.trajectory.recorded.even_stamps import elapsed_times, resolution, rounding_notes
+from vsacli.trajectory.recorded.even_stamps import elapsed_times, even_rate, resolution, rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.samples import Samples
@@ -221,6 +221,24 @@ def test_rounded_stamps_of_even_samples_are_even(start: float, digits: int, rate
     even = np.diff(elapsed_times(stamps)) * rate
     assert np.abs(even - np.round(even)).max() < 1e-3
     assert rounding_notes(stamps)[0].endswith("s from even, which is their rounding, and are taken for even")
+
+
+@pytest.mark.parametrize("rate", [1000, 963, 500, 1e4 / 3, 29.97])
+@pytest.mark.parametrize(("start", "digits"), [(0, 17), (5, 6), (1.7e9, 7)])
+def test_the_rate_of_even_stamps_is_the_one_of_fewest_digits(start: float, digits: int, rate: float):
+    found = even_rate(np.round(start + np.arange(501) / rate, digits))
+    assert found is not None
+    if rate == 1e4 / 3:  # has no few digits; as good as the ends are known
+        assert found == pytest.approx(rate, rel=2e-5)
+    else:
+        assert found == rate
+
+
+def test_stamps_that_are_not_even_or_miss_some_have_no_rate():
+    rng = np.random.default_rng(0)
+    time = np.arange(500) / 500
+    for stamps in (time + 1e-4 * rng.uniform(-1, 1, 500), np.delete(time, 100), time**1.1):
+        assert even_rate(stamps) is None
 
 
 def test_other_stamps_stay_as_they_are():

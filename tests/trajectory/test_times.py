@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from vsacli.base.errors import InputError
-from vsacli.trajectory.times import RecordedTimes, UniformTimes
+from vsacli.trajectory.times import RecordedTimes, ResampledTimes, UniformTimes
 
 
 @pytest.mark.parametrize(("duration", "rate"), [(4.0, 1000.0), (0.3, 1000.0), (0.1, 30.0), (1 / 3, 12345.0)])
@@ -26,11 +26,29 @@ def test_last_time_is_the_duration_even_where_k_duration_over_n_is_not():
     assert UniformTimes(duration, n / duration).block(0, n + 1)[-1] == duration
 
 
-@pytest.mark.parametrize("times", [UniformTimes(1.0, 10.0), RecordedTimes(np.linspace(0, 1, 11))])
+@pytest.mark.parametrize(
+    "times", [UniformTimes(1.0, 10.0), ResampledTimes(2.0, 3.0, 10.0), RecordedTimes(np.linspace(0, 1, 11))]
+)
 def test_blocks_are_slices_of_the_whole(times):
     whole = times.block(0, 11)
     for start, stop in [(0, 4), (4, 8), (8, 11), (8, 99), (11, 12), (3, 3)]:
         np.testing.assert_array_equal(times.block(start, stop), whole[start:stop])
+
+
+def test_resampled_times_keep_their_rate_and_their_ends():
+    times = ResampledTimes(1.7e9, 1.7e9 + 0.5, 500.0)
+    slower = times.stretched(1.028)
+    assert (times.samples, slower.samples) == (251, 258)
+    assert slower.span == (1.7e9, 1.7e9 + 0.514)
+    whole = slower.block(0, 258)
+    assert (whole[0], whole[-1]) == slower.span
+    # stamps since 1970 are multiples of 2.4e-7 s
+    np.testing.assert_allclose(np.diff(whole), 0.002, rtol=0, atol=5e-7)
+    assert ResampledTimes(2.0, 2.25, 10.0).notes == (
+        "the rate is 8 per second, not 10: whole steps in 0.25 s",
+    )
+    with pytest.raises(InputError, match="duration and rate must be positive"):
+        ResampledTimes(0.0, 1.0, 0.0)
 
 
 def test_rate_that_does_not_fit_is_noted():

@@ -21,7 +21,7 @@ from vsacli.cli.file_names import FOLDER
     type=click.Choice(["double", "float"]),
     default="double",
     show_default=True,
-    help="Type of all numbers.",
+    help="Type of all numbers; float is refused where it would spoil the results.",
 )
 @click.option(
     "--wrench",

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Self
 
 import numpy as np
 
 COARSER = float(np.finfo(np.float32).eps / np.finfo(np.float64).eps)
 """Rounding in single precision, relative to that in double precision."""
+
+_SMALLEST, _LARGEST = float(np.finfo(np.float32).tiny), float(np.finfo(np.float32).max)
 
 
 class OfRounding(float):
@@ -30,3 +33,12 @@ class OfRounding(float):
     def in_single_precision(self) -> float:
         """The tolerance there."""
         return float(self * COARSER**self.power)
+
+
+def single(number: float) -> float:
+    """Return a constant as single precision has it: a larger tolerance; zero only for zero."""
+    if isinstance(number, OfRounding):
+        number = number.in_single_precision()
+    if number and abs(number) < _SMALLEST:
+        return math.copysign(_SMALLEST, number)
+    return math.copysign(math.inf, number) if abs(number) > _LARGEST else number

@@ -62,7 +62,8 @@ class TrajectoryFile:
     )
     slow_down: float = number(
         units.DIMENSIONLESS,
-        "factor by which everything is passed more slowly than declared and recorded here",
+        "factor by which everything is passed more slowly than declared and recorded here; steps of a fit at"
+        " equally spaced times keep their `rate`",
         check=POSITIVE,
         default=1.0,
     )

@@ -141,17 +141,59 @@ class RecordedTimes:
         return RecordedTimes(stretch(self.time, self.time[0], factor), self.notes)
 
 
-def uniform_times_over(span: tuple[float, float], rate: float) -> RecordedTimes:
-    """Equally spaced times from the first to the last of a span, in s, at about `rate` per second.
+@dataclass(frozen=True)
+class ResampledTimes:
+    """Equally spaced times over the span of a recording; like declared ones they keep their rate.
+
+    Attributes:
+        first: first time, s.
+        last: last time, s.
+        rate: steps per second that are asked for.
 
     Raises:
         InputError: the rate is not possible.
     """
-    first, last = span
-    uniform = UniformTimes(last - first, rate)
-    time = first + uniform.block(0, uniform.samples)
-    time[-1] = last
-    return RecordedTimes(time, uniform.notes)
+
+    first: float
+    last: float
+    rate: float
+
+    def __post_init__(self) -> None:
+        _ = self._elapsed
+
+    @property
+    def _elapsed(self) -> UniformTimes:
+        return UniformTimes(self.last - self.first, self.rate)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """As of `UniformTimes`."""
+        return self._elapsed.notes
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """First and last time, s."""
+        return (self.first, self.last)
+
+    @property
+    def samples(self) -> int:
+        """Number of steps, both ends included."""
+        return self._elapsed.samples
+
+    def block(self, start: int, stop: int) -> FloatArray:
+        """Times of the steps start..stop-1; like a slice, it ends where the steps end."""
+        time = self.first + self._elapsed.block(start, stop)
+        if stop >= self.samples > start:
+            time[-1] = self.last
+        return time
+
+    def from_zero(self) -> UniformTimes:
+        """The same times, counted from the first."""
+        return self._elapsed
+
+    def stretched(self, factor: float) -> ResampledTimes:
+        """A longer span at the same rate."""
+        return ResampledTimes(self.first, stretch(self.last, self.first, factor), self.rate)
 
 
 def stretch(time: _Time, first: float, factor: float) -> _Time:

@@ -21,6 +21,7 @@ from vsacli.control.codegen.feedback_function import feedback_linearization_func
 from vsacli.control.codegen.header import comment, header_text
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.parameters import check_parameters, with_parameters
+from vsacli.control.codegen.precision_check import check_single_precision
 from vsacli.control.codegen.readme import readme_text
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.scalar import DIGEST, source_text
@@ -69,7 +70,8 @@ def generate(
 
     Raises:
         InputError: something of the robot has no evaluation in a bounded number of operations, or too many;
-            or none without loops; a pattern fits no number, or one that cannot be an argument.
+            or none without loops; single precision misses the values of the self-test; a pattern fits no
+            number, or one that cannot be an argument.
     """
     prefix = prefix_of(robot)
     title = f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
@@ -80,10 +82,13 @@ def generate(
         functions, omitted = _functions(robot, wrench, chosen)
         if not loops:
             _check_loops(robot, functions)
+        reference = Reference(robot, chosen)
+        if precision == "float":
+            check_single_precision(robot, functions, reference)
         files = {
             f"{prefix}.h": header_text(prefix, robot, functions, precision, head),
             f"{prefix}.c": source_text(prefix, functions, precision, head),
-            f"{prefix}_test.c": self_test_text(prefix, functions, Reference(robot, chosen), precision, head),
+            f"{prefix}_test.c": self_test_text(prefix, functions, reference, precision, head),
             f"{prefix}.py": binding_text(prefix, functions, precision, about),
             **build_files(prefix),
             "README.md": readme_text(prefix, robot, functions, precision, omitted),

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from vsacli.compute.rounding import OfRounding
+from vsacli.compute.rounding import single
 from vsacli.compute.tracing import Kind, Program, Symbol, is_of_calls
 from vsacli.compute.tracing.c_code import Dialect, Names, Writer, digits, table_declarations
 from vsacli.compute.tracing.c_functions import VALUES, CallingCode
@@ -77,15 +77,13 @@ class Scalar(Dialect):
 
     def constant(self, value: float | int | bool, kind: Kind) -> str:
         """As of `Dialect`."""
-        if self._suffix and isinstance(value, OfRounding):
-            value = value.in_single_precision()
-        return super().constant(value, kind)
+        return super().constant(single(value) if self._suffix and kind is Kind.REAL else value, kind)
 
     def real(self, number: float) -> str:
         """As of `Dialect`; NAN and INFINITY of math.h are floats."""
         if not self._suffix:
             return digits(number).replace("INFINITY", "HUGE_VAL").replace("NAN", "(double)NAN")
-        text = digits(_in_range(number))
+        text = digits(single(number))
         if "N" in text:
             return text
         return text.replace(")", "f)") if text.endswith(")") else f"{text}f"
@@ -160,7 +158,7 @@ class Scalar(Dialect):
 
 def _holds_float(value: float) -> bool:
     """Whether single precision has all digits of a number that is not below its range."""
-    return math.isnan(value) or (_in_range(value) == value and float(np.float32(value)) == value)
+    return math.isnan(value) or (single(value) == value and float(np.float32(value)) == value)
 
 
 def _holds_integer(largest: int) -> Callable[[float], bool]:
@@ -177,15 +175,6 @@ _SMALLER_TYPES = {
 
 BYTES = {"signed char": 1, "short": 2, "float": 4, "double": 8}
 """Of an entry of each type."""
-
-
-def _in_range(number: float) -> float:
-    """What stands for a number among those of single precision: no number but zero becomes zero."""
-    limits = np.finfo(np.float32)
-    smallest, largest = float(limits.tiny), float(limits.max)
-    if number and abs(number) < smallest:
-        return math.copysign(smallest, number)
-    return math.copysign(math.inf, number) if abs(number) > largest else number
 
 
 def source_text(prefix: str, functions: Sequence[Function], precision: str, head: str) -> str:

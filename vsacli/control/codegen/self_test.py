@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from vsacli.base.arrays import FloatArray, over_time
 from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.compute.tracing.c_code import digits
+from vsacli.compute.tracing.single_precision import in_single_precision
 from vsacli.control.codegen.interface import Array, Function
 from vsacli.control.codegen.parameters import PARAMETERS, parameters_structure
 from vsacli.control.codegen.scalar import included
@@ -38,6 +40,18 @@ Arrays = dict[str, FloatArray]
 """Arrays (cases, ...) by name."""
 
 
+class Comparison(NamedTuple):
+    """How the self-test compares an array.
+
+    Attributes:
+        scale: what differences are relative to; 0 if there may be none, as of flags.
+        bound: values beyond count as this one.
+    """
+
+    scale: float
+    bound: float
+
+
 class Reference:
     """Inputs and results of the generated functions of a robot."""
 
@@ -45,6 +59,7 @@ class Reference:
         """Of functions that take the chosen numbers as an argument, if they take any."""
         self._robot = robot
         self._rng = np.random.default_rng(1)
+        self._results: dict[str, Arrays] = {}
         command = self._command()
         self._inputs = {
             "motion": {name: command[name] for name in LinkTorques(robot).arguments.shapes},
@@ -64,20 +79,37 @@ class Reference:
         ]
 
     def results(self, function: Function) -> Arrays:
-        """What the function computes from them, by the names of the arrays of its result."""
-        arguments = self.inputs(function)
+        """Return the results of a function for these inputs, by the names of the arrays of its result."""
+        if function.name not in self._results:
+            with np.errstate(all="ignore"):
+                cases = [_computed(function, row) for row in self._entries(function)]
+            self._results[function.name] = _result_arrays(function, np.array(cases).T)
+        return self._results[function.name]
+
+    def single_results(self, function: Function) -> Arrays:
+        """Return the results that code in single precision has."""
+        rows = in_single_precision(function.program, self._entries(function).T)
+        return _result_arrays(function, np.array(rows, dtype=np.float64))
+
+    def comparison(self, function: Function, name: str) -> Comparison:
+        """Return the rule by which the self-test compares an array of the results of a function."""
+        values = self.results(function)[name]
+        bound = BOUND * self._largest_stiffness if name == BOUNDED else np.inf
+        scale = float(np.abs(np.minimum(values, bound)[np.isfinite(values)]).max(initial=0.0))
+        bits = next(array.bits for array in function.result.arrays if array.name == name)
+        return Comparison(0.0 if bits else scale, scale if name == BOUNDED else np.inf)
+
+    def _entries(self, function: Function) -> FloatArray:
+        """All entries of the arguments, (CASES, entries)."""
         entries = [
-            array.reshape(CASES, -1)
-            for (_, structure), arrays in zip(function.arguments, arguments, strict=True)
-            for array in (arrays[member.name] for member in structure.arrays)
+            arrays[member.name].reshape(CASES, -1)
+            for (_, structure), arrays in zip(function.arguments, self.inputs(function), strict=True)
+            for member in structure.arrays
         ]
-        with np.errstate(all="ignore"):
-            cases = [_computed(function, row) for row in np.concatenate(entries, axis=1)]
-        found = function.result.layout.arrays(np.array(cases).T)
-        return {name: over_time(array) for name, array in found.items()}
+        return np.concatenate(entries, axis=1)
 
     @property
-    def largest_stiffness(self) -> float:
+    def _largest_stiffness(self) -> float:
         """Largest stiffness demanded, of joints of either kind."""
         return float(np.nanmax(self._inputs["command"]["stiffness"]))
 
@@ -142,6 +174,11 @@ def _gains(shape: Sequence[int]) -> Arrays:
         "position_integral": np.full((CASES, joints), position[0]),
         "stiffness_integral": np.full((CASES, joints), stiffness[0]),
     }
+
+
+def _result_arrays(function: Function, rows: FloatArray) -> Arrays:
+    found = function.result.layout.arrays(rows)
+    return {name: over_time(array) for name, array in found.items()}
 
 
 def _computed(function: Function, entries: FloatArray) -> list[float]:
@@ -226,7 +263,6 @@ def _initializer(values: FloatArray, bits: bool) -> str:
 
 
 def _test(prefix: str, function: Function, reference: Reference) -> Iterator[str]:
-    results = reference.results(function)
     own = function.name
     yield f"static int test_{own}(void)\n{{"
     yield "    int failures = 0;"
@@ -236,13 +272,10 @@ def _test(prefix: str, function: Function, reference: Reference) -> Iterator[str
     given = ", ".join(f"&{own}_{name}[n]" for name, _ in function.arguments)
     yield f"        {prefix}_{own}({given}, &found);"
     for array in function.result.arrays:
-        values = results[array.name]
-        if array.name == BOUNDED:
-            values = np.minimum(values, BOUND * reference.largest_stiffness)
-        scale = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+        scale, bound = reference.comparison(function, array.name)
         for entry in array.entries:
             both = f"found.{entry}", f"expected->{entry}"
-            if array.name == BOUNDED:
-                both = f"at_most({both[0]}, {digits(scale)})", f"at_most({both[1]}, {digits(scale)})"
+            if np.isfinite(bound):
+                both = f"at_most({both[0]}, {digits(bound)})", f"at_most({both[1]}, {digits(bound)})"
             yield (f'        failures += differs("{own}: {entry}", n, {", ".join(both)}, {digits(scale)});')
     yield "    }\n    return failures;\n}"

@@ -11,7 +11,8 @@ from vsacli.studies.optimisation.interior_point import Minimum
 from vsacli.studies.optimisation.paced_joints import CLEARANCE, PacedJoint
 from vsacli.studies.optimisation.paced_motion import PacedMotion
 from vsacli.studies.optimisation.paced_search import PacedSearch, Start
-from vsacli.studies.optimisation.paced_splines import PacedSpaces
+from vsacli.studies.optimisation.paced_splines import PacedSpaces, Pacing
+from vsacli.studies.optimisation.periods import Ends
 from vsacli.studies.optimisation.separable import Group, SeparableProblem
 from vsacli.studies.optimisation.smoothing import smoothed_minimum
 
@@ -36,9 +37,10 @@ class CheapestPaceSearch(PacedSearch):
         motion: along the path.
         joints: cost and bounds of each.
         varied: the joints whose stiffness varies as well, by index.
-        repeating: whether the motion ends as it begins, on its way.
+        ends: of the motion.
         seed: of the starts that are drawn.
         progress: called after each search.
+        near: pace and stiffness to begin near, scaled to the duration, where the path itself is infeasible.
     """
 
     pieces = (12, 24, 48)
@@ -52,21 +54,23 @@ class CheapestPaceSearch(PacedSearch):
         motion: PacedMotion,
         joints: Sequence[PacedJoint],
         varied: Sequence[int],
-        repeating: bool,
+        ends: Ends,
         seed: int,
         progress: Callable[[], None],
+        near: Pacing | None = None,
     ) -> None:
         super().__init__(motion, joints, varied, seed, progress)
-        self._repeating = repeating
+        self._ends, self._near = ends, near
 
     def _spaces(self, pieces: int) -> PacedSpaces:
-        kind = PacedSpaces.repeating if self._repeating else PacedSpaces.of
-        return kind(self._span, pieces, self._varied).lasting_as_commanded()
+        return PacedSpaces.of(self._span, pieces, self._varied, self._ends).lasting_as_commanded()
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
         """The pace as commanded with some stiffnesses, and drawn paces with the first of these."""
         asked = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
         even = np.ones_like(self._s)
+        if self._near is not None:
+            even, asked = self._lasting(self._near.pace()(self._s)), self._near.stiffness_at(self._s)
         first = self._levelled(spaces, spaces.fitted(self._s, even, asked))
         inside = first if self._kept(spaces, first) else None
         stiffer = [
@@ -75,10 +79,14 @@ class CheapestPaceSearch(PacedSearch):
         ]
         wanted = [spaces.fitted(self._s, even, stiffness) for stiffness in stiffer]
         wanted += [
-            spaces.fitted(self._s, drawn * self._span[1] / np.trapezoid(drawn, self._s), asked)
-            for drawn in self._drawn(*DRAWN_PACES)
+            spaces.fitted(self._s, self._lasting(even * drawn), asked) for drawn in self._drawn(*DRAWN_PACES)
         ]
         return [(self._levelled(spaces, unknowns), inside) for unknowns in wanted]
+
+    def _lasting(self, pace: FloatArray) -> FloatArray:
+        """A pace scaled to the duration as commanded, (instants,)."""
+        scaled: FloatArray = pace * (self._span[1] / np.trapezoid(pace, self._s))
+        return scaled
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
         stiffness = {key: LIFTED * row for key, row in rows.items() if key is not None}

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import STIFFNESS
 from vsacli.robot.model import Robot
 from vsacli.studies.optimisation.criteria import CRITERIA, Criterion
 from vsacli.studies.optimisation.optimum import Optimum
-from vsacli.studies.optimisation.periods import rests
 from vsacli.studies.remedies.acceptance import Acceptance
 from vsacli.studies.remedies.suggestions import Remedy
 from vsacli.studies.remedies.task import Task
@@ -30,19 +30,14 @@ def varied_joints(robot: Robot, vary: str) -> list[int]:
     return [] if vary == TIMING else chosen_joints(robot)
 
 
-def check_time_can_vary(trajectory: Trajectory, vary: str) -> None:
-    """Refuse to minimise the time of a motion whose timing cannot vary.
+def check_timing_varies(vary: str) -> None:
+    """Refuse to minimise the time where the timing does not vary.
 
     Raises:
-        InputError: it cannot, or it is not what varies.
+        InputError: it does not.
     """
     if vary == STIFFNESS.key:
         raise InputError.one(f"time is what {TIMING!r} varies for, or {BOTH!r}, not {vary!r}")
-    if not rests(trajectory):
-        raise InputError.one(
-            f"{trajectory.name} begins or ends in motion, and another timing would change how fast; vary the "
-            "stiffness, or let it begin and end at rest, sinusoids by a ramp"
-        )
 
 
 def chosen_joints(robot: Robot) -> list[int]:
@@ -71,7 +66,10 @@ def checked_criterion(robot: Robot, name: str, joints: Sequence[int]) -> Criteri
     return criterion
 
 
-def confirmed(what: Optimum, trajectory: Trajectory) -> bool:
-    """Whether a run keeps margin and limits."""
+def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
+    """Return times since the start, s, at which a run misses margin or limits; None if it keeps them.
+
+    Between the steps, too; empty if it is the self-check alone that fails.
+    """
     task = Task(Acceptance(what.robot, what.margin), trajectory)
-    return task.falls_short(Remedy(0.0, what.robot, trajectory)) is None
+    return task.falls_short(Remedy(0.0, what.robot, trajectory))

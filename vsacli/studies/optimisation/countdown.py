@@ -23,3 +23,4 @@ class Countdown:
     def finish(self) -> None:
         """All are."""
         self._progress(self._left)
+        self._left = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from vsacli.base.variables import VARIABLES
 from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import Drive
 from vsacli.robot.joint import Joint
+
+if TYPE_CHECKING:
+    from vsacli.analysis.result import Result
 
 Values = Dual | FloatArray
 """(instants,), which may carry derivatives."""
@@ -99,6 +102,10 @@ class Criterion:
         """By what it is scaled: what it is, of some motion."""
         return self.of(joint, driven, time)
 
+    def of_run(self, result: Result, index: int) -> float:
+        """Return the cost of a joint, by index, over the steps of a run; NaN if any is out of reach."""
+        raise NotImplementedError
+
     def together(self, costs: Sequence[float]) -> float:
         """The cost of all joints; of shares of what they cost as commanded if these are relative."""
         return math.fsum(costs)
@@ -146,6 +153,11 @@ class Torque(Criterion):
         (square,) = self.integrands(joint, driven, None, UNSCALED)
         return math.sqrt(float(self.weights(time)[0] @ square))
 
+    def of_run(self, result: Result, index: int) -> float:
+        """N m (N); by trapezoids between the steps."""
+        square = np.mean(_torques_of(result, index) ** 2, axis=0)
+        return math.sqrt(float(self.weights(result.time)[0] @ square))
+
     def together(self, costs: Sequence[float]) -> float:
         """Root mean square."""
         return math.hypot(*costs) / math.sqrt(len(costs))
@@ -173,6 +185,11 @@ class Copper(Criterion):
         """J."""
         (power,) = self.integrands(joint, driven, None, UNSCALED)
         return float(trapezoidal(time) @ power)
+
+    def of_run(self, result: Result, index: int) -> float:
+        """J, as in the report of the run."""
+        heat = result.report.joints[index].energy.copper_loss
+        return math.nan if heat is None else heat
 
 
 class Energy(Criterion):
@@ -202,6 +219,11 @@ class Energy(Criterion):
         """J."""
         spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven.motor_power))
         return float(np.sum(self.weights(time) * np.stack([spent, driven.elastic_energy])))
+
+    def of_run(self, result: Result, index: int) -> float:
+        """J, as in the report of the run."""
+        spent = result.report.joints[index].energy.spent
+        return spent if self.repeating else spent + float(result.elastic_energy[0, index])
 
     def size(self, joint: Joint, driven: Drive, time: FloatArray) -> float:
         """What passes the motors either way: what they spend may be nothing."""
@@ -240,6 +262,10 @@ class Peak(Criterion):
         """N m (N)."""
         return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven.tau_motor)))
 
+    def of_run(self, result: Result, index: int) -> float:
+        """N m (N)."""
+        return float(np.abs(_torques_of(result, index)).max())
+
     def together(self, costs: Sequence[float]) -> float:
         """The largest."""
         return max(costs)
@@ -259,3 +285,9 @@ def trapezoidal(time: FloatArray) -> FloatArray:
 def _of_motors(joint: Joint, variable: Any) -> list[Any]:
     """The rows of the motors there are."""
     return [variable[motor] for motor in range(joint.actuator.motor_count)]
+
+
+def _torques_of(result: Result, index: int) -> FloatArray:
+    """The torques of the motors of a joint at the steps of a run, (motors, steps)."""
+    torques: FloatArray = result.tau_motor[:, index].T[: result.robot.joints[index].actuator.motor_count]
+    return torques

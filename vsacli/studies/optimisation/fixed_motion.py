@@ -37,13 +37,20 @@ class FixedMotion:
         admissible: its stiffness at them.
         criterion: what is minimised.
         scale: of the cost.
+        reserve: share of each limit of the motors that is kept clear of.
     """
 
     def __init__(
-        self, joint: Joint, load: Load, admissible: Range, criterion: Criterion, scale: Scale
+        self,
+        joint: Joint,
+        load: Load,
+        admissible: Range,
+        criterion: Criterion,
+        scale: Scale,
+        reserve: float = 0.0,
     ) -> None:
         self.joint, self.load, self.admissible = joint, load, admissible
-        self.criterion, self.scale = criterion, scale
+        self.criterion, self.scale, self._clearance = criterion, scale, CLEARANCE + reserve
         self.stiffness = float(np.median(load.command.commanded[STIFFNESS.key]))
         self._carrying = _made_to_carry(joint)
         self._limits = [check for check in limit_checks(joint) if check.variable in OF_MOTORS]
@@ -86,7 +93,7 @@ class FixedMotion:
         for check in self._limits:
             for sign, bound in finite_ends(check):
                 size = abs(bound) or 1.0
-                yield sign * (check.values(of_joint) - bound) / size + CLEARANCE
+                yield sign * (check.values(of_joint) - bound) / size + self._clearance
 
 
 def finite_ends(check: LimitCheck) -> Iterator[tuple[float, float]]:

@@ -46,6 +46,9 @@ ARMIJO = 1e-4
 SHORTEST_STEP = 1e-10
 """Share of a step below which the search gives up: rounding hides what it gains."""
 
+MOST_ADDED = 1e6
+"""Multiple of its diagonal that a matrix may get to be positive definite; steps go down the gradient then."""
+
 MOST_STEPS = 200
 """Steps; twenty to forty are usual."""
 
@@ -119,6 +122,8 @@ def minimise(
     costs = [point.cost]
     for _ in range(MOST_STEPS):
         newton = _Newton(point, multipliers)
+        if newton.factor is None:
+            return Minimum(unknowns, point.cost, found=False)
         step = newton.step(gap / count)
         while gap > last and step.gain <= NEARLY_SOLVED * gap and newton.centred(gap / count):
             gap = max(min(0.2 * gap, gap**1.5), last)
@@ -156,14 +161,15 @@ class _Newton:
     def __init__(self, point: Point, multipliers: FloatArray) -> None:
         self._point, self._multipliers, self._slack = point, multipliers, -point.bounds
         self._stiffening = multipliers / self._slack
-        self._factor = _factor(point, multipliers, self._stiffening)
+        self.factor = _factor(point, multipliers, self._stiffening)
 
     def step(self, barrier: float) -> _Step:
         """The step of both, whose part for the unknowns the Cholesky factor solves."""
         from scipy.linalg import cho_solve
 
+        assert self.factor is not None
         right = -(self._point.gradient + self._point.pull(barrier / self._slack))
-        unknowns = cho_solve(self._factor, right)
+        unknowns = cho_solve(self.factor, right)
         multipliers = (
             barrier / self._slack - self._multipliers + self._stiffening * self._point.changes(unknowns)
         )
@@ -175,18 +181,22 @@ class _Newton:
         return bool(off.max(initial=0.0) <= CENTRED * barrier)
 
 
-def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tuple[FloatArray, bool]:
-    """Of Newton's matrix if it is positive definite, else of a convex one with a little more."""
+def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tuple[FloatArray, bool] | None:
+    """Of Newton's matrix if it is positive definite, else of a convex one with a little more.
+
+    None if that is not possible: numbers overflow, or nothing depends on some unknown.
+    """
     from scipy.linalg import LinAlgError, cho_factor
 
     matrix, added = point.newton_matrix(multipliers, stiffening, convex=False), 0.0
-    while True:
+    while added <= MOST_ADDED and np.isfinite(matrix).all():
         try:
             return cho_factor(matrix + added * np.diag(np.abs(np.diag(matrix))), lower=True)
         except LinAlgError:
             if not added:
                 matrix = point.newton_matrix(multipliers, stiffening, convex=True)
             added = max(10 * added, 1e-12)
+    return None
 
 
 def _line_search(

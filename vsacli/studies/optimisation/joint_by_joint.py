@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import as_name
-from vsacli.robot.joint import Joint
-from vsacli.studies.optimisation.checks import chosen_joints, confirmed
+from vsacli.studies.optimisation.checks import chosen_joints, falls_short
 from vsacli.studies.optimisation.countdown import Countdown
 from vsacli.studies.optimisation.criteria import Criterion
-from vsacli.studies.optimisation.joint_costs import asked_cost, asked_stiffness, cost
+from vsacli.studies.optimisation.divided_steps import as_one_function
+from vsacli.studies.optimisation.joint_costs import run_costs
 from vsacli.studies.optimisation.optimum import JointOptimum, Optimum
 from vsacli.studies.optimisation.periods import periods, rests
 from vsacli.studies.optimisation.spline_space import SplineSpace
@@ -24,12 +26,15 @@ from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
 from vsacli.studies.remedies.motions import Load
-from vsacli.studies.remedies.task import STEPS
+from vsacli.studies.remedies.smallest_changes import STRICTER
 from vsacli.trajectory.trajectory import Trajectory
 
-STRICTER = (0.0, 0.001, 0.01)
-"""Shares by which the rule is stricter, one after the other: what has the margin at the steps may fall short
-of it between them."""
+HALVES = 2
+"""Parts into which a load divides each step by itself."""
+
+LOOKED_AT = 3000
+"""Instants of a period at which bounds are looked at, at least: with 8 for each piece of the spline, a search
+along 15 steps fell short between them five times."""
 
 
 def cheapest_stiffness(
@@ -40,20 +45,32 @@ def cheapest_stiffness(
     progress: Callable[[int], object],
 ) -> Optimum:
     """The best stiffness of all joints, confirmed by a run."""
-    for share in STRICTER:
-        acceptance = Acceptance(what.robot, what.margin).stricter(share)
-        search = CheapestStiffness(acceptance, trajectory, criterion, seed, progress)
-        try:
-            joints, best = search.best()
-        except ImpossibleError as error:
-            return replace(what, reasons=error.reasons)
-        if confirmed(what, best):
-            return replace(what, joints=joints, trajectory=best)
-    return replace(what, reasons=("what keeps every limit at the steps exceeds one between them",))
+    search = CheapestStiffness(Acceptance(what.robot, what.margin), trajectory, criterion, seed, progress)
+    try:
+        found = search.confirmed(what)
+    except ImpossibleError as error:
+        return replace(what, reasons=error.reasons)
+    return replace(what, joints=search.optima(found), trajectory=found.trajectory)
+
+
+class Found(NamedTuple):
+    """The profiles that were found, by index of the joint, and the trajectory with the best of them."""
+
+    best: dict[int, Profile]
+    constant: dict[int, Profile | None]
+    trajectory: Trajectory
 
 
 class CheapestStiffness:
-    """A search for the best stiffness of all joints."""
+    """A search for the best stiffness of all joints.
+
+    Args:
+        acceptance: the rule for every step.
+        trajectory: the motion.
+        criterion: what is minimised.
+        seed: of the starts that are drawn.
+        progress: is told how many searches are done.
+    """
 
     def __init__(
         self,
@@ -64,36 +81,76 @@ class CheapestStiffness:
         progress: Callable[[int], object],
     ) -> None:
         self._acceptance, self._trajectory, self._criterion = acceptance, trajectory, criterion
-        self._seed, self._progress = seed, progress
-        self._rests = rests(trajectory)
+        self._seed = seed
+        self._joints = chosen_joints(acceptance.robot)
+        self._bars = {index: Countdown(progress) for index in self._joints}
+        rest, loads = rests(trajectory), joint_loads(acceptance.robot, trajectory, self._joints)
+        self._periods = {
+            index: 0 if rest else periods(load) for index, load in zip(self._joints, loads, strict=True)
+        }
 
-    def best(self) -> tuple[dict[str, JointOptimum], Trajectory]:
-        """What was found for each joint, by name, and the trajectory with it.
+    def confirmed(self, what: Optimum) -> Found:
+        """Search until a run of what was found keeps every limit between its steps as well.
 
         Raises:
             ImpossibleError: with the reason of each joint for which nothing was found.
         """
-        robot = self._acceptance.robot
-        chosen, reasons = chosen_joints(robot), list(self._reasons_of_others())
-        joints, changes = {}, {}
-        for index, load in zip(chosen, joint_loads(robot, self._trajectory, chosen), strict=True):
-            joint = robot.joints[index]
+        acceptance = self._acceptance
+        for share in STRICTER:
+            found = self.best(acceptance.stricter(share))
+            short = falls_short(what, found.trajectory)
+            if short is None:
+                return found
+            acceptance = replace(acceptance, between=np.union1d(acceptance.between, short))
+        raise ImpossibleError("what keeps every limit at the steps exceeds one between them")
+
+    def best(self, acceptance: Acceptance) -> Found:
+        """Search with a rule, at whose instants between the steps every profile keeps all limits as well.
+
+        Raises:
+            ImpossibleError: with the reason of each joint for which nothing was found.
+        """
+        robot, reasons = acceptance.robot, list(self._reasons_of_others())
+        loads = joint_loads(robot, self._trajectory, self._joints, between=self._between(acceptance))
+        best: dict[int, Profile] = {}
+        constant: dict[int, Profile | None] = {}
+        for index, load in zip(self._joints, loads, strict=True):
             try:
-                joints[joint.name], rows = self._of_joint(joint, load)
+                constant[index], best[index] = self._of_joint(acceptance, index, load)
             except ImpossibleError as error:
                 reasons += error.reasons
-                continue
-            changes[index] = (rows - asked_stiffness(load))[:, STEPS]
         if reasons:
             raise ImpossibleError(*reasons)
-        best = copy(with_changed_stiffness(self._trajectory, changes))
-        best.name = as_name(f"{self._trajectory.name}-{self._criterion.name}")
-        return joints, best
+        changed = copy(as_one_function(self._with_stiffness(best)))
+        changed.name = as_name(f"{self._trajectory.name}-{self._criterion.name}")
+        return Found(best, constant, changed)
+
+    def optima(self, found: Found) -> dict[str, JointOptimum]:
+        """Return what was found for each joint, by name, with the costs of runs."""
+        joints = self._acceptance.robot.joints
+        constants = {index: each for index, each in found.constant.items() if each is not None}
+        trajectories = self._trajectory, self._with_stiffness(constants), found.trajectory
+        criteria = {index: self._criterion_of(index) for index in self._joints}
+        runs = [run_costs(self._acceptance.robot, each, criteria) for each in trajectories]
+        optima = {}
+        for index, profile in found.best.items():
+            before, constant, after = (costs[index] for costs in runs)
+            optima[joints[index].name] = JointOptimum(
+                before=before,
+                constant=constant if index in constants else math.nan,
+                after=after,
+                unit=self._criterion.quantity.unit(joints[index].type),
+                found=profile.found,
+                starts=profile.starts,
+                agreeing=profile.agreeing,
+                bounding=profile.bounding,
+            )
+        return optima
 
     def _reasons_of_others(self) -> Sequence[str]:
         """What is wrong with joints that have no stiffness to choose."""
         robot = self._acceptance.robot
-        others = [index for index in range(len(robot.joints)) if index not in chosen_joints(robot)]
+        others = [index for index in range(len(robot.joints)) if index not in self._joints]
         loads = joint_loads(robot, self._trajectory, others)
         reasons = [
             self._acceptance.reason(robot.joints[index], load)
@@ -101,32 +158,50 @@ class CheapestStiffness:
         ]
         return [reason for reason in reasons if reason]
 
-    def _of_joint(self, joint: Joint, load: Load) -> tuple[JointOptimum, FloatArray]:
-        """What was found, and stiffness, rate and second derivative at all instants, (3, instants)."""
-        count = 0 if self._rests else periods(load)
-        criterion = type(self._criterion)(repeating=count > 0)
-        period = load.at(slice(0, (len(load.time) - 1) // max(count, 1) + 1))
-        spaces = SplineSpace.periodic if count else SplineSpace.at_rest
-        bar = Countdown(self._progress)
-        search = StiffnessSearch(self._acceptance, joint, period, criterion, spaces, self._seed, bar.count)
-        constant, best = search.best_constant(), search.best()
-        bar.finish()
-        rows = _repeated(best, max(count, 1))
-        optimum = JointOptimum(
-            before=asked_cost(joint, load, criterion),
-            constant=math.nan
-            if constant is None
-            else cost(joint, load, criterion, _repeated(constant, max(count, 1))),
-            after=cost(joint, load, criterion, rows),
-            unit=criterion.quantity.unit(joint.type),
-            found=best.found,
-            starts=best.starts,
-            agreeing=best.agreeing,
-            bounding=best.bounding,
+    def _between(self, acceptance: Acceptance) -> FloatArray:
+        """Instants between the steps, since the start: of coarse steps many, and those of the rule.
+
+        Of a joint whose load repeats itself the first period counts, so that instants are there as well.
+        """
+        trajectory, counts = self._trajectory, {max(count, 1) for count in self._periods.values()}
+        shortest, longest = ((trajectory.samples - 1) // count for count in (max(counts), min(counts)))
+        steps = trajectory.times.block(0, longest + 1) - trajectory.start
+        parts, dense = math.ceil(LOOKED_AT / shortest), np.empty(0)
+        if parts > HALVES and trajectory.known_between:
+            dense = (steps[:-1, None] + np.diff(steps)[:, None] * np.arange(1, parts) / parts).ravel()
+        first = [np.mod(acceptance.between, trajectory.duration / count) for count in counts]
+        return np.unique(np.concatenate([dense, acceptance.between, *first]))
+
+    def _criterion_of(self, index: int) -> Criterion:
+        return type(self._criterion)(repeating=self._periods[index] > 0)
+
+    def _of_joint(self, acceptance: Acceptance, index: int, load: Load) -> tuple[Profile | None, Profile]:
+        """The best constant, if there is one, and the best profile over a period of a joint."""
+        steps = np.arange(len(load.time))[load.steps][: self._steps_of_period(index) + 1]
+        period = replace(load.at(slice(steps[-1] + 1)), steps=steps)
+        search = StiffnessSearch(
+            acceptance,
+            acceptance.robot.joints[index],
+            period,
+            self._criterion_of(index),
+            SplineSpace.periodic if self._periods[index] else SplineSpace.at_rest,
+            self._seed,
+            self._bars[index].count,
         )
-        return optimum, rows
+        found = search.best_constant(), search.best()
+        self._bars[index].finish()
+        return found
 
+    def _steps_of_period(self, index: int) -> int:
+        return (self._trajectory.samples - 1) // max(self._periods[index], 1)
 
-def _repeated(profile: Profile, count: int) -> FloatArray:
-    """A profile passed several times."""
-    return np.concatenate([np.tile(profile.rows[:, :-1], count), profile.rows[:, -1:]], axis=1)
+    def _with_stiffness(self, profiles: Mapping[int, Profile]) -> Trajectory:
+        """The motion with other stiffness profiles of joints, by index."""
+        commanded = self._trajectory.block(0, self._trajectory.samples).commanded
+        changes = {}
+        for index, profile in profiles.items():
+            rows = profile.at_steps
+            repeated = np.tile(rows[:, :-1], max(self._periods[index], 1))
+            asked = np.stack([commanded[name][:, index] for name in STIFFNESS.names])
+            changes[index] = np.concatenate([repeated, rows[:, -1:]], axis=1) - asked
+        return with_changed_stiffness(self._trajectory, changes)

@@ -13,7 +13,7 @@ from vsacli.studies.optimisation.checks import (
     BOTH,
     TIME,
     TIMING,
-    check_time_can_vary,
+    check_timing_varies,
     checked_criterion,
     chosen_joints,
     varied_joints,
@@ -62,7 +62,7 @@ def optimize(
     varied = varied_joints(robot, vary)
     what = Optimum(robot, trajectory.name, minimize, "duration", vary, margin)
     if minimize == TIME:
-        check_time_can_vary(trajectory, vary)
+        check_timing_varies(vary)
         return fastest(what, trajectory, varied, seed, progress)
     shared = vary in (TIMING, BOTH)
     criterion = checked_criterion(robot, minimize, range(len(robot.joints)) if shared else varied)

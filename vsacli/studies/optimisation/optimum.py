@@ -109,6 +109,8 @@ class Optimum(Published):
         margin: that every step has.
         joints: by name; empty if nothing was found, and where time is minimised.
         together: what they cost together, if they share a timing; else None.
+        slow_down: factor by which the motion is slower than commanded, where a cost is minimised and no pace
+            in its duration was found that is feasible; else 1.
         timing: None if time is not minimised, or nothing was found.
         reasons: why nothing was found, in clauses.
         trajectory: the best; None if nothing was found.
@@ -123,6 +125,7 @@ class Optimum(Published):
     margin: float
     joints: dict[str, JointOptimum] = field(default_factory=dict)
     together: TotalCost | None = None
+    slow_down: float = 1.0
     timing: TimingOptimum | None = None
     reasons: tuple[str, ...] = ()
     trajectory: Trajectory | None = field(default=None, repr=False)
@@ -136,6 +139,7 @@ class Optimum(Published):
         "possible": "possible",
         **named("minimised", "varied", "margin", "joints"),
         "together?": "together",
+        "slow_down?": "slowed_down",
         "timing?": "timing",
         "reasons?": "reasons",
     }
@@ -144,6 +148,11 @@ class Optimum(Published):
     def possible(self) -> bool:
         """Whether anything feasible was found."""
         return self.trajectory is not None
+
+    @property
+    def slowed_down(self) -> float | None:
+        """The factor of the slow-down, if there is any."""
+        return None if self.slow_down == 1 else self.slow_down
 
     @property
     def robot_name(self) -> str:
@@ -155,7 +164,7 @@ class Optimum(Published):
 
     def _lines(self) -> Iterator[str]:
         title = f"{self.robot_name}, {self.asked}: {self.words} by another {VARIED[self.varied]}"
-        if not self.possible:
+        if self.trajectory is None:
             yield f"{title}: nothing feasible was found"
             yield from (f"- {reason}" for reason in self.reasons)
             return
@@ -163,6 +172,11 @@ class Optimum(Published):
         if self.timing is not None:
             yield from self.timing.lines()
             return
+        if self.slow_down != 1:
+            yield (
+                f"slowed down by a factor {self.slow_down:.4g} to {self.trajectory.duration:.4g} s: nothing "
+                "feasible was found that lasts as commanded"
+            )
         yield from aligned(list(self._rows()))
         whole = "time" if self.together is None else "path"
         yield from (
@@ -188,7 +202,7 @@ def _cost(cost: float, unit: str) -> str:
 
 
 def _change(before: float, after: float) -> str:
-    return "-" if not before > 0 else f"{100 * (after / before - 1):+.1f} %"
+    return "-" if not before > 0 or math.isnan(after) else f"{100 * (after / before - 1):+.1f} %"
 
 
 def _along(bounding: Mapping[str, float], whole: str) -> str:

@@ -26,8 +26,8 @@ between them: with 4000 of them a hardening spring's motor exceeded its limit by
 FASTEST = 0.02
 """Least pace: fifty times as fast as commanded, more than which the units are more likely to be wrong."""
 
-NOT_OF_THE_PACE = ("q", "stiffness", "damping")
-"""Variables with limits that no pace changes."""
+NOT_OF_THE_PACE = ("q", "damping")
+"""Variables with limits that no pace changes; nor that of a stiffness that does not vary."""
 
 
 class Pace:
@@ -62,6 +62,8 @@ class PacedJoint:
         near_singular: the margin.
         criterion: what it costs.
         share: that its cost has in that of all joints.
+        reserve: share of each limit that is kept clear of besides `CLEARANCE`.
+        varied: whether the stiffness varies.
 
     Attributes:
         criterion: what it costs.
@@ -76,12 +78,17 @@ class PacedJoint:
         criterion: Criterion = NO_COST,
         scale: Scale = UNSCALED,
         share: float = 1.0,
+        reserve: float = 0.0,
+        *,
+        varied: bool = False,
     ) -> None:
         self._motion, self._index, self._near_singular = motion, index, near_singular
         self.criterion, self.scale, self._share = criterion, scale, share
+        self._clearance = CLEARANCE + reserve
         self._joint = motion.robot.joints[index]
         self._carrying = _made_to_carry(self._joint)
-        self._checks = [check for check in limit_checks(self._joint) if check.variable not in NOT_OF_THE_PACE]
+        fixed = NOT_OF_THE_PACE if varied else (*NOT_OF_THE_PACE, STIFFNESS.key)
+        self._checks = [check for check in limit_checks(self._joint) if check.variable not in fixed]
         self._chosen = STIFFNESS.key in self._joint.actuator.commanded
 
     @property
@@ -139,7 +146,7 @@ class PacedJoint:
         for check in self._checks:
             for sign, bound in finite_ends(check):
                 size = abs(bound) or 1.0
-                yield sign * (check.values(of_joint) - bound) / size + CLEARANCE
+                yield sign * (check.values(of_joint) - bound) / size + self._clearance
 
 
 def _made_to_carry(joint: Joint) -> Joint:

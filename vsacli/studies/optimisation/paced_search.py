@@ -22,6 +22,11 @@ from vsacli.trajectory.trajectory import Trajectory
 LOOKED_AT = 4000
 """Instants at which bounds are looked at to see where they are missed, at most."""
 
+FEWEST_LOOKED_AT = 1000
+"""The same at least, however few steps a motion has."""
+
+NOTHING = np.empty(0)
+
 NEAR_END, TOWARDS_END = (1e-5, 0.05), 150
 """Shares of the path between which further instants towards each end are, and how many: where an arm with
 a hardening spring started, torques between even instants were 8e-4 larger than at them."""
@@ -209,11 +214,16 @@ class PacedSearch:
         return found
 
 
-def instants_of(trajectory: Trajectory, duration: float) -> FloatArray:
+def instants_of(trajectory: Trajectory, duration: float, further: FloatArray = NOTHING) -> FloatArray:
     """Where bounds are looked at, s: evenly, and more and more densely towards both ends.
 
     A motion that begins at rest has hardly begun where its pace, which may be high there, is past its worst.
+
+    Args:
+        trajectory: the path.
+        duration: of its part that is looked at, s.
+        further: instants of that part that shall be among them, s.
     """
-    even = np.linspace(0.0, 1.0, min(2 * trajectory.samples - 1, LOOKED_AT))
+    even = np.linspace(0.0, 1.0, min(max(2 * trajectory.samples - 1, FEWEST_LOOKED_AT), LOOKED_AT))
     towards = np.geomspace(*NEAR_END, TOWARDS_END)
-    return duration * np.unique(np.concatenate([even, towards, 1 - towards]))
+    return np.union1d(duration * np.unique(np.concatenate([even, towards, 1 - towards])), further)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.studies.optimisation.periods import Ends
 from vsacli.studies.optimisation.separable import Functions, Group
 from vsacli.studies.optimisation.spline_space import SplineSpace
 
@@ -41,6 +42,10 @@ class Pacing:
     def stiffness(self, count: int = 1) -> dict[int, BSpline[np.float64]]:
         """Likewise of the joints where it varies, by index."""
         return {key: self._spline(key, count) for key in self.splines if key is not None}
+
+    def stiffness_at(self, s: FloatArray) -> dict[int, FloatArray]:
+        """The stiffness of these joints at instants of the path, or of its first period, (instants,) each."""
+        return {joint: spline(s) for joint, spline in self.stiffness().items()}
 
     def _spline(self, key: int | None, count: int) -> BSpline[np.float64]:
         space, amounts = self.splines[key]
@@ -83,16 +88,17 @@ class PacedSpaces(NamedTuple):
     stiffness: dict[int, SplineSpace]
 
     @classmethod
-    def of(cls, span: tuple[float, float], pieces: int, varied: Sequence[int]) -> PacedSpaces:
-        """With so many pieces each."""
-        at_rest = SplineSpace.at_rest(span, pieces)
-        return cls(SplineSpace.free(span, pieces), dict.fromkeys(varied, at_rest))
+    def of(cls, span: tuple[float, float], pieces: int, varied: Sequence[int], ends: Ends) -> PacedSpaces:
+        """With so many pieces each, for a motion with such ends.
 
-    @classmethod
-    def repeating(cls, span: tuple[float, float], pieces: int, varied: Sequence[int]) -> PacedSpaces:
-        """The same for what goes on at the end as it begins."""
-        periodic = SplineSpace.periodic(span, pieces)
-        return cls(periodic, dict.fromkeys(varied, periodic))
+        What repeats itself goes on at the end as it begins, at whatever pace. What begins or ends on its way
+        without repeating itself does so at the pace as commanded, with the accelerations as commanded, too.
+        """
+        if ends.periods:
+            periodic = SplineSpace.periodic(span, pieces)
+            return cls(periodic, dict.fromkeys(varied, periodic))
+        pace = SplineSpace.free(span, pieces).one_at(*ends.moving)
+        return cls(pace, dict.fromkeys(varied, SplineSpace.at_rest(span, pieces)))
 
     def lasting_as_commanded(self) -> PacedSpaces:
         """Those with which the path takes as long as it is."""
@@ -111,6 +117,19 @@ class PacedSpaces(NamedTuple):
         wanted: dict[int | None, FloatArray] = {None: pace}
         wanted.update(stiffness.items())
         return np.concatenate([space.fitted(s, wanted[key]) for key, (space, _) in self.parts().items()])
+
+    def even(self, s: FloatArray, pace: float, stiffness: Mapping[int, FloatArray]) -> FloatArray:
+        """Unknowns of the same pace everywhere, but for ends where it is given."""
+        unknowns = self.fitted(s, np.full_like(s, pace), stiffness)
+        _, own = self.parts()[None]
+        unknowns[own] = pace - self.pace.offset  # shapes of a free pace are B-splines, whose sum is one
+        return unknowns
+
+    def slowed(self, unknowns: FloatArray, share: float) -> FloatArray:
+        """Unknowns of a pace that is larger by a share, but for ends where it is given."""
+        slower, (_, own) = unknowns.copy(), self.parts()[None]
+        slower[own] += share * (slower[own] + self.pace.offset)
+        return slower
 
     def rows(self, key: int | None, s: FloatArray, orders: int, size: float = 1.0) -> Rows:
         """The pace, None, or the stiffness of a joint, of about a size, with its derivatives at instants."""

@@ -1,6 +1,10 @@
-"""How often a load repeats itself."""
+"""How a motion begins and ends: at rest, on its way, or as often as its load repeats itself."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,11 +24,37 @@ FEWEST_STEPS = 20
 """Steps of a period; what repeats itself faster is not told from noise."""
 
 
+class Ends(NamedTuple):
+    """How a motion begins and ends.
+
+    Attributes:
+        periods: how many equal periods it has; 0 if it does not repeat itself.
+        moving: whether it begins, and ends, on its way without repeating itself.
+    """
+
+    periods: int = 0
+    moving: tuple[bool, bool] = (False, False)
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, loads: Sequence[Load]) -> Ends:
+        """Those of a trajectory with the loads of all joints."""
+        moving = _moving_ends(trajectory)
+        if not any(moving):
+            return cls()
+        counts = [periods(load) for load in loads]
+        return cls(math.gcd(*counts)) if all(counts) else cls(0, moving)
+
+
 def rests(trajectory: Trajectory) -> bool:
     """Whether all joints stand still at both ends of a trajectory."""
-    some = trajectory.block(0, trajectory.samples).dq
-    fastest = np.abs(some).max(axis=0)
-    return bool(np.all(np.maximum(np.abs(some[0]), np.abs(some[-1])) <= AT_REST * fastest))
+    return not any(_moving_ends(trajectory))
+
+
+def _moving_ends(trajectory: Trajectory) -> tuple[bool, bool]:
+    """Whether any joint moves at the start, and at the end."""
+    some = np.abs(trajectory.block(0, trajectory.samples).dq)
+    first, last = (bool(np.any(row > AT_REST * some.max(axis=0))) for row in some[[0, -1]])
+    return first, last
 
 
 def periods(load: Load) -> int:

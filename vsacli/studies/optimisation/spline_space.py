@@ -33,15 +33,21 @@ class SplineSpace:
     offset: float = 0.0
 
     @classmethod
-    def at_rest(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
+    def at_rest(
+        cls, span: tuple[float, float], pieces: int, allowed: FloatArray | None = None
+    ) -> SplineSpace:
         """Splines of so many equal pieces whose first two derivatives vanish at both ends.
 
         They vanish where the first three coefficients are equal.
+
+        Args:
+            span: where they are defined, s.
+            pieces: their number; fewer if fewer are allowed.
+            allowed: times at which pieces may begin and end, both ends of the span among them; any if None.
         """
-        first, last = span
-        ends = np.linspace(first, last, pieces + 1)
-        knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
-        coefficients = pieces + DEGREE
+        ends = _ends(span, pieces, allowed)
+        knots = np.concatenate([[ends[0]] * DEGREE, ends, [ends[-1]] * DEGREE])
+        coefficients = len(ends) - 1 + DEGREE
         shape_of = np.clip(np.arange(coefficients) - FLAT_ENDS, 0, coefficients - 1 - 2 * FLAT_ENDS)
         return cls(knots, np.eye(shape_of[-1] + 1)[shape_of])
 
@@ -52,17 +58,30 @@ class SplineSpace:
         return cls(knots, np.eye(pieces + DEGREE))
 
     @classmethod
-    def periodic(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
-        """Splines of so many equal pieces that go on at the end as they begin."""
-        first, last = span
-        knots = first + (last - first) * np.arange(-DEGREE, pieces + DEGREE + 1, dtype=np.float64) / pieces
-        return cls(knots, np.eye(pieces)[np.arange(pieces + DEGREE) % pieces])
+    def periodic(
+        cls, span: tuple[float, float], pieces: int, allowed: FloatArray | None = None
+    ) -> SplineSpace:
+        """Splines of so many equal pieces that go on at the end as they begin; see `at_rest`."""
+        ends = _ends(span, pieces, allowed)
+        pieces, period = len(ends) - 1, span[1] - span[0]
+        turns, places = np.divmod(np.arange(-DEGREE, pieces + DEGREE + 1), pieces)
+        return cls(ends[places] + turns * period, np.eye(pieces)[np.arange(pieces + DEGREE) % pieces])
 
     @classmethod
     def constant(cls, span: tuple[float, float]) -> SplineSpace:
         """Constants."""
         whole = cls.at_rest(span, 1)
         return cls(whole.knots, np.ones((len(whole.shapes), 1)))
+
+    def one_at(self, first: bool, last: bool) -> SplineSpace:
+        """Those of `free` splines that are one at an end, or both, where three derivatives vanish.
+
+        They do where the first four coefficients are equal.
+        """
+        if not (first or last):
+            return self
+        fixed = FLAT_ENDS + 2
+        return replace(self, shapes=self.shapes[:, fixed * first : self.size - fixed * last], offset=1.0)
 
     def of_mean(self, mean: float) -> SplineSpace:
         """Those of them with a mean over the span, the constant among them."""
@@ -87,8 +106,9 @@ class SplineSpace:
 
     @property
     def piece(self) -> float:
-        """Length of a piece, s."""
-        return float(self.knots[DEGREE + 1] - self.knots[DEGREE])
+        """Mean length of the pieces, s."""
+        ends = self.knots[DEGREE : len(self.knots) - DEGREE]
+        return float(ends[-1] - ends[0]) / (len(ends) - 1)
 
     def basis(self, time: FloatArray, orders: int) -> FloatArray:
         """The shapes and their derivatives, (orders, instants, shapes)."""
@@ -111,3 +131,13 @@ class SplineSpace:
         """The amounts of the shapes with which they come nearest to values, (shapes,)."""
         amounts: FloatArray = np.linalg.lstsq(self.basis(time, 1)[0], values - self.offset, rcond=None)[0]
         return amounts
+
+
+def _ends(span: tuple[float, float], pieces: int, allowed: FloatArray | None) -> FloatArray:
+    """The ends of pieces of about equal length, each the nearest that is allowed."""
+    ends = np.linspace(*span, pieces + 1)
+    if allowed is None:
+        return ends
+    after = np.clip(np.searchsorted(allowed, ends), 1, len(allowed) - 1)
+    nearest = after - (ends - allowed[after - 1] < allowed[after] - ends)
+    return allowed[np.unique(nearest)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -38,8 +38,11 @@ WORTH_HALVING = 1e-3
 SAME_COST = 1e-4
 """Relative difference of costs up to which two starts came to the same optimum."""
 
-MOST_ROUNDS = 6
-"""Rounds of adding instants at which bounds are missed; one or two are usual."""
+MOST_ROUNDS = 12
+"""Rounds of adding instants at which bounds are missed; one or two are usual, seven were needed."""
+
+SAME_LEVEL = 1e-5
+"""Share of a level by which what it bounds may exceed it at some instants: a tenth of `SAME_COST`."""
 
 FIRST_LEVEL = 1.05
 """Multiple of what a level bounds, to begin with."""
@@ -53,7 +56,9 @@ class Profile:
     """A stiffness over the instants of a load.
 
     Attributes:
-        rows: stiffness, rate and second derivative, (3, instants), N m/rad (N/m) per s^k.
+        rows: stiffness, rate and second derivative at the instants of the load, (3, instants), N m/rad (N/m)
+            per s^k.
+        steps: which of these instants are steps.
         found: whether the conditions for a local optimum hold.
         starts: of how many different profiles the search began.
         agreeing: from how many of them it came to this optimum.
@@ -61,14 +66,20 @@ class Profile:
     """
 
     rows: FloatArray = field(repr=False)
+    steps: IndexArray | slice = field(repr=False)
     found: bool
     starts: int
     agreeing: int
     bounding: dict[str, float]
 
+    @property
+    def at_steps(self) -> FloatArray:
+        """The rows at the steps alone, (3, steps)."""
+        return self.rows[:, self.steps]
 
-Spaces = Callable[[tuple[float, float], int], SplineSpace]
-"""The splines over a span of so many pieces."""
+
+Spaces = Callable[[tuple[float, float], int, FloatArray], SplineSpace]
+"""The splines over a span of so many pieces, which begin and end at some of these times."""
 
 
 class _Attempt(NamedTuple):
@@ -89,7 +100,8 @@ class StiffnessSearch:
     Args:
         acceptance: the rule for every step.
         joint: whose stiffness can be chosen.
-        load: what it carries.
+        load: what it carries. Pieces of splines begin and end at its steps, so that the quintic between two
+            steps with given derivatives, which a file describes, is the spline itself.
         criterion: what is minimised.
         spaces: among which splines is searched.
         seed: of the starts that are drawn.
@@ -115,7 +127,9 @@ class StiffnessSearch:
         self._joint, self._load, self._criterion = joint, load, criterion
         self._spaces, self._seed, self._progress = spaces, seed, progress
         self._span = float(load.time[0]), float(load.time[-1])
-        self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale())
+        self._steps = load.time[load.steps]
+        self._most = min(MOST_PIECES, len(self._steps) - 1)
+        self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale(), acceptance.reserve)
 
     def best(self) -> Profile:
         """The best profile that is found from several starts.
@@ -124,10 +138,14 @@ class StiffnessSearch:
             ImpossibleError: none was found.
         """
         pieces, starts = self._starts()
-        space = self._spaces(self._span, pieces)
+        space = self._space(pieces)
         self._scale_by(space, starts[0])
-        attempts = [(self._attempt(space, pieces, start), start) for start in starts]
-        kept = [(attempt, start) for attempt, start in attempts if attempt is not None]
+        kept: list[tuple[_Attempt, FloatArray]] = []
+        for start in starts:
+            # most starts come to the same optimum, where bounds are missed at the same instants
+            attempt = self._attempt(space, pieces, start, known=kept[-1][0].instants if kept else None)
+            if attempt is not None:
+                kept.append((attempt, start))
         if not kept:
             raise ImpossibleError(
                 f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
@@ -151,21 +169,29 @@ class StiffnessSearch:
     def _asked(self) -> FloatArray:
         return self._load.command.commanded[STIFFNESS.key]
 
+    def _space(self, pieces: int) -> SplineSpace:
+        return self._spaces(self._span, pieces, self._steps)
+
     def _starts(self) -> tuple[int, list[FloatArray]]:
         """The pieces of splines of which some lie within what is admissible, and these."""
-        time, pieces = self._load.time, FIRST_PIECES
+        time, coarsest = self._load.time, min(FIRST_PIECES, self._most)
         chosen = evenly(len(time), INSTANTS_PER_PIECE * MOST_PIECES)
         admissible = Range(*(row[chosen] for row in self._admissible))
         wanted = [target[chosen] for target in targets(self._asked, self._admissible, time, self._seed)]
-        while pieces <= MOST_PIECES:
-            space = self._spaces(self._span, pieces)
+        for pieces in self._finer_than(coarsest // 2):
+            space = self._space(pieces)
             found = [nearest_profile(space, time[chosen], target, admissible) for target in wanted]
             if starts := [amounts for amounts in found if amounts is not None]:
                 return pieces, starts
-            pieces *= 2
         raise ImpossibleError(
             f"what {self._joint.name} may have is too narrow, or changes too fast, for a smooth profile"
         )
+
+    def _finer_than(self, pieces: int) -> Iterator[int]:
+        """Numbers of pieces, each twice as large as the one before, up to the most that there may be."""
+        while pieces < self._most:
+            pieces = min(max(2 * pieces, 1), self._most)
+            yield pieces
 
     def _scale_by(self, space: SplineSpace, amounts: FloatArray) -> None:
         """Scale the cost by that of a profile."""
@@ -175,7 +201,12 @@ class StiffnessSearch:
         self._whole.scale = Scale(size, self._span[1] - self._span[0], self._criterion.smoothings[0])
 
     def _attempt(
-        self, space: SplineSpace, pieces: int, start: FloatArray, nearby: _Attempt | None = None
+        self,
+        space: SplineSpace,
+        pieces: int,
+        start: FloatArray,
+        nearby: _Attempt | None = None,
+        known: IndexArray | None = None,
     ) -> _Attempt | None:
         """Search from a start, with as many instants as it takes; None if nothing keeps all bounds.
 
@@ -184,8 +215,11 @@ class StiffnessSearch:
             pieces: of each.
             start: amounts of the shapes, within what is admissible.
             nearby: a minimum among coarser splines, from which the search goes on.
+            known: instants that another search took.
         """
         instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * pieces + 1)
+        if known is not None:
+            instants = np.union1d(instants, known)
         every = self._group(space, np.arange(len(self._load.time)))
         inside = unknowns = self._with_level(every, start)
         if nearby is not None:
@@ -238,17 +272,17 @@ class StiffnessSearch:
 
     def _missed(self, every: Group, unknowns: FloatArray) -> IndexArray:
         """The worst instant of each stretch at which any bound is missed."""
-        missed = every.bounds(every.rows(unknowns))
-        return np.unique(np.concatenate([peaks(row - CLEARANCE) for row in missed]))
+        missed = every.bounds(every.rows(unknowns)) - CLEARANCE
+        missed[len(self._whole.bound_names) :] -= SAME_LEVEL
+        return np.unique(np.concatenate([peaks(row) for row in missed]))
 
     def _refined(self, best: _Attempt, pieces: int, start: FloatArray) -> _Attempt:
         """The same with finer pieces, as long as these lower the cost."""
         coarse = best.space
-        while 2 * pieces <= MOST_PIECES:
-            pieces *= 2
-            space = self._spaces(self._span, pieces)
+        for finer_pieces in self._finer_than(pieces):
+            space = self._space(finer_pieces)
             inside = space.fitted(self._load.time, coarse.basis(self._load.time, 1)[0] @ start)
-            finer = self._attempt(space, pieces, inside, best)
+            finer = self._attempt(space, finer_pieces, inside, best)
             if finer is None or finer.minimum.cost > best.minimum.cost:
                 break
             gained, best = best.minimum.cost - finer.minimum.cost, finer
@@ -261,6 +295,7 @@ class StiffnessSearch:
         rows = attempt.space.basis(self._load.time, STIFFNESS.orders) @ amounts
         return Profile(
             rows=rows,
+            steps=self._load.steps,
             found=attempt.minimum.found,
             starts=starts,
             agreeing=agreeing,

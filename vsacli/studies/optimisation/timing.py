@@ -9,14 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, evenly
-from vsacli.robot.model import Robot
 from vsacli.studies.optimisation.interior_point import Minimum, minimise
 from vsacli.studies.optimisation.paced_joints import CLEARANCE, FASTEST, PacedJoint, least_pace
 from vsacli.studies.optimisation.paced_motion import PacedMotion
 from vsacli.studies.optimisation.paced_search import STIFFER, PacedSearch, Start, instants_of
 from vsacli.studies.optimisation.paced_splines import PacedSpaces, Pacing
+from vsacli.studies.optimisation.periods import Ends
 from vsacli.studies.optimisation.separable import Group, SeparableProblem
-from vsacli.studies.remedies.acceptance import ImpossibleError
+from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.trajectory.trajectory import Trajectory
 
 FEW = 100
@@ -44,20 +44,24 @@ STALLED_TIMING = 3e-4
 """Share of the time that some steps together must gain."""
 
 
+class NoStartError(ImpossibleError):
+    """No stiffness that was tried makes any slow-down feasible."""
+
+
 class TimingSearch(PacedSearch):
-    """A search for the fastest pace along the path of a trajectory from rest to rest.
+    """A search for the fastest pace along the path of a trajectory, over a period of what repeats itself.
 
     Args:
-        robot: the robot.
+        acceptance: the rule, with instants of the path that count as well.
         trajectory: the path.
-        near_singular: the margin that is kept.
+        ends: of the motion.
         varied: the joints whose stiffness varies as well, by index.
         seed: of the starts that are drawn.
         progress: called after each search.
 
     Attributes:
         uniform: duration of the fastest motion that is slowed down or sped up as a whole, s; NaN if there is
-            none.
+            none, or its ends move at a given pace.
     """
 
     pieces = (12, 24)
@@ -67,16 +71,28 @@ class TimingSearch(PacedSearch):
 
     def __init__(
         self,
-        robot: Robot,
+        acceptance: Acceptance,
         trajectory: Trajectory,
-        near_singular: float,
+        ends: Ends,
         varied: Sequence[int],
         seed: int,
         progress: Callable[[], None],
     ) -> None:
-        motion = PacedMotion(robot, trajectory, instants_of(trajectory, trajectory.duration))
-        joints = [PacedJoint(motion, index, near_singular) for index in range(len(robot.joints))]
+        robot, count = acceptance.robot, max(ends.periods, 1)
+        instants = instants_of(trajectory, trajectory.duration / count, acceptance.between)
+        motion = PacedMotion(robot, trajectory, instants)
+        joints = [
+            PacedJoint(
+                motion,
+                index,
+                acceptance.near_singular,
+                reserve=acceptance.reserve,
+                varied=index in varied,
+            )
+            for index in range(len(robot.joints))
+        ]
         super().__init__(motion, joints, varied, seed, progress)
+        self._ends, self._count = ends, count
         self.uniform = math.nan
 
     def best(self) -> Pacing:
@@ -87,7 +103,8 @@ class TimingSearch(PacedSearch):
         """
         found = super().best()
         shortest = np.trapezoid(least_pace(self._motion.resting), self._s)
-        if found.pace().integrate(*self._span) < UNBOUNDED * shortest:
+        held = any(self._ends.moving)
+        if not found.bounding if held else found.pace().integrate(*self._span) < UNBOUNDED * shortest:
             raise ImpossibleError(
                 f"no limit keeps the motion from being {1 / FASTEST:g} times as fast; give some, such as "
                 "max_torque of the motors, or begin with a shorter duration"
@@ -95,7 +112,7 @@ class TimingSearch(PacedSearch):
         return found
 
     def _spaces(self, pieces: int) -> PacedSpaces:
-        return PacedSpaces.of(self._span, pieces, self._varied)
+        return PacedSpaces.of(self._span, pieces, self._varied, self._ends)
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
         asked = {joint: self._motion.stiffness(joint) for joint in self._varied}
@@ -105,16 +122,17 @@ class TimingSearch(PacedSearch):
             factor = self._uniform(spaces, stiffness)
             if factor is None:
                 continue
-            inside = spaces.fitted(self._s, np.full_like(self._s, SLACK * factor), stiffness)
+            inside = spaces.even(self._s, SLACK * factor, stiffness)
             begun.append((inside, inside))
             if multiple == 1:
-                self.uniform = self._scale = factor * self._span[1]
+                self._scale = factor * self._span[1]
+                self.uniform = math.nan if any(self._ends.moving) else self._count * self._scale
                 begun += [
                     (spaces.fitted(self._s, factor * drawn, stiffness), inside)
                     for drawn in self._drawn(SLACK, 2.0)
                 ]
         if not begun:
-            raise ImpossibleError("no slow-down or speed-up of the whole motion keeps every limit")
+            raise NoStartError("no slow-down or speed-up of the whole motion keeps every limit")
         return begun
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
@@ -129,7 +147,7 @@ class TimingSearch(PacedSearch):
         every = self._groups(spaces, np.arange(len(self._s)))
 
         def kept(groups: Sequence[Group], factor: float) -> bool:
-            unknowns = spaces.fitted(self._s, np.full_like(self._s, factor), stiffness)
+            unknowns = spaces.even(self._s, factor, stiffness)
             _, bounds = SeparableProblem(groups).values(unknowns)
             return bool(np.all(bounds < 0))
 
@@ -149,10 +167,8 @@ class TimingSearch(PacedSearch):
 
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
         """The same so little slower that all bounds are kept at every instant; None if that takes more."""
-        _, own = spaces.parts()[None]
         for share in SLOWER:
-            unknowns = found.unknowns.copy()
-            unknowns[own] *= 1 + share
+            unknowns = spaces.slowed(found.unknowns, share)
             cost, bounds = SeparableProblem(every).values(unknowns)
             if np.all(bounds <= CLEARANCE / 2):
                 return replace(found, unknowns=unknowns, cost=cost)

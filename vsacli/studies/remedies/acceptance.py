@@ -167,9 +167,8 @@ class Acceptance:
             return None
         low, high = lower[step] / (1 - self.near_singular), upper[step] / (1 + self.near_singular)
         bound = low if math.isnan(low) or asked[step] < low else high
-        return Trouble(
-            "stiffness", "stiffness", load.time[step], asked[step], bound, STIFFNESS.unit(joint.type)
-        )
+        unit = STIFFNESS.unit(joint.type)
+        return Trouble("stiffness", "stiffness", load.time[step], asked[step], bound, unit, of_load=True)
 
     def _limit_trouble(
         self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
@@ -195,6 +194,7 @@ class Trouble(NamedTuple):
         value: of the variable there.
         bound: that it is beyond; NaN if no stiffness carries the elastic torque.
         unit: of both.
+        of_load: whether the bound follows from the load, else it is a limit of the robot.
     """
 
     variable: str
@@ -203,6 +203,7 @@ class Trouble(NamedTuple):
     value: float
     bound: float
     unit: str
+    of_load: bool = False
 
     def clause(self, joint: Joint) -> str:
         """What is wrong, and with which joint."""

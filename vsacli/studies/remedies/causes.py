@@ -17,7 +17,7 @@ from vsacli.studies.remedies.combined_search import CombinedSearch
 from vsacli.studies.remedies.longer_transition import has_transitions
 from vsacli.studies.remedies.motions import Load
 from vsacli.studies.remedies.slow_down import WATCHED_STEPS
-from vsacli.studies.remedies.stiffness_offset import smallest_offset
+from vsacli.studies.remedies.stiffness_offset import lowest_offset, smallest_offset
 from vsacli.studies.remedies.suggestions import Cause
 from vsacli.studies.remedies.task import Task
 
@@ -65,11 +65,27 @@ def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> 
     try:
         offset = smallest_offset(acceptance, joint, resting)
     except ImpossibleError:
-        return f"{_what(at_rest, resting=True)}: no slower motion and no constant stiffness helps", False
+        why = f"no slower motion and no constant stiffness helps{_in_the_way(acceptance, joint, resting)}"
+        return f"{_what(at_rest, resting=True)}: {why}", False
     return (
         f"{_what(at_rest, resting=True)}: no slower motion helps, {_stiffness(joint, resting, offset)}",
         True,
     )
+
+
+def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
+    """The limit that the softest constant stiffness exceeds, in a clause; empty if there is none."""
+    try:
+        offset = lowest_offset(acceptance, joint, resting)
+    except ImpossibleError:
+        return ""
+    trouble = acceptance.trouble(joint, resting.changed(offset))
+    if trouble is None:
+        return ""
+    asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
+    constant = asked.min() == asked.max()
+    least = f"{asked[0] + offset:.4g} {unit}" if constant else f"{offset:+.4g} {unit}"
+    return f", since with {least}, the least it may have, {_what(trouble)}"
 
 
 def _what(trouble: Trouble, *, resting: bool = False) -> str:
@@ -79,7 +95,7 @@ def _what(trouble: Trouble, *, resting: bool = False) -> str:
         return f"its springs cannot carry the elastic torque {when}"
     side = "below" if trouble.value < trouble.bound else "above"
     shown = f"{trouble.bound:.4g}"
-    bound = f"the {shown} its load allows" if trouble.variable == "stiffness" else f"its limit of {shown}"
+    bound = f"the {shown} its load allows" if trouble.of_load else f"its limit of {shown}"
     return f"{trouble.whose} is {trouble.value:.4g} {trouble.unit} {when}, {side} {bound}"
 
 

@@ -25,9 +25,11 @@ NOTHING: Mapping[int, FloatArray] = MappingProxyType({})
 def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]) -> Trajectory:
     """A trajectory with constants added to the stiffness of joints, given by index, N m/rad (N/m).
 
-    A stiffness that is a formula stays one.
+    A stiffness that is a formula stays one, and one to which nothing is added stays as it is.
     """
     stiffness = trajectory.commanded[STIFFNESS.key]
+    if not any(constants.values()):
+        return with_stiffness(trajectory, stiffness)
     if not isinstance(stiffness, ClosedForm):
         steps = np.zeros((3, trajectory.samples))
         steps[0] = 1.0

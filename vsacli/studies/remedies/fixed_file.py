@@ -24,7 +24,7 @@ from vsacli.studies.remedies.suggestions import Remedy
 from vsacli.trajectory.file import FORMAT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.recorded.samples import SampledProfile
-from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.times import ResampledTimes, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -117,8 +117,8 @@ def _document(
         keys["type"] == "csv" for keys in declared.values()
     ):
         yield f"duration: {trajectory.times.duration!r}\nrate: {trajectory.times.rate!r}\n"
-    if any(estimate.resampled for estimate in trajectory.estimates.values()):
-        yield f"rate: {(trajectory.samples - 1) / trajectory.duration!r}\n"
+    if isinstance(trajectory.times, ResampledTimes) and trajectory.estimates:
+        yield f"rate: {trajectory.times.rate!r}\n"
     for signal, keys in declared.items():
         yield f"{signal.key}:\n"
         yield from (f"  {key}: {_in_one_line(value)}\n" for key, value in keys.items())

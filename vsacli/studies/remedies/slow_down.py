@@ -9,12 +9,12 @@ import numpy as np
 
 from vsacli.base.arrays import evenly
 from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError, smallest_confirmed
+from vsacli.studies.remedies.kept_rate import rate_of
 from vsacli.studies.remedies.motions import Passage, joined
-from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 FACTOR_DENOMINATOR = 10_000
-"""Factors are whole multiples of 1/FACTOR_DENOMINATOR where steps are recorded one by one: these get further
+"""Factors are whole multiples of 1/FACTOR_DENOMINATOR where recorded stamps are not even: steps get further
 apart."""
 
 WHOLE = 1e-9
@@ -47,10 +47,8 @@ class Factors(NamedTuple):
     @classmethod
     def of(cls, trajectory: Trajectory) -> Factors:
         """Those of a task."""
-        times = trajectory.times
-        if isinstance(times, UniformTimes):
-            return cls(times.duration * times.rate)
-        return cls(float(FACTOR_DENOMINATOR))
+        rate = rate_of(trajectory)
+        return cls(float(FACTOR_DENOMINATOR) if rate is None else trajectory.duration * rate)
 
     @property
     def first(self) -> int:

@@ -23,6 +23,7 @@ from vsacli.studies.remedies.recorded_limits import RecordedLimits
 from vsacli.studies.remedies.slow_down import smallest_slow_down
 from vsacli.studies.remedies.suggestions import Cause, NotPossible, Remedy, Suggestions
 from vsacli.studies.remedies.task import Task
+from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 SIMPLER_SHARE = 1.05
@@ -97,6 +98,15 @@ def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
         reasons = NotPossible(tuple(map(str, found_causes.values())))
         return _Tried(_Found(reasons, reasons, reasons, None, []), [], [])
     asked = replace(task, acceptance=replace(task.acceptance, ignored=hopeless))
+    tried = _searched(asked)
+    if tried.chosen or not isinstance(task.trajectory.times, RecordedTimes):
+        return tried
+    # steps between the samples may exceed a limit of the position that these keep, at whatever speed
+    return _searched(replace(asked, keeps_rate=False))
+
+
+def _searched(asked: Task) -> _Tried:
+    """What is found when instants that fall short join the steps, search after search."""
     acceptance = asked.acceptance
     for share in STRICTER:
         found = _Found.of(replace(asked, acceptance=acceptance.stricter(share)))

@@ -28,6 +28,9 @@ OFFSETS_AT_ONCE = 64
 OFFSET_DIGITS = 4
 """Decimal places of an offset behind the leading digit of the stiffness: so what is printed was confirmed."""
 
+ROUNDING = 1e-9
+"""Relative rise of a stiffness after which rounding leaves it no margin short."""
+
 GRID_ROUNDING = 1e-6
 """By how much of its spacing a number may miss the grid; far less than any limit allows."""
 
@@ -56,6 +59,18 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     reason = acceptance.reason(joint, load.changed(nearest))
     with_it = f"with {nearest:+.6g}" if nearest else "as it is"
     raise ImpossibleError(f"none keeps every limit of {joint.name}; {with_it}, {reason}")
+
+
+def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
+    """The constant with which a joint is as soft as its load and its limit of stiffness admit, N m/rad (N/m).
+
+    Raises:
+        ImpossibleError: no stiffness mends the joint.
+    """
+    asked = load.command.commanded["stiffness"]
+    rise = checked_range(acceptance, joint, load).low - asked
+    hardest = int(rise.argmax())
+    return float(rise[hardest] + ROUNDING * (asked[hardest] + rise[hardest]))
 
 
 def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.remedies.admissible_stiffness import joint_loads
 from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness, with_raised_stiffness
 from vsacli.studies.remedies.combination import RELATIVE_CHANGE, Combination, Cost, constant_change
+from vsacli.studies.remedies.kept_rate import rate_of, with_kept_rate
 from vsacli.studies.remedies.longer_transition import smallest_transition
 from vsacli.studies.remedies.motions import Load, Passage
 from vsacli.studies.remedies.stiffness_offset import WATCHED_STEPS, smallest_offset
@@ -35,6 +36,8 @@ from vsacli.studies.remedies.suggestions import (
     StiffnessOffset,
     StiffnessProfile,
 )
+from vsacli.trajectory.curves import ClosedForm
+from vsacli.trajectory.times import ResampledTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 _Found = TypeVar("_Found")
@@ -48,9 +51,6 @@ FINER = 10
 MOST_INSTANTS = 300_000
 """Instants of a remedy that are looked at: the steps of longer ones are divided into fewer parts."""
 
-STEPS = slice(None, None, 2)
-"""The instants of a load that are steps."""
-
 
 @dataclass(frozen=True)
 class Task:
@@ -60,11 +60,13 @@ class Task:
         acceptance: the rule, and the robot.
         trajectory: what the robot is asked to do.
         cost: how large a remedy is.
+        keeps_rate: whether a recording that becomes slower has steps at its rate, else at its samples.
     """
 
     acceptance: Acceptance
     trajectory: Trajectory
     cost: Cost = RELATIVE_CHANGE
+    keeps_rate: bool = True
 
     def acceptance_with(self, found: Combination) -> Acceptance:
         """The rule for the robot with the preloads of a combination."""
@@ -77,11 +79,14 @@ class Task:
             for index, joint in enumerate(self.acceptance.robot.joints)
             if "stiffness" in joint.actuator.commanded
         )
-        stretched, factor = self._stretched(found.factor)
+        changed = any(found.constants.values()) and not self._declares_stiffness
+        stretched, factor = self._stretched(found.factor, changed=changed)
+        raised = with_raised_stiffness(stretched, found.constants)
+        declared, factor = self._kept_rate(raised, factor, found)
         return Remedy(
             size=found.size,
             robot=found.robot(self.acceptance.robot),
-            declared=with_raised_stiffness(stretched, found.constants),
+            declared=declared,
             factor=factor,
             asked=self.trajectory,
             slow_down=self._slow_down(found),
@@ -100,13 +105,14 @@ class Task:
         find = partial(_nearest_change, acceptance, slower)
         changes = for_refused_joints(acceptance, slower, find, found.factor)
         summaries = tuple(_summary(robot.joints[index], change) for index, (_, change) in changes.items())
-        stretched, factor = self._stretched(found.factor)
+        stretched, factor = self._stretched(found.factor, changed=bool(changes))
         scale = factor ** np.arange(STIFFNESS.orders)[:, None]
         at_steps = {index: scale * change.rows[:, load.steps] for index, (load, change) in changes.items()}
+        declared, factor = self._kept_rate(with_changed_stiffness(stretched, at_steps), factor, found)
         return Remedy(
             size=self._size(found.factor, [(load, change.rows[0]) for load, change in changes.values()]),
             robot=robot,
-            declared=with_changed_stiffness(stretched, at_steps),
+            declared=declared,
             factor=factor,
             asked=self.trajectory,
             slow_down=self._slow_down(found),
@@ -137,15 +143,31 @@ class Task:
             transition=LongerTransition(before, after),
         )
 
-    def _stretched(self, factor: float) -> tuple[Trajectory, float]:
+    @property
+    def _declares_stiffness(self) -> bool:
+        return isinstance(self.trajectory.commanded[STIFFNESS.key], ClosedForm)
+
+    def _stretched(self, factor: float, *, changed: bool) -> tuple[Trajectory, float]:
         """The trajectory passed more slowly by a factor, and by which factor it is still to be stretched.
 
         A record is stretched after its fit only: that of slower samples could be another one, hum of mains at
-        other frequencies for example.
+        other frequencies for example. Resampled steps with another stiffness are known as such, at the rate
+        that the stretched ones have.
+
+        Args:
+            factor: how much longer it lasts.
+            changed: whether the stiffness will be recorded at the steps.
         """
-        if self.trajectory.estimates:
+        resampled = isinstance(self.trajectory.times, ResampledTimes)
+        if self.trajectory.estimates and not (changed and resampled):
             return self.trajectory, factor
         return self.trajectory.stretched(factor), 1.0
+
+    def _kept_rate(self, declared: Trajectory, factor: float, found: Combination) -> tuple[Trajectory, float]:
+        """What is declared and is still slower by a factor, at the rate of the task if it can be."""
+        if found.factor == 1 or not self.keeps_rate:
+            return declared, factor
+        return with_kept_rate(declared, factor, rate_of(self.trajectory))
 
     def constants(self) -> Combination:
         """The smallest constant changes of stiffness that mend the task by themselves.

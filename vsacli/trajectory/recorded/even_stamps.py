@@ -15,6 +15,9 @@ EVEN = 1e-6
 LOST = 1.5
 """Steps, in median ones, over which rows are missing."""
 
+DIGITS = 17
+"""Digits that tell any two floating-point numbers apart."""
+
 COARSEST = 0.5
 """Resolution, in steps, up to which stamps show whether samples are even."""
 
@@ -59,6 +62,22 @@ def resolution(stamps: FloatArray) -> float:
 def _rounding(stamps: FloatArray) -> float:
     """Distance of the floating-point numbers that stamps are, s."""
     return float(np.spacing(np.abs(stamps).max()))
+
+
+def even_rate(stamps: FloatArray) -> float | None:
+    """Return the samples per second of even stamps that miss none, (samples,) in s; None of others.
+
+    Of all rates that the rounding of the stamps admits it is the one of fewest digits.
+    """
+    steps = len(stamps) - 1
+    elapsed = elapsed_times(stamps)
+    if steps < 1 or np.abs(np.diff(elapsed) * steps / elapsed[-1] - 1).max() > 2 * EVEN:
+        return None
+    even = elapsed[-1] * np.arange(steps + 1) / steps
+    off = float(np.abs(stamps - stamps[0] - even).max()) + _rounding(stamps)
+    rate, allowed = steps / float(elapsed[-1]), 2 * off / float(elapsed[-1])  # off at either end
+    rounded = (float(f"{rate:.{digits}g}") for digits in range(1, DIGITS))
+    return next((each for each in rounded if abs(each - rate) <= allowed * rate), rate)
 
 
 def rounding_notes(stamps: FloatArray) -> tuple[str, ...]:

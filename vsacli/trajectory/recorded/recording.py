@@ -27,7 +27,7 @@ from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, time_problems, value_problems
 from vsacli.trajectory.recorded.samples import SampledProfile, Samples
-from vsacli.trajectory.times import RecordedTimes, Times, uniform_times_over
+from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times
 from vsacli.trajectory.trajectory import Trajectory
 
 NEEDED = (POSITION, *(signal for signal in COMMANDED.values() if signal.device is None))
@@ -74,7 +74,7 @@ class Recording:
         if rate is None or self.rated:
             return self.times
         try:
-            return uniform_times_over(self.times.span, rate)
+            return ResampledTimes(*self.times.span, rate)
         except InputError as error:
             raise InputError.one(f"rate: {error}", file) from None
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat
+from vsacli.compute.rounding import OfRounding
 
 Function = Callable[..., Values]
 """Value, slope and curvature at (x, *constants), arrays of one shape."""
@@ -15,10 +16,10 @@ Function = Callable[..., Values]
 MAX_STEPS = 100
 """Halvings leave no digit after 60; between them Halley's method takes a handful of steps."""
 
-SHORT_STEP = 1e-5
+SHORT_STEP = OfRounding(1e-5, power=1 / 3)
 """Step, relative to x, after which the third power of it is rounding."""
 
-LEFT_ERROR = 1e-17
+LEFT_ERROR = OfRounding(1e-17)
 """Error after a step, relative to x, that is below rounding: Newton's step times Halley's correction squared.
 Where the slope vanishes, as next to a fold, steps that are short enough elsewhere are not."""
 
