@@ -62,7 +62,7 @@ def calibrated(model: Model, orders: int, unexplained: float) -> Calibration:
     cautious = np.array([model.variances(order, model.cautious) for order in range(orders)])
     softer, stiffer = (np.array([each.variances(order) for order in range(orders)]) for each in near)
     bias = (softer - stiffer) / (2 * STEP)
-    found = cautious - (1 - share) * bias
+    found = np.maximum(cautious - (1 - share) * bias, 0)
     found = np.where(model.kinks, np.maximum(found, KINK_VARIANCE * cautious), found)
     found *= 1 + unexplained**2 / float(np.mean(found[-1, model.inside]) * model.noise_variance)
     return Calibration(

@@ -119,6 +119,11 @@ def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
         if known is not None and known.lines.hum:
             hum = ", ".join(f"{frequency:.4g}" for frequency in known.lines.hum[:LISTED_LINES])
             yield f"mains hum of {hum} Hz in {value} of {_members([part], labels)} is taken for noise"
+        if known is not None and known.lines.resampled:
+            yield (
+                f"{value} of {_members([part], labels)} was resampled from {known.lines.resampled:.4g} Hz,"
+                " which left images of the motion: they are taken for noise"
+            )
         if part.noise is not None and part.noise.share > TOLD and (known is None or known.determined):
             yield (
                 f"{value} of {_members([part], labels)} has noise above {part.noise.above:.2g} Hz that a"

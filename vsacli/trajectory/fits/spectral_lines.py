@@ -42,6 +42,12 @@ UNEVEN = 0.2
 """Share of a step by which stamps may be uneven for a periodogram."""
 
 
+CLOSE_LINES = 2.0
+"""Lines of a spectrum within which frequencies are the same."""
+
+FAR = 10.0
+"""Least ratio of the middle of two images to their distance from it. Harmonics of a motion are closer."""
+
 STEP_TOLERANCE = 0.01
 """Share of an encoder's step by which values may miss its multiples, as they were printed."""
 
@@ -56,16 +62,19 @@ class Lines(NamedTuple):
         hum: those of mains, Hz.
         others: which may be motion, Hz.
         share: of the residual's power that the others carry.
+        resampled: rate from which resampling left images of the motion, Hz; 0 if there are none.
     """
 
     hum: tuple[float, ...] = ()
     others: tuple[float, ...] = ()
     share: float = 0.0
+    resampled: float = 0.0
 
     def stretched(self, factor: float) -> Lines:
         """Those of the same course, slower by a factor."""
         hum = tuple(frequency / factor for frequency in self.hum)
-        return Lines(hum, tuple(frequency / factor for frequency in self.others), self.share)
+        others = tuple(frequency / factor for frequency in self.others)
+        return Lines(hum, others, self.share, self.resampled / factor)
 
 
 def spectral_lines(
@@ -96,11 +105,15 @@ def spectral_lines(
     found, frequencies = found[matter], frequencies[matter]
     if len(found) > MOST_LINES:
         return Lines()
+    near = CLOSE_LINES / (len(time) * step)
     mains = _mains(frequencies)
-    unclear = ~mains & (frequencies < (np.inf if bandwidth is None else bandwidth))
-    near = np.unique(found[unclear, None] + np.arange(-LEAKAGE, LEAKAGE + 1))
-    share = float(np.sum(power[near]) / max(np.sum(power), np.finfo(float).tiny))
-    return Lines(tuple(frequencies[mains].tolist()), tuple(frequencies[unclear].tolist()), share)
+    mains |= _side_bands(frequencies, mains, near)
+    images, resampled = _images(frequencies, near)
+    unclear = ~mains & ~images & (frequencies < (np.inf if bandwidth is None else bandwidth))
+    places = np.unique(found[unclear, None] + np.arange(-LEAKAGE, LEAKAGE + 1))
+    share = float(np.sum(power[places]) / max(np.sum(power), np.finfo(float).tiny))
+    hum, others = (tuple(frequencies[which].tolist()) for which in (mains & ~images, unclear))
+    return Lines(hum, others, share, resampled)
 
 
 def _standing_out(power: FloatArray, neighbours: int) -> IndexArray:
@@ -115,6 +128,35 @@ def _standing_out(power: FloatArray, neighbours: int) -> IndexArray:
     here = power[centre]
     peak = (here >= power[centre - 1]) & (here >= power[centre + 1])
     return np.asarray(centre[peak & (here > LINE_RATIO * beside)])
+
+
+def _side_bands(frequencies: FloatArray, mains: BoolArray, near: float) -> BoolArray:
+    """Which lie in pairs about one of mains, as hum has them that grows and fades."""
+    found = np.zeros(len(frequencies), dtype=bool)
+    for middle in frequencies[mains]:
+        mirrored = 2 * middle - frequencies
+        found |= np.any(np.abs(frequencies[:, None] - mirrored) < near, axis=1)
+    return found
+
+
+def _images(frequencies: FloatArray, near: float) -> tuple[BoolArray, float]:
+    """Which are images that resampling left, and the rate from which: pairs about it and about its double.
+
+    What interpolates samples of another rate repeats the motion's lines on both sides of its multiples.
+    """
+    first, second = np.triu_indices(len(frequencies), 1)
+    far = (frequencies[first] + frequencies[second]) > FAR * (frequencies[second] - frequencies[first])
+    first, second = first[far], second[far]
+    middle = (frequencies[first] + frequencies[second]) / 2
+    distance = (frequencies[second] - frequencies[first]) / 2
+    found, rates = np.zeros(len(frequencies), dtype=bool), []
+    for rate, about in zip(middle, distance, strict=True):
+        multiple = np.round(middle / rate)
+        alike = (np.abs(middle - multiple * rate) < near) & (np.abs(distance - about) < near)
+        if np.any(alike & (multiple == 2)):
+            rates.append(float(rate))
+            found[first[alike]] = found[second[alike]] = True
+    return found, min(rates, default=0.0)
 
 
 def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
