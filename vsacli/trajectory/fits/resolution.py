@@ -44,6 +44,10 @@ CLOSE = 3.0
 coarse one may state the least deviation of a derivative that it does not see: with a factor of 100, steps of
 velocity smoothed over 50 ms were missed by 0.03 rad, and motor torques 17 % off where 7 % were stated."""
 
+MISSED = 0.3
+"""Share of the record's deviation that a residual may have. A larger one is motion that no resolution but the
+finest follows, which none confirms."""
+
 PROBES = 16384
 """Samples, about, of which a residual is taken."""
 
@@ -117,17 +121,20 @@ def find_resolution(
         below: a frequency in Hz that no resolution that is tried may follow.
 
     Returns:
-        If none is confirmed, that with the least deviation among those close to the samples; None if there is
-        none.
+        If none is confirmed, that with the least deviation among those close to the samples; the finest if
+        none is; None if there is none.
     """
     if known.bandwidth is not None:
         return _given(time, row, degree, order, known)
     tried = []
-    for coarse, fine in pairwise(_models(_moments(time, row, degree, below), known)):
-        tried.append(_compared(time, row, coarse, fine, order))
+    finest: Model | None = None
+    for coarse, finest in pairwise(_models(_moments(time, row, degree, below), known)):
+        tried.append(_compared(time, row, coarse, finest, order))
         if tried[-1].accepted:
             return tried[-1]
     least = min((each.residual for each in tried), default=0.0)
+    if finest is not None and least > MISSED:
+        return tried[-1]._replace(model=finest, residual=_residual(time, row, finest))
     close = [each for each in tried if each.residual <= CLOSE * least]
     return min(close, key=lambda each: each.total, default=None)
 
@@ -177,12 +184,17 @@ def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, ord
     explained = change < CONFIRMED * deviation
     model = fine if not explained and change < NEGLIGIBLE * size else coarse
     deviation = deviation if model is coarse else _deviation(fine, order)
-    some = slice(None, None, 1 + len(time) // PROBES)
-    residual = _rms(row[some] - model.spline(time[some])[:, 0])
+    residual = _residual(time, row, model)
     # the finer of two splines near the same samples is the coarser plus what is independent of it
     more, less = (_mean_variance(each, each.variances(order)) for each in (fine, coarse))
     unexplained = float(np.sqrt(max(0.0, change**2 - abs(more - less))))
     return Resolution(model, deviation / size, change / size, unexplained, residual)
+
+
+def _residual(time: FloatArray, row: FloatArray, model: Model) -> float:
+    """Of a model, root mean square."""
+    some = slice(None, None, 1 + len(time) // PROBES)
+    return _rms(row[some] - model.spline(time[some])[:, 0])
 
 
 def _deviation(model: Model, order: int) -> float:
