@@ -14,11 +14,11 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
 from vsacli.trajectory.fits import fit_samples
-from vsacli.trajectory.fits.spectrum import followed_noise
+from vsacli.trajectory.fits.spectrum import followed_noise, motion_band
 
 ONCE_WRONG = (10, 58, 60, 78, 118, 130, 132, 208, 216, 346, 362, 392, 657)
-"""Recordings that passed for right: torques were wrong by up to 90 %, or by 10 to 60,000 deviations. Of the last
-only the finest resolution follows the motion, of the others noise that a steep filter left."""
+"""Recordings that passed for right: torques were wrong by up to 90 %, or by 10 to 60,000 deviations. The last
+moves so fast that only the finest resolution follows; in the others a steep filter left noise."""
 
 
 def share_of(time, row, bandwidth=None, degree=7, order=4):
@@ -60,6 +60,18 @@ def test_motion_is_no_noise(name, seed, rate):
     time = np.arange(10 * rate + 1) / rate
     # rounding of the samples' last digit is noise, too, the more the higher the rate
     assert share_of(time, MOTIONS[name](time, seed)[0]).share < 0.05
+
+
+def test_the_band_of_the_motion_ends_where_the_noise_begins():
+    time = np.arange(5001) / 500
+    row = two_sines(time) + filtered(0, time, 10, 3e-4)
+    spline, inside = make_interp_spline(time, row[:, None], k=7), (time[50], time[-50])
+    noise = followed_noise(spline, inside, time[1], 4)
+    # the faster sine has nearly all of the derivative; a line is 0.1 Hz wide, with a Hann window two
+    assert motion_band(spline, inside, time[1], 4, noise.above + 0.3) == pytest.approx(1.3, abs=0.25)
+    assert motion_band(spline, inside, time[1], 4) > 5
+    resting = make_interp_spline(time, 0 * row[:, None], k=7)
+    assert np.isnan(motion_band(resting, inside, time[1], 4))
 
 
 def test_below_a_stated_bandwidth_there_is_motion():

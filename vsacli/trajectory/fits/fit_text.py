@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.trajectory.fits.fit import Fit, Part
+from vsacli.trajectory.fits.fit import ORDERS, Fit, Part
 from vsacli.trajectory.fits.selection import (
     FEWEST_JUDGED,
     INTERPOLATE,
@@ -17,6 +17,7 @@ from vsacli.trajectory.fits.selection import (
     SMOOTH,
 )
 from vsacli.trajectory.fits.smoothing import Smoothing
+from vsacli.trajectory.fits.spectrum import motion_band
 
 TOLD = 0.01
 """Share of the highest derivative from which on filtered noise in it is told."""
@@ -151,11 +152,21 @@ def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
                 "residual": {"rms": float(fit.residual[member]), "max": float(fit.largest[member])},
                 "noise": float(fit.noise[member]),
                 "doubtful": dict(zip(("start", "end"), part.doubtful, strict=True)),
+                "band": _band(part, member, fit),
                 **_judgement(part),
             }
             for member, part in sorted(parts.items(), key=itemgetter(0))
         ],
     }
+
+
+def _band(part: Part, member: int, fit: Fit) -> float | None:
+    """Up to which frequency a component moves, Hz; None of one that rests."""
+    column = part.members.tolist().index(member)
+    spline = type(part.spline)(part.spline.t, part.spline.c[:, [column]], part.spline.k)
+    above = np.inf if part.noise is None else part.noise.above
+    band = motion_band(spline, part.inside, fit.step, ORDERS[fit.degree] - 1, above)
+    return None if np.isnan(band) else band
 
 
 def _judgement(part: Part) -> dict[str, Any]:

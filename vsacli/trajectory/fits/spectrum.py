@@ -70,6 +70,9 @@ TAPERED = 10
 """Share of a stretch at each end, one over this, where a window is too small to be undone."""
 
 
+WITHIN = 0.99
+"""Share of a derivative's power that its band has."""
+
 LEAST_REST = 0.01
 """Share of a derivative's power that is taken for motion at least."""
 
@@ -171,6 +174,28 @@ def followed_noise(
             above = _end_of_motion(spectrum, bands, valley, top)
             return FollowedNoise(float(np.sqrt(min(1.0, power / total))), above, peak)
     return FollowedNoise()
+
+
+def motion_band(
+    spline: BSpline[np.float64],
+    inside: tuple[float, float],
+    step: float,
+    order: int,
+    below: float = np.inf,
+) -> float:
+    """Frequency up to which 99 % of the power of a derivative lies, Hz; NaN of what rests.
+
+    Args:
+        spline: near or through the samples, with one column.
+        inside: first and last time of the stretch that is not doubtful, s.
+        step: mean distance of samples, s.
+        order: of the derivative.
+        below: frequency from which on it is noise, Hz.
+    """
+    spectrum = _spectrum(spline, inside, step, order)
+    power = np.where(spectrum.frequency < below, np.sum(spectrum.power, axis=0), 0.0)
+    summed = np.cumsum(power)
+    return float(spectrum.frequency[np.searchsorted(summed, WITHIN * summed[-1])]) if summed[-1] else np.nan
 
 
 def _spectrum(spline: BSpline[np.float64], inside: tuple[float, float], step: float, order: int) -> _Spectrum:
