@@ -57,11 +57,12 @@ def files_below(folder: Path, pattern: str) -> set[str]:
 
 
 def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> None:
-    modules = files_below(REPOSITORY / "vsacli", "*.py") | files_below(REPOSITORY / "vsacli", "*.c")
+    package = REPOSITORY / "vsacli"
+    modules = files_below(package, "*.py") | files_below(package, "*.c") | files_below(package, "*.in")
     pages = {
         name
         for ending in ("css", "html", "js")
-        for name in files_below(REPOSITORY / "vsacli" / "results" / "pages", f"*.{ending}")
+        for name in files_below(package / "results" / "pages", f"*.{ending}")
     }
     examples = {
         f"vsacli/{name}"
@@ -71,6 +72,7 @@ def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> No
     }
     assert {"vsacli/robots/vsa_3r.yaml", "vsacli/trajectories/rest_to_rest.yaml"} <= examples
     content = {name for name in wheel.root.namelist() if not re.search(r"\.dist-info/|/$", name)}
+    assert "vsacli/control/codegen/templates/robot.h.in" in modules
     assert {"vsacli/results/pages/page.html", "vsacli/results/pages/page.css"} <= pages
     assert content == modules | pages | examples | {"vsacli/py.typed"}
 

@@ -17,9 +17,8 @@ from subjects import motion, seven_joints
 from timing import medians
 
 import vsacli.compute.tracing
-from vsacli.control.codegen.header import header_text
 from vsacli.control.codegen.robot_functions import link_torques_function
-from vsacli.control.codegen.scalar import source_text
+from vsacli.control.codegen.texts import header_text, source_text
 
 OURS = "vsacli, recorded, C"
 LOOP = """
@@ -67,8 +66,8 @@ def compare(samples: int, repeats: int) -> list[Recorder]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         casadi = CasadiPeer(robot, folder)
-        (folder / "arm.h").write_text(header_text("arm", robot, [function], "double", "/* timed */"))
-        (folder / "arm.c").write_text(source_text("arm", [function], "double", "/* timed */"))
+        (folder / "arm.h").write_text(header_text("arm", robot, [function], "double", "Timed."))
+        (folder / "arm.c").write_text(source_text("arm", [function], "double", "Timed."))
         (folder / "loop.c").write_text(LOOP)
         subprocess.run(["gcc", *FLAGS, "arm.c", "loop.c", "-o", "arm.so", "-lm"], cwd=folder, check=True)
         library = ctypes.CDLL(str(folder / "arm.so"))

@@ -19,7 +19,7 @@ from vsacli.compute.engine.compiler import Library
 from vsacli.compute.engine.engines import kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.control.codegen.interface import Array, Function, Structure
-from vsacli.control.codegen.scalar import DIGEST
+from vsacli.control.codegen.texts import DIGEST
 
 pytestmark = needs_compiler
 

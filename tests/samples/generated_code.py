@@ -12,18 +12,15 @@ import numpy as np
 
 from samples.marks import COMPILERS
 from vsacli.base.arrays import FloatArray
-from vsacli.control.codegen.binding import binding_text
-from vsacli.control.codegen.build_files import build_files
-from vsacli.control.codegen.header import header_text
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.project import Project, prefix_of
-from vsacli.control.codegen.scalar import source_text
+from vsacli.control.codegen.texts import binding_text, filled, header_text, source_text
 from vsacli.robot.model import Robot
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 """Every warning is an error."""
 
-HEAD = "/* for a test */"
+ABOUT = "For a test."
 
 Values = dict[str, Any]
 
@@ -84,9 +81,9 @@ def compiled(
     """Functions that a header declares, compiled in a folder."""
     files = {
         f"{prefix}.h": header,
-        f"{prefix}.c": source_text(prefix, functions, precision, HEAD),
-        f"{prefix}.py": binding_text(prefix, functions, precision, HEAD),
-        **build_files(prefix),
+        f"{prefix}.c": source_text(prefix, functions, precision, ABOUT),
+        f"{prefix}.py": binding_text(prefix, functions, precision, ABOUT),
+        "Makefile": filled("Makefile", prefix),
     }
     write_files(Project(files, [], ()), folder)
     return Compiled(folder, prefix)
@@ -96,5 +93,5 @@ def compiled_robot(folder: Path, robot: Robot, functions: Sequence[Function], pr
     """Some functions of a robot, without the rest of a project."""
     prefix = prefix_of(robot)
     folder.mkdir()
-    header = header_text(prefix, robot, functions, precision, HEAD)
+    header = header_text(prefix, robot, functions, precision, ABOUT)
     return compiled(folder, prefix, header, functions, precision)

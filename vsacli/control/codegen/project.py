@@ -14,18 +14,22 @@ from vsacli.base.outputs import Outputs
 from vsacli.base.texts import sentence
 from vsacli.base.version import __version__
 from vsacli.compute.tracing import TooLongError
-from vsacli.control.codegen.binding import binding_text
-from vsacli.control.codegen.build_files import build_files
 from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
-from vsacli.control.codegen.header import comment, header_text
 from vsacli.control.codegen.interface import Function
-from vsacli.control.codegen.parameters import check_parameters, with_parameters
+from vsacli.control.codegen.parameters import Maker, check_parameters, with_parameters
 from vsacli.control.codegen.precision_check import check_single_precision
-from vsacli.control.codegen.readme import readme_text
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.scalar import DIGEST, source_text
-from vsacli.control.codegen.self_test import Reference, self_test_text
+from vsacli.control.codegen.self_test import Reference
+from vsacli.control.codegen.texts import (
+    DIGEST,
+    binding_text,
+    filled,
+    header_text,
+    readme_text,
+    self_test_text,
+    source_text,
+)
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
 
@@ -74,9 +78,9 @@ def generate(
             number, or one that cannot be an argument.
     """
     prefix = prefix_of(robot)
-    title = f"{robot.name}, {_plural(len(robot.joints))}, {precision}. Written by vsacli {__version__}."
+    joints = "1 joint" if len(robot.joints) == 1 else f"{len(robot.joints)} joints"
+    title = f"{robot.name}, {joints}, {precision}. Written by vsacli {__version__}."
     about = " ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)])
-    head = comment(about)
     chosen = parameters(robot, patterns) if patterns else ()
     try:
         functions, omitted = _functions(robot, wrench, chosen)
@@ -86,22 +90,19 @@ def generate(
         if precision == "float":
             check_single_precision(robot, functions, reference)
         files = {
-            f"{prefix}.h": header_text(prefix, robot, functions, precision, head),
-            f"{prefix}.c": source_text(prefix, functions, precision, head),
-            f"{prefix}_test.c": self_test_text(prefix, functions, reference, precision, head),
+            f"{prefix}.h": header_text(prefix, robot, functions, precision, about),
+            f"{prefix}.c": source_text(prefix, functions, precision, about),
+            f"{prefix}_test.c": self_test_text(prefix, functions, reference, precision, about),
             f"{prefix}.py": binding_text(prefix, functions, precision, about),
-            **build_files(prefix),
+            "Makefile": filled("Makefile", prefix),
+            "CMakeLists.txt": filled("CMakeLists.txt", prefix),
             "README.md": readme_text(prefix, robot, functions, precision, omitted),
         }
     except NotImplementedError as error:
         raise InputError.one(f"no C code can be made of {robot.name}: {error}") from error
-    return Project(_sealed(files), omitted, robot.warnings)
-
-
-def _sealed(files: dict[str, str]) -> dict[str, str]:
-    """The texts with their common digest."""
     digest = hashlib.sha256("".join(files.values()).encode()).hexdigest()
-    return {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
+    sealed = {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
+    return Project(sealed, omitted, robot.warnings)
 
 
 def _functions(
@@ -116,17 +117,21 @@ def _functions(
         InputError: some of the chosen numbers cannot be arguments of these.
         NotImplementedError: not even the first two.
     """
-    makers = (link_torques_function, inverse_dynamics_function)
+
+    def made(make: Maker) -> Function:
+        function = with_parameters(make, robot, wrench, chosen)
+        _ = function.program  # raises what keeps it from being generated
+        return function
+
     try:
-        functions = [_recorded(with_parameters(make, robot, wrench, chosen)) for make in makers]
+        functions = [made(link_torques_function), made(inverse_dynamics_function)]
     except NotImplementedError:
         if chosen:
             check_parameters(robot, wrench, chosen)
         raise
     omitted = []
     try:
-        make = feedback_linearization_function
-        functions.append(_recorded(with_parameters(make, robot, wrench, chosen)))
+        functions.append(made(feedback_linearization_function))
     except InputError as error:
         omitted.append(f"no feedback_linearization: {error}")
     except NotImplementedError as error:
@@ -153,16 +158,6 @@ def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
     )
 
 
-def _recorded(function: Function) -> Function:
-    """A function that is known to have a program.
-
-    Raises:
-        NotImplementedError: as of `Function.program`.
-    """
-    _ = function.program
-    return function
-
-
 def prefix_of(robot: Robot) -> str:
     """What the names in C begin with: the robot's, in lower case, of letters that C allows."""
     name = re.sub(r"\W+", "_", robot.name.lower(), flags=re.ASCII).strip("_")
@@ -178,7 +173,3 @@ def write(project: Project, folder: str | Path, outputs: Outputs) -> None:
     outputs.folder(folder)
     for name, text in project.files.items():
         outputs.file(Path(folder) / name).write_text(text)
-
-
-def _plural(joints: int) -> str:
-    return f"{joints} joint" if joints == 1 else f"{joints} joints"

@@ -45,24 +45,6 @@ static inline int search(const {type} *nodes, int count, {type} x)
 """Functions beyond math.h; of the two sides of a comparison, maximum and minimum let NaN pass."""
 
 
-DIGEST = "0xd19e5700u"
-"""Stands in the texts for the digest of all of them until that is known; C that is read before is valid."""
-
-
-def included(prefix: str) -> str:
-    """How a file includes the header, of which it takes none but its own."""
-    return f"""#include "{prefix}.h"
-
-#if {prefix.upper()}_DIGEST != {DIGEST}
-#error "this file and {prefix}.h were not written together: generate both again"
-#endif"""
-
-
-_STRICT = """#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
-#error "compile without -ffast-math and -ffinite-math-only: what is not finite would go unnoticed"
-#endif"""
-
-
 class Scalar(Dialect):
     """Plain C99.
 
@@ -177,15 +159,8 @@ BYTES = {"signed char": 1, "short": 2, "float": 4, "double": 8}
 """Of an entry of each type."""
 
 
-def source_text(prefix: str, functions: Sequence[Function], precision: str, head: str) -> str:
-    """The source file.
-
-    Args:
-        prefix: what the names of the robot begin with.
-        functions: what it defines.
-        precision: one of `PRECISIONS`.
-        head: the comment at its beginning.
-    """
+def definitions(prefix: str, functions: Sequence[Function], precision: str) -> Iterator[str]:
+    """Yield all that the source file defines: constants, helpers, subroutines, then the functions."""
     dialect = Scalar(precision)
     programs = [function.program for function in functions]
     tables = Tables(programs, dialect.array_type)
@@ -196,13 +171,12 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, head
         "\n".join(_definition(prefix, function, program, writer, dialect))
         for function, program in zip(functions, programs, strict=True)
     ]
-    declarations = list(table_declarations(tables, dialect))
-    constants = [_constant(prefix, each, dialect) for each in structures(functions) if each.nominal]
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
-    helpers = [helper_text(name, precision) for name in HELPERS if name in used]
-    constants.append("\n".join(declarations))
-    parts = [head, included(prefix), "#include <math.h>", _STRICT, *constants, *helpers, *bodies]
-    return "\n\n".join(filter(None, parts)) + "\n"
+    yield from (_constant(prefix, each, dialect) for each in structures(functions) if each.nominal)
+    if declarations := list(table_declarations(tables, dialect)):
+        yield "\n".join(declarations)
+    yield from (helper_text(name, precision) for name in HELPERS if name in used)
+    yield from bodies
 
 
 def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:

@@ -1,0 +1,278 @@
+"""Texts of the generated files: templates, and what fills their holes.
+
+A template in `templates/` is a file as it is written for every robot, with holes such as `@prefix`. Lists
+that depend on the robot, such as members of structures and reference values, are made here; the bodies of
+functions come from `vsacli.control.codegen.scalar`.
+"""
+
+from __future__ import annotations
+
+import string
+import textwrap
+from collections.abc import Iterable, Iterator, Sequence
+from importlib.resources import files
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import Flag
+from vsacli.base.texts import for_comment, for_markdown, one_line, sentence
+from vsacli.base.version import __version__
+from vsacli.compute.tracing.c_code import digits
+from vsacli.control.codegen.cost import table_bytes, worst_cost
+from vsacli.control.codegen.interface import Function, Structure, structures
+from vsacli.control.codegen.scalar import WIDTH, definitions, signature
+from vsacli.control.codegen.self_test import CASES, TOLERANCE, Arrays, Reference
+from vsacli.robot.model import Robot
+
+DIGEST = "0xd19e5700u"
+"""Stands in the texts for the digest of all of them until that is known; C that is read before is valid."""
+
+_STEPS = "As a rule a loop ends after a handful of steps; near double solutions it takes more.\n"
+
+
+class _Template(string.Template):
+    """A text whose holes begin with @: $ has a meaning in Make and CMake, @ in none of the files."""
+
+    delimiter = "@"
+
+
+def filled(template: str, prefix: str, **values: object) -> str:
+    """Return the text of a template.
+
+    Args:
+        template: file name without `.in`.
+        prefix: what the names of the robot begin with.
+        values: what the other holes contain.
+    """
+    text = files("vsacli.control.codegen.templates").joinpath(f"{template}.in").read_text(encoding="utf-8")
+    return _Template(text).substitute(values, prefix=prefix, upper=prefix.upper(), digest=DIGEST)
+
+
+def comment(text: str) -> str:
+    """Return a comment in C, in as many lines as it takes, that no text ends early."""
+    lines = textwrap.wrap(for_comment(text), WIDTH - 6)
+    return "/* " + "\n   ".join(lines) + " */"
+
+
+def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precision: str, about: str) -> str:
+    """Return the header file: structures with units, bits, functions. Arguments as of `source_text`."""
+    upper = prefix.upper()
+    robot_file = "".join(
+        "/* Of the file that the robot was read from; results of the same file have it, too. */\n"
+        f'#define {upper}_ROBOT_SHA256 "{source.sha256}"\n'
+        for source in robot.sources[:1]
+    )
+    return filled(
+        "robot.h",
+        prefix,
+        head=comment(about),
+        version=__version__,
+        robot_file=robot_file,
+        about=comment(_conventions(robot, functions)),
+        joints=len(robot.joints),
+        flags="\n".join(f"    {upper}_{flag.name} = {flag.value}, /* {flag.meaning} */" for flag in Flag),
+        structures="\n\n".join(_structure(prefix, each, precision) for each in structures(functions)),
+        functions="\n\n".join(f"{comment(each.meaning)}\n{signature(prefix, each)};" for each in functions),
+    )
+
+
+def _conventions(robot: Robot, functions: Sequence[Function]) -> str:
+    acted_on = any(structure.name == "wrench" for structure in structures(functions))
+    acting = "the argument wrench acts" if acted_on else "nothing acts"
+    names = ", ".join(
+        f"{index} {joint.name} ({joint.type}, {joint.actuator_type})"
+        for index, joint in enumerate(robot.joints)
+    )
+    return (
+        f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN. SI units; "
+        f"signs, frames and gravity as in the robot file; {acting} on the end effector. Functions keep "
+        "nothing between calls."
+    )
+
+
+def _structure(prefix: str, structure: Structure, precision: str) -> str:
+    """The type of a structure in C, and its constant if it has nominal values."""
+    name = f"{prefix}_{structure.name}"
+    lines = [comment(structure.meaning), "typedef struct {"]
+    for array in structure.arrays:
+        shape = "".join(f"[{size}]" for size in array.shape)
+        number = "unsigned" if array.bits else precision
+        lines.append(f"    {number} {array.name}{shape}; /* {array.meaning} */")
+    lines.append(f"}} {name};")
+    if structure.nominal:
+        constant = f"extern const {name} {prefix}_nominal_{structure.name};"
+        lines += ["", "/* Those of the robot file. */", constant]
+    return "\n".join(lines)
+
+
+def source_text(prefix: str, functions: Sequence[Function], precision: str, about: str) -> str:
+    """Return the source file.
+
+    Args:
+        prefix: what the names of the robot begin with.
+        functions: what it defines.
+        precision: one of `vsacli.control.codegen.scalar.PRECISIONS`.
+        about: what the comment at its beginning says.
+    """
+    defined = "\n\n".join(definitions(prefix, functions, precision))
+    return filled("robot.c", prefix, head=comment(about), definitions=defined)
+
+
+def self_test_text(
+    prefix: str, functions: Sequence[Function], reference: Reference, precision: str, about: str
+) -> str:
+    """Return the test program; arguments as of `source_text`."""
+    tests: list[str] = []
+    for function in functions:
+        given = zip(function.arguments, reference.inputs(function), strict=True)
+        tests += (
+            _vector(f"{prefix}_{structure.name} {function.name}_{name}", structure, arrays)
+            for (name, structure), arrays in given
+        )
+        result = function.result
+        expected = f"{prefix}_{result.name} {function.name}_expected"
+        tests += [_vector(expected, result, reference.results(function)), _test(prefix, function, reference)]
+    return filled(
+        "robot_test.c",
+        prefix,
+        head=comment(about),
+        cases=CASES,
+        tolerance=TOLERANCE[precision],
+        tests="\n\n".join(tests),
+        calls=" + ".join(f"test_{function.name}()" for function in functions),
+    )
+
+
+def _vector(declared: str, structure: Structure, values: Arrays) -> str:
+    """A constant with the values of a structure in all cases."""
+    cases = (
+        ", ".join(
+            f".{array.name} = {_initializer(values[array.name][case], array.bits)}"
+            for array in structure.arrays
+        )
+        for case in range(CASES)
+    )
+    return "\n".join([f"static const {declared}[CASES] = {{", *(f"    {{{case}}}," for case in cases), "};"])
+
+
+def _initializer(values: FloatArray, bits: bool) -> str:
+    if values.ndim:
+        return "{" + ", ".join(_initializer(entry, bits) for entry in values) + "}"
+    return f"{int(values)}u" if bits else digits(float(values))
+
+
+def _test(prefix: str, function: Function, reference: Reference) -> str:
+    """The comparison of all entries of a result in C."""
+    own, result = function.name, f"{prefix}_{function.result.name}"
+    given = ", ".join(f"&{own}_{name}[n]" for name, _ in function.arguments)
+    comparisons = "\n".join(_comparisons(function, reference))
+    return f"""static int test_{own}(void)
+{{
+    int failures = 0;
+    for (int n = 0; n < CASES; n++) {{
+        const {result} *const expected = &{own}_expected[n];
+        {result} found;
+        {prefix}_{own}({given}, &found);
+{comparisons}
+    }}
+    return failures;
+}}"""
+
+
+def _comparisons(function: Function, reference: Reference) -> Iterator[str]:
+    for array in function.result.arrays:
+        scale, bound = reference.comparison(function, array.name)
+        for entry in array.entries:
+            both = f"found.{entry}", f"expected->{entry}"
+            if np.isfinite(bound):
+                both = f"at_most({both[0]}, {digits(bound)})", f"at_most({both[1]}, {digits(bound)})"
+            name = f"{function.name}: {entry}"
+            yield f'        failures += differs("{name}", n, {", ".join(both)}, {digits(scale)});'
+
+
+def binding_text(prefix: str, functions: Sequence[Function], precision: str, about: str) -> str:
+    """Return the Python module that calls the functions; arguments as of `source_text`."""
+    used = structures(functions)
+    loop = next((each for each in functions if each.name == "inverse_dynamics"), functions[0])
+    called = [*(_binding(prefix, each) for each in functions), *_constants(prefix, used)]
+    return filled(
+        "robot.py",
+        prefix,
+        head=textwrap.fill(one_line(about), WIDTH, initial_indent="# ", subsequent_indent="# "),
+        call=f"{loop.name}({_names(loop)})",
+        flags="\n".join(f"    {flag.name} = {flag.value}  # {flag.meaning}" for flag in Flag),
+        data_types="\n\n".join(_data_type(each, precision) for each in used),
+        functions="\n\n\n".join(called),
+    )
+
+
+def _names(function: Function) -> str:
+    return ", ".join(name for name, _ in function.arguments)
+
+
+def _type(structure: Structure) -> str:
+    return structure.name.capitalize()
+
+
+def _data_type(structure: Structure, precision: str) -> str:
+    """The type of a structure in Python, laid out as C has it."""
+    number = {"double": "np.float64", "float": "np.float32"}[precision]
+    members = "".join(
+        f'        ("{array.name}", {"np.uintc" if array.bits else number}, {array.shape}),\n'
+        for array in structure.arrays
+    )
+    return f"{_type(structure)} = np.dtype(\n    [\n{members}    ],\n    align=True,\n)"
+
+
+def _binding(prefix: str, function: Function) -> str:
+    """A function in Python with the arguments of that in C."""
+    meaning = f'"""{function.meaning}"""'
+    given = "".join(f", ({name}, {_type(structure)})" for name, structure in function.arguments)
+    return f"""def {function.name}({_names(function)}):
+{textwrap.fill(meaning, WIDTH, initial_indent="    ", subsequent_indent="    ")}
+    return _call(_LIBRARY.{prefix}_{function.name}, {_type(function.result)}{given})"""
+
+
+def _constants(prefix: str, used: Iterable[Structure]) -> Iterator[str]:
+    """The nominal values of structures, in Python."""
+    for each in used:
+        if each.nominal:
+            name, kind = f"{prefix}_nominal_{each.name}", _type(each)
+            yield f"""_CONSTANT = (ctypes.c_char * {kind}.itemsize).in_dll(_LIBRARY, "{name}")
+NOMINAL_{each.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""
+
+
+def readme_text(
+    prefix: str, robot: Robot, functions: Sequence[Function], precision: str, omitted: Sequence[str]
+) -> str:
+    """Return the README: how to use the code, and what a call costs."""
+    loop = next(function for function in functions if function.name == "inverse_dynamics")
+    programs = [function.program for function in functions]
+    costs = [worst_cost(program) for program in programs]
+    return filled(
+        "README.md",
+        prefix,
+        name=for_markdown(robot.name),
+        warnings="".join(f"\nWarning: {for_markdown(sentence(warning))}\n" for warning in robot.warnings),
+        call=_names(loop),
+        arguments=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
+        tolerance=TOLERANCE[precision],
+        functions="\n".join(
+            f"- `{' '.join(signature(prefix, function).split()).replace('( ', '(')}`: {function.meaning}"
+            for function in functions
+        ),
+        joints=for_markdown(", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names))),
+        omitted="".join(f"There is {for_markdown(sentence(reason))}\n" for reason in omitted),
+        numbers="".join(
+            filled("parameters.md", prefix, first=next(each.entries))
+            for each in structures(functions)
+            if each.nominal
+        ),
+        costs="\n".join(
+            f"| `{function.name}` | {cost.operations:,} | {cost.functions:,} | {cost.loops:,} |"
+            for function, cost in zip(functions, costs, strict=True)
+        ),
+        steps=_STEPS if any(cost.loops for cost in costs) else "",
+        tables=table_bytes(programs, precision),
+    )
