@@ -79,9 +79,10 @@ class Reference:
     def results(self, function: Function) -> Arrays:
         """Return the results of a function for these inputs, by the names of the arrays of its result."""
         if function.name not in self._results:
-            with np.errstate(all="ignore"):
-                cases = [_computed(function, row) for row in self._entries(function)]
-            self._results[function.name] = _result_arrays(function, np.array(cases).T)
+            with np.errstate(all="ignore"):  # one sample at a time, as on the controller
+                cases = [function.compute(list(entries[:, None])) for entries in self._entries(function)]
+            rows = [[np.asarray(row, dtype=np.float64).item() for row in case] for case in cases]
+            self._results[function.name] = _result_arrays(function, np.array(rows).T)
         return self._results[function.name]
 
     def single_results(self, function: Function) -> Arrays:
@@ -177,11 +178,6 @@ def _gains(shape: Sequence[int]) -> Arrays:
 def _result_arrays(function: Function, rows: FloatArray) -> Arrays:
     found = function.result.layout.arrays(rows)
     return {name: over_time(array) for name, array in found.items()}
-
-
-def _computed(function: Function, entries: FloatArray) -> list[float]:
-    """The results for one sample, by NumPy."""
-    return [np.asarray(row, dtype=np.float64).item() for row in function.compute(list(entries[:, None]))]
 
 
 TOLERANCE = {"double": 1e-9, "float": 2e-3}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import string
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
 import numpy as np
@@ -38,13 +38,7 @@ class _Template(string.Template):
 
 
 def filled(template: str, prefix: str, **values: object) -> str:
-    """Return the text of a template.
-
-    Args:
-        template: file name without `.in`.
-        prefix: what the names of the robot begin with.
-        values: what the other holes contain.
-    """
+    """Return the text of `templates/TEMPLATE.in` with these values in its holes."""
     text = files("vsacli.control.codegen.templates").joinpath(f"{template}.in").read_text(encoding="utf-8")
     return _Template(text).substitute(values, prefix=prefix, upper=prefix.upper(), digest=DIGEST)
 
@@ -125,14 +119,13 @@ def self_test_text(
     """Return the test program; arguments as of `source_text`."""
     tests: list[str] = []
     for function in functions:
-        given = zip(function.arguments, reference.inputs(function), strict=True)
+        constants = (*function.arguments, ("expected", function.result))
+        values = (*reference.inputs(function), reference.results(function))
         tests += (
             _vector(f"{prefix}_{structure.name} {function.name}_{name}", structure, arrays)
-            for (name, structure), arrays in given
+            for (name, structure), arrays in zip(constants, values, strict=True)
         )
-        result = function.result
-        expected = f"{prefix}_{result.name} {function.name}_expected"
-        tests += [_vector(expected, result, reference.results(function)), _test(prefix, function, reference)]
+        tests.append(_test(prefix, function, reference))
     return filled(
         "robot_test.c",
         prefix,
@@ -195,7 +188,8 @@ def binding_text(prefix: str, functions: Sequence[Function], precision: str, abo
     """Return the Python module that calls the functions; arguments as of `source_text`."""
     used = structures(functions)
     loop = next((each for each in functions if each.name == "inverse_dynamics"), functions[0])
-    called = [*(_binding(prefix, each) for each in functions), *_constants(prefix, used)]
+    called = [_binding(prefix, each) for each in functions]
+    called += (_constant(prefix, each) for each in used if each.nominal)
     return filled(
         "robot.py",
         prefix,
@@ -234,13 +228,11 @@ def _binding(prefix: str, function: Function) -> str:
     return _call(_LIBRARY.{prefix}_{function.name}, {_type(function.result)}{given})"""
 
 
-def _constants(prefix: str, used: Iterable[Structure]) -> Iterator[str]:
-    """The nominal values of structures, in Python."""
-    for each in used:
-        if each.nominal:
-            name, kind = f"{prefix}_nominal_{each.name}", _type(each)
-            yield f"""_CONSTANT = (ctypes.c_char * {kind}.itemsize).in_dll(_LIBRARY, "{name}")
-NOMINAL_{each.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""
+def _constant(prefix: str, structure: Structure) -> str:
+    """The nominal values of a structure, in Python."""
+    kind, name = _type(structure), f"{prefix}_nominal_{structure.name}"
+    return f"""_CONSTANT = (ctypes.c_char * {kind}.itemsize).in_dll(_LIBRARY, "{name}")
+NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""
 
 
 def readme_text(
