@@ -30,8 +30,8 @@ BAND, HALF_WIDTH, LEAST_LINES = 0.04, 0.12, 7
 many lines of a spectrum on both sides, so that no line of a sine moves it."""
 
 RISE = 4.0
-"""Rise of the derivative's density from a valley to both sides. Medians of fifteen lines of noise differ by less
-than a factor of 2.2 in 19 of 20 cases."""
+"""Rise of the derivative's density from a valley to both sides. Medians of fifteen lines of noise differ by
+less than a factor of 2.2 in 19 of 20 cases."""
 
 NO_RISE = 4.0
 """Factor by which the density of the samples may rise beyond a valley: that of filtered noise does not."""
