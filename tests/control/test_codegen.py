@@ -16,7 +16,6 @@ from samples.codegen import clear, commands, expected_of, motion_of, with_spring
 from samples.command_line import REPOSITORY
 from samples.generated_code import STRICT, compile_c, compiled_robot, write_files
 from samples.marks import COMPILERS, needs, needs_compiler, slow, slow_but
-from samples.mechanisms import DEVICES
 from samples.robots import random_robot
 from samples.shipped import shipped_robot, shipped_run
 from samples.springs import SPRINGS
@@ -104,20 +103,6 @@ def test_every_bundled_robot_passes_its_own_test_in_both_precisions(
     compile_c(tmp_path, *STRICT, *sources, "-o", "self_test", "-lm")
     done = subprocess.run(["./self_test"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("all values agree\n", "")
-
-
-@needs_compiler
-def test_a_sine_passes_in_single_precision_at_its_largest_torque(tmp_path: Path) -> None:
-    """Its stiffness there is zero, and not what rounding makes of the cosine of pi/2."""
-    arm = shipped_robot("awas_1r")
-    joint = replace(arm.joints[0], actuator=DEVICES["variable_ratio, sine"].actuator)
-    robot = replace(
-        arm, gravity=(0.0, -1000.0, 0.0), joints=(joint,)
-    )  # which it does not carry at all settings
-    write_files(generate(robot, "float"), tmp_path)
-    compile_c(tmp_path, *STRICT, "awas_1r.c", "awas_1r_test.c", "-o", "self_test", "-lm")
-    done = subprocess.run(["./self_test"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.stdout == "all values agree\n"
 
 
 @needs_compiler

@@ -57,6 +57,13 @@ def test_every_mechanism_passes_its_own_test(name: str, tmp_path: Path) -> None:
 
 
 @needs_compiler
+def test_a_sine_passes_at_its_largest_torque(tmp_path: Path) -> None:
+    """Its stiffness there is zero, and not what rounding makes of the cosine of pi/2."""
+    overloaded = with_device("variable_ratio, sine", gravity=-1000.0)  # at some settings it carries nothing
+    assert self_test(overloaded, tmp_path) == "all values agree\n"
+
+
+@needs_compiler
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DEVICES)
 def test_overloaded_mechanisms_pass_or_are_refused(name: str, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from vsacli.trajectory.fits.bins import Bins, uniform_basis
 from vsacli.trajectory.fits.moments import Moments
 from vsacli.trajectory.fits.noise import filtered_noise
 from vsacli.trajectory.fits.penalised import Model
-from vsacli.trajectory.fits.spectral_lines import spectral_lines
+from vsacli.trajectory.fits.spectral_lines import Lines, spectral_lines
 from vsacli.trajectory.trajectory import Trajectory
 
 EPS = np.finfo(float).eps
@@ -196,7 +196,7 @@ def test_uniform_basis_adds_up_to_one():
 def test_lines_of_a_residual():
     time = np.arange(10001) / 1000
     noise = np.random.default_rng(0).standard_normal(10001)
-    assert spectral_lines(time, noise, 4, 1.0) == ((), (), 0.0)
+    assert spectral_lines(time, noise, 4, 1.0) == Lines()
     tones = noise + np.sin(2 * np.pi * 50 * time) + 2 * np.sin(2 * np.pi * 33 * time)
     lines = spectral_lines(time, tones, 4, 1.0)
     # a bin is 0.1 Hz

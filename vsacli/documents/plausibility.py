@@ -1,7 +1,8 @@
-"""Numbers that can be computed with but are hardly what was meant: the rules, and what they find in a file.
+"""Warnings of values that can be computed with but are hardly meant: a row of a table is a rule.
 
-A rule holds a size, made of a number of the file, against bounds that whatever is built keeps by far. What
-lies outside is a warning that names the number, its size, and the unit in which it would be as usual.
+A rule compares a size, which is made of one value of a file, with bounds that whatever is built keeps by far.
+A value outside is a warning with its line, its size, and the unit in which it would be a common one.
+The rows are in `robot.plausibility` and `trajectory.plausibility`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
@@ -53,7 +53,7 @@ class Measured(NamedTuple):
         path: to the number.
         value: of it; NaN if the path leads to several.
         unit: of it.
-        size: what the rule bounds; NaN if there is nothing to hold it against.
+        size: compared with the bounds; NaN if the rule does not apply or there is nothing to compare with.
         beside: values that the words of the rule name, by name.
     """
 
@@ -64,35 +64,34 @@ class Measured(NamedTuple):
     beside: Mapping[str, Any] = MappingProxyType({})
 
 
-@dataclass(frozen=True, kw_only=True)
-class Rule(Generic[_Subject]):
-    """What numbers of a kind are held against.
+class Rule(NamedTuple, Generic[_Subject]):
+    """A row of the table.
 
     Attributes:
-        name: of what is judged, a few words.
-        fields: of the file, for the documentation.
-        measure: yields the numbers of a robot or trajectory with their sizes.
-        size: what the size is, for the documentation.
+        name: a few words.
+        fields: keys of the file, for the documentation.
+        measure: yields values of a robot or trajectory with their sizes.
+        size: the size in words, for the documentation.
+        reason: why sizes outside the bounds are not what is meant, a sentence.
+        finding: what is said of the value: a verb, `{size}`, and words from `Measured.beside` in braces.
         low: least size that passes.
         high: sizes from here on do not pass.
-        usual: a common size, towards which a slip is looked for.
-        finding: what the number is, a verb with its object; `{size}` and what lies beside are filled in.
-        reason: why sizes beyond the bounds are not what is meant, a sentence.
-        slips: other units that the number may be in.
+        usual: a common size, towards which another unit is looked for.
+        slips: other units that the value may be in.
         advice: what to look at if none of them fits.
-        in_angles: whether a number written with `deg` or `pi` passes, as its writer knew the unit.
-        explained_by: names of rules; what one of them finds explains what this one would find.
+        in_angles: whether a value written with `deg` or `pi` passes, as its writer knew the unit.
+        explained_by: names of rules; if one of them finds something, this one is not asked.
     """
 
     name: str
     fields: str
     measure: Callable[[_Subject], Iterable[Measured]]
     size: str
+    reason: str
+    finding: str
     low: float = 0.0
     high: float = math.inf
     usual: float = 1.0
-    finding: str
-    reason: str
     slips: tuple[Slip, ...] = ()
     advice: str = "check its unit"
     in_angles: bool = False
@@ -117,9 +116,12 @@ class Rule(Generic[_Subject]):
         path = _of_slip(measured.path, slip)
         known = path == measured.path and not math.isnan(measured.value)
         value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if known else ""
-        found = self.finding.format(size=_shown(measured.size), **measured.beside)
-        guess = "" if slip is None else _guess(measured, slip) if known else f"is it in {slip.unit}?"
-        return f"{_dotted(path)}{value} {found}; {guess or self.advice}"
+        # Three digits, with a power of ten only where there would be many zeros.
+        found = self.finding.format(size=f"{float(f'{measured.size:.3g}'):.6g}", **measured.beside)
+        advice = self.advice
+        if slip is not None:
+            advice = _guess(measured, slip) if known else f"is it in {slip.unit}?"
+        return f"{'.'.join(map(str, path))}{value} {found}; {advice}"
 
 
 def _guess(measured: Measured, slip: Slip) -> str:
@@ -129,17 +131,8 @@ def _guess(measured: Measured, slip: Slip) -> str:
     return f"{meant}, which is {measured.value * slip.factor:.6g} {measured.unit}?"
 
 
-def _shown(size: float) -> str:
-    """Three digits, with a power of ten only where there would be many zeros."""
-    return f"{float(f'{size:.3g}'):.6g}"
-
-
 def _of_slip(path: NumberPath, slip: Slip | None) -> NumberPath:
     return (*path[:-1], *slip.field) if slip and slip.field else path
-
-
-def _dotted(path: NumberPath) -> str:
-    return ".".join(map(str, path))
 
 
 Moved: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
@@ -151,13 +144,14 @@ class Written:
 
     def __init__(self, source: Source, moved: Moved | None = None) -> None:
         """The file, and where it has what stands elsewhere in the record made of it."""
-        self._source = source
+        self.path = source.path
+        self._text = source.text or ""
         self._moved = moved
 
     @cached_property
     def _root(self) -> tree.Node:
         try:
-            return parse_yaml(self._source.text or "", Problems(self._source.path))
+            return parse_yaml(self._text, Problems(self.path))
         except InputError:  # no YAML file
             return tree.Mapping(0, {}, {})
 
@@ -172,16 +166,19 @@ class Written:
             node = inner
         return node, ()
 
-    def problem(self, path: NumberPath, message: str) -> Problem:
-        """A message on a path, with the line."""
-        return Problem(self._source.path, self.at(path)[0].line, message)
+    def line(self, path: NumberPath) -> int:
+        """The line of the file on which a path ends."""
+        return self.at(path)[0].line
 
     def said(self, measured: Measured) -> Measured | None:
         """The number as the file says it, once if for all joints or both ends; None if it says another."""
         node, left = self.at(measured.path)
         if not isinstance(node, tree.Scalar) or math.isnan(measured.value):
             return measured
-        value = _value(node.text, measured.unit)
+        try:
+            value = evaluate(node.text, measured.unit)
+        except ExpressionError:
+            return None
         if abs(value) != abs(measured.value):
             return None
         return measured._replace(path=measured.path[: len(measured.path) - len(left)], value=value)
@@ -201,14 +198,6 @@ def _inside(node: tree.Node, step: str | Entry) -> tree.Node | None:
         case tree.Sequence(items=items), Entry(number=number) if number < len(items):
             return items[number]
     return None
-
-
-def _value(text: str, unit: str) -> float:
-    """The number that a text stands for; NaN if none."""
-    try:
-        return evaluate(text, unit)
-    except ExpressionError:
-        return math.nan
 
 
 def strange(
@@ -242,7 +231,7 @@ def findings(
     written: Written | None = None,
     known: Collection[str] = (),
 ) -> tuple[Problem, ...]:
-    """What rules find, as `strange`; with file and line if the file is given and still says it."""
+    """The warnings of what `strange` finds; with file and line if the file is given and still says it."""
     named = {rule.name: rule for rule in rules}
     found = strange(rules, subject, written, known)
     problems = (_problem(named[name], each, written) for name, several in found.items() for each in several)
@@ -255,4 +244,5 @@ def _problem(rule: Rule[Any], measured: Measured, written: Written | None) -> Pr
     said = written.said(measured) if written is not None else None
     if written is None or said is None:
         return Problem("", 0, rule.sentence(measured, slip))
-    return written.problem(_of_slip(measured.path, slip), rule.sentence(said, slip))
+    line = written.line(_of_slip(measured.path, slip))
+    return Problem(written.path, line, rule.sentence(said, slip))

@@ -24,8 +24,7 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
 from vsacli.trajectory.devices import with_devices
-from vsacli.trajectory.plausibility import implausible
-from vsacli.trajectory.plausibility.facts import Facts
+from vsacli.trajectory.plausibility import Facts, implausible
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory

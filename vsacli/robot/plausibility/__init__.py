@@ -9,14 +9,12 @@ from vsacli.documents import tree
 from vsacli.documents.plausibility import Written, findings, strange
 from vsacli.documents.record_numbers import Entry, NumberPath
 from vsacli.documents.source import Source
-from vsacli.robot.plausibility.body_rules import BODY_RULES
-from vsacli.robot.plausibility.damper_rules import DAMPER_RULES
-from vsacli.robot.plausibility.drive_rules import DRIVE_RULES
+from vsacli.robot.plausibility.bodies import BODY_RULES
+from vsacli.robot.plausibility.drives import DRIVE_RULES
 from vsacli.robot.plausibility.facts import Facts
-from vsacli.robot.plausibility.motor_rules import MOTOR_RULES
-from vsacli.robot.plausibility.spring_rules import SPRING_RULES
+from vsacli.robot.plausibility.springs import SPRING_RULES
 
-ROBOT_RULES = (*BODY_RULES, *MOTOR_RULES, *DRIVE_RULES, *SPRING_RULES, *DAMPER_RULES)
+ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
 def implausible(facts: Facts, sources: Sequence[Source]) -> tuple[Problem, ...]:

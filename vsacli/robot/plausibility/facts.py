@@ -46,10 +46,15 @@ class Facts:
         """Of the robot."""
         return BodySizes(self.joints)
 
-    def of_unit(self, unit: str, *within: str) -> Iterator[Measured]:
-        """The numbers in a unit, each with its magnitude as size; those whose path has these steps."""
+    @property
+    def driven(self) -> Iterator[tuple[int, Joint]]:
+        """The joints with their indices, unless springs and motors only stand in for others."""
+        return enumerate(() if self.placeholder else self.joints)
+
+    def of_unit(self, unit: str) -> Iterator[Measured]:
+        """The numbers in a unit, each with its magnitude as size."""
         for path, quantity, value, _ in self.numbers:
-            if {*within} <= {*path} and quantity.unit(self._variant(path)) == unit:
+            if quantity.unit(self._variant(path)) == unit:
                 yield Measured(path, value, unit, abs(value))
 
     def _variant(self, path: NumberPath) -> str:

@@ -83,7 +83,7 @@ def _doubts(value: str, highest: str, labels: Sequence[str], fit: Fit) -> Iterat
 
 
 def _remedy(part: Part) -> str:
-    """What would determine the highest derivative of a component."""
+    """Return a sentence on how to determine the highest derivative of a component."""
     if part.noise is not None:
         return (
             f"above {part.noise.above:.2g} Hz it is noise that a filter made smooth: record it without the"
@@ -161,7 +161,7 @@ def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
 
 
 def _band(part: Part, member: int, fit: Fit) -> float | None:
-    """Up to which frequency a component moves, Hz; None of one that rests."""
+    """Return the frequency up to which a component moves, Hz; None at rest."""
     column = part.members.tolist().index(member)
     spline = type(part.spline)(part.spline.t, part.spline.c[:, [column]], part.spline.k)
     above = np.inf if part.noise is None else part.noise.above
@@ -170,7 +170,7 @@ def _band(part: Part, member: int, fit: Fit) -> float | None:
 
 
 def _judgement(part: Part) -> dict[str, Any]:
-    """What a smoothing spline and the spectrum say of a component, if they say anything."""
+    """Return the findings of a smoothing spline and of the spectrum about a component."""
     found: dict[str, Any] = {}
     if part.smoothing is not None:
         found["deviation"] = part.smoothing.relative

@@ -113,7 +113,7 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
 
 
 def _noise_of(record: Record, part: Part) -> FollowedNoise:
-    """Noise that the part of one component follows."""
+    """Return the noise that the part of one component follows."""
     step = float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
     bandwidth = record.known[int(part.members[0])].bandwidth
     noise = followed_noise(part.spline, part.inside, step, record.order, bandwidth)
@@ -123,7 +123,7 @@ def _noise_of(record: Record, part: Part) -> FollowedNoise:
 
 
 def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
-    """The part of one component, which follows noise: an error like any other."""
+    """Return the part of one component with the noise that it follows, an error like any other."""
     known = part.smoothing
     if known is None or noise.relative <= known.relative:
         return part
@@ -131,7 +131,7 @@ def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
 
 
 def _size(part: Part, order: int) -> float:
-    """Of a derivative of one component, root mean square away from the ends."""
+    """Return the root mean square of a derivative of one component, away from the ends."""
     return float(np.sqrt(np.mean(part.spline(np.linspace(*part.inside, PROBES), nu=order) ** 2)))
 
 

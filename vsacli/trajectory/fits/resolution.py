@@ -192,7 +192,7 @@ def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, ord
 
 
 def _residual(time: FloatArray, row: FloatArray, model: Model) -> float:
-    """Of a model, root mean square."""
+    """Return the root mean square of the residual of a model."""
     some = slice(None, None, 1 + len(time) // PROBES)
     return _rms(row[some] - model.spline(time[some])[:, 0])
 

@@ -58,7 +58,7 @@ class Smoothing:
         return self.resolved and self.relative <= DETERMINED
 
     def following(self, noise: FollowedNoise, size: float) -> Smoothing:
-        """That of a spline that follows noise, too.
+        """Return what is known of a spline that follows noise, too.
 
         Args:
             noise: in its highest derivative.

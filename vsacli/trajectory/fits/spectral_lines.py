@@ -117,7 +117,7 @@ def spectral_lines(
 
 
 def _standing_out(power: FloatArray, neighbours: int) -> IndexArray:
-    """Indices of lines, of those that have so many neighbours to both sides."""
+    """Return indices of lines among the frequencies with that number of neighbors on both sides."""
     windows = np.lib.stride_tricks.sliding_window_view(power, neighbours)
     starts = range(0, len(windows), BLOCK_FREQUENCIES)
     medians = np.concatenate([np.median(windows[at : at + BLOCK_FREQUENCIES], axis=1) for at in starts])
@@ -131,7 +131,7 @@ def _standing_out(power: FloatArray, neighbours: int) -> IndexArray:
 
 
 def _side_bands(frequencies: FloatArray, mains: BoolArray, near: float) -> BoolArray:
-    """Which lie in pairs about one of mains, as hum has them that grows and fades."""
+    """Return which lie in pairs about a line of mains: side bands of hum that grows and fades."""
     found = np.zeros(len(frequencies), dtype=bool)
     for middle in frequencies[mains]:
         mirrored = 2 * middle - frequencies
@@ -140,7 +140,7 @@ def _side_bands(frequencies: FloatArray, mains: BoolArray, near: float) -> BoolA
 
 
 def _images(frequencies: FloatArray, near: float) -> tuple[BoolArray, float]:
-    """Which are images that resampling left, and the rate from which: pairs about it and about its double.
+    """Return which are images that resampling left, pairs about a rate and about its double; and the rate.
 
     What interpolates samples of another rate repeats the motion's lines on both sides of its multiples.
     """

@@ -30,8 +30,8 @@ BAND, HALF_WIDTH, LEAST_LINES = 0.04, 0.12, 7
 many lines of a spectrum on both sides, so that no line of a sine moves it."""
 
 RISE = 4.0
-"""Of the derivative's density from a valley to both sides. Medians of fifteen lines of noise differ by less
-than a factor of 2.2 in 19 of 20 cases."""
+"""Rise of the derivative's density from a valley to both sides. Medians of fifteen lines of noise differ by
+less than a factor of 2.2 in 19 of 20 cases."""
 
 NO_RISE = 4.0
 """Factor by which the density of the samples may rise beyond a valley: that of filtered noise does not."""
@@ -47,7 +47,7 @@ HUMP = 0.1
 """Share of the largest density of a hump that its lines have at least."""
 
 FEWEST_LINES, FEW_LINES = 16, 12
-"""Of a hump that can be told from a few sines; of a high one."""
+"""Lines of a hump that is distinguished from a few sines; of a high hump."""
 
 PEAKED = 2.5
 """Power of a hump over what its medians have, from which on lines make it up."""
@@ -92,16 +92,16 @@ class FollowedNoise(NamedTuple):
 
     @property
     def relative(self) -> float:
-        """To the derivative without it."""
+        """Its root mean square relative to that of the derivative without it."""
         return float(self.share / np.sqrt(max(1 - self.share**2, LEAST_REST)))
 
     def stretched(self, factor: float) -> FollowedNoise:
-        """That of the same course, slower by a factor."""
+        """Return the noise of the same motion, slower by a factor."""
         return FollowedNoise(self.share, self.above / factor, self.peak / factor)
 
 
 class _Spectrum(NamedTuple):
-    """Of a derivative, in stretches of a record.
+    """The spectrum of a derivative, in stretches of a recording.
 
     Attributes:
         frequency: of the lines, Hz.
@@ -119,7 +119,7 @@ class _Spectrum(NamedTuple):
 
     @property
     def power(self) -> FloatArray:
-        """Of each line, (stretches, lines)."""
+        """The power of each line, (stretches, lines)."""
         return np.abs(self.lines) ** 2
 
 
@@ -148,7 +148,7 @@ def followed_noise(
     order: int,
     bandwidth: float | None = None,
 ) -> FollowedNoise:
-    """Filtered noise in a derivative of a spline; none is found in fewer than some hundred samples.
+    """Find filtered noise in a derivative of a spline; fewer than some hundred samples show none.
 
     Args:
         spline: near or through the samples, with one column.
@@ -183,7 +183,7 @@ def motion_band(
     order: int,
     below: float = np.inf,
 ) -> float:
-    """Frequency up to which 99 % of the power of a derivative lies, Hz; NaN of what rests.
+    """Return the frequency up to which 99 % of the power of a derivative lies, Hz; NaN at rest.
 
     Args:
         spline: near or through the samples, with one column.
@@ -234,7 +234,7 @@ def _bands(spectrum: _Spectrum) -> _Bands:
 
 
 def _valleys(bands: _Bands, motion: float) -> tuple[BoolArray, BoolArray]:
-    """Bands from which the derivative's density rises and the samples' does not, (bands,).
+    """Return bands from which the derivative's density rises and the samples' does not, (bands,).
 
     Returns:
         These, and those to which the derivative's density descends; to others motion is hidden by the noise.
@@ -251,13 +251,13 @@ def _valleys(bands: _Bands, motion: float) -> tuple[BoolArray, BoolArray]:
 
 
 def _medians(spectrum: _Spectrum, bands: _Bands, first: int, last: int) -> FloatArray:
-    """Of the derivative's density at lines first..last-1."""
+    """Return the median density of the derivative at lines first..last-1."""
     samples = np.interp(np.arange(first, last), bands.line, np.log(bands.samples))
     return np.asarray(np.exp(samples) * spectrum.weight[first:last])
 
 
 def _end_of_motion(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> float:
-    """The frequency of a valley, or of a later line of motion: medians pass lines over. Hz."""
+    """Return the frequency, Hz, of a valley, or of a later line of motion, which medians pass over."""
     first, last = int(bands.line[valley]), int(bands.line[top]) + 1
     power = spectrum.power[:, first:last].mean(axis=0)
     lines = np.flatnonzero(power > LINE_RATIO * _medians(spectrum, bands, first, last))
@@ -265,7 +265,7 @@ def _end_of_motion(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) ->
 
 
 def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool:
-    """Whether what is beyond a valley is random, and there all the time."""
+    """Return whether the hump beyond a valley is random and lasts."""
     density = bands.derivative
     motion = np.max(density[:valley], initial=0.0)
     rise = density[top] / density[valley]

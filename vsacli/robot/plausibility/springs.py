@@ -1,4 +1,4 @@
-"""What springs of a robot, and what they make of its joints, are held against."""
+"""Rules on springs and dampers of a robot, and on the stiffness that springs give to its joints."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ import numpy as np
 
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.transmission import Command, Transmission
+from vsacli.base import units
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.documents.plausibility import Measured, Rule, Slip
 from vsacli.documents.record_numbers import Entry, NumberPath
 from vsacli.robot.joint import Joint
-from vsacli.robot.plausibility.body_rules import DEGREES, SIZES, TURN
+from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETRES, SIZES, TURN
 from vsacli.robot.plausibility.facts import Facts, joint_path, ratio, written_once
 
 HALF_TURN = math.pi
@@ -27,11 +28,14 @@ TOO_SOFT = (
     Slip("N/mm", 1e3, instead_of="N/m"),
 )
 NEWTON_MILLIMETRES = Slip("N mm/rad", 1e-3, instead_of="N m/rad")
-TOO_STIFF = (
-    NEWTON_MILLIMETRES,
-    Slip("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"),
-)
+TOO_STIFF = (NEWTON_MILLIMETRES, Slip("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
 """Units in which a stiffness is a smaller, or a larger number than in the expected one."""
+
+SLIPS_OF_DAMPING = (
+    Slip("N mm s/rad", 1e-3, instead_of="N m s/rad"),
+    Slip("N m s/deg", 180 / math.pi, instead_of="N m s/rad"),
+    Slip("N s/mm", 1e3, instead_of="N s/m"),
+)
 
 
 class Corridor(NamedTuple):
@@ -49,20 +53,29 @@ def corridor(joint: Joint) -> Corridor | None:
     return Corridor(float(solution.lower[0]), float(solution.upper[0]))
 
 
-def _soft_ends(facts: Facts) -> Iterator[Measured]:
-    """The stiffness of pairs of springs at rest, over the weight at full reach, per rad or per reach."""
-    for index, joint in enumerate(() if facts.placeholder else facts.joints):
-        found = corridor(joint)
-        if found is not None:
-            size = ratio(found.lower * _travel(facts, joint), facts.sizes.scale(joint))
-            unit = "N m/rad" if joint.is_revolute else "N/m"
-            beside = {"stiffness": f"{found.lower:.4g} {unit}"}
-            yield Measured(joint_path(index, joint, "actuator", "spring"), math.nan, unit, size, beside)
+def _unit(joint: Joint) -> str:
+    return units.STIFFNESS.unit(joint.type)
 
 
 def _travel(facts: Facts, joint: Joint) -> float:
     """A radian, or for a prismatic joint the reach of the robot, m."""
     return 1.0 if joint.is_revolute else facts.sizes.extent
+
+
+def _corridors(facts: Facts) -> Iterator[tuple[int, Joint, Corridor]]:
+    """The joints whose stiffness can be commanded, with their indices."""
+    for index, joint in facts.driven:
+        found = corridor(joint)
+        if found is not None:
+            yield index, joint, found
+
+
+def _soft_ends(facts: Facts) -> Iterator[Measured]:
+    """The stiffness of pairs of springs at rest, over the weight at full reach, per rad or per reach."""
+    for index, joint, found in _corridors(facts):
+        size = ratio(found.lower * _travel(facts, joint), facts.sizes.scale(joint))
+        beside = {"stiffness": f"{found.lower:.4g} {_unit(joint)}"}
+        yield Measured(joint_path(index, joint, "actuator", "spring"), math.nan, _unit(joint), size, beside)
 
 
 def _stiff_transmissions(facts: Facts) -> Iterator[Measured]:
@@ -83,19 +96,19 @@ def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, Transmissio
 
     What is measured is the stiffness or the law; its size is to be replaced.
     """
-    for number, joint in enumerate(() if facts.placeholder else facts.joints):
+    for number, joint in facts.driven:
         if joint.actuator.sprung and "stiffness" not in joint.actuator.commanded:
             command = Command.at_rest(np.array([0.0, facts.sizes.loads[number]]), np.zeros(2))
             held = joint.actuator.transmit(command, NEAR_SINGULAR_MARGIN, None)
-            unit = "N m/rad" if joint.is_revolute else "N/m"
             constant = getattr(joint.actuator, "stiffness", None)
             path = joint_path(number, joint, "actuator", "spring" if constant is None else "stiffness")
-            yield joint, Measured(path, math.nan if constant is None else constant, unit, math.nan), held
+            value = math.nan if constant is None else constant
+            yield joint, Measured(path, value, _unit(joint), math.nan), held
 
 
 def _springs(facts: Facts) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
     """The springs with their joints, as they are written."""
-    for number, joint in enumerate(() if facts.placeholder else facts.joints):
+    for number, joint in facts.driven:
         path = joint_path(number, joint, "actuator", "spring")
         for at, law in written_once(path, getattr(joint.actuator, "spring", None) or ()):
             yield joint, at, law
@@ -125,104 +138,79 @@ def _deflections(facts: Facts) -> Iterator[Measured]:
 
 
 def _stiffness_limits(facts: Facts) -> Iterator[Measured]:
-    for index, joint in enumerate(() if facts.placeholder else facts.joints):
-        found = corridor(joint)
-        for side, limit in enumerate(joint.limits.stiffness if found else ()):
-            if found and math.isfinite(limit):
+    """Limits over the lowest at rest; a lower limit below all that springs give does no harm."""
+    for index, joint, found in _corridors(facts):
+        beside = {"lower": f"{found.lower:.4g}", "unit": _unit(joint)}
+        for side, limit in enumerate(joint.limits.stiffness):
+            size = ratio(limit, found.lower)
+            if math.isfinite(limit) and (side or limit > found.upper or size > 1):
                 path = joint_path(index, joint, "limits", "stiffness", Entry(side))
-                unit = "N m/rad" if joint.is_revolute else "N/m"
-                beside = {"lower": f"{found.lower:.4g}", "unit": unit}
-                size = ratio(limit, found.lower) if side else _lowest_size(limit, found)
-                yield Measured(path, limit, unit, size, beside)
+                yield Measured(path, limit, _unit(joint), size, beside)
 
 
-def _lowest_size(limit: float, found: Corridor) -> float:
-    """The lower limit over the lower end of the corridor; NaN if it is below that end, which does no harm."""
-    size = ratio(limit, found.lower)
-    return size if limit > found.upper or size > 1 else math.nan
+def _least_stiffness(joint: Joint) -> float:
+    """The least that a joint can have without load, N m/rad (N/m)."""
+    found = corridor(joint)
+    if found is not None:
+        return found.lower if found.lower > 0 else found.upper
+    held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), NEAR_SINGULAR_MARGIN, None)
+    return float(held.stiffness[0])
+
+
+def _largest_dampings(facts: Facts) -> Iterator[Measured]:
+    """The upper end of each damper's range over twice the root of inertia times stiffness."""
+    for number, joint in facts.driven:
+        if joint.damper is not None and joint.actuator.sprung:
+            product = float(facts.sizes.moved[number]) * _least_stiffness(joint)
+            damping = joint.damper.range[1]
+            size = damping / (2 * math.sqrt(product)) if product > 0 else math.nan
+            path = joint_path(number, joint, "damper", "range", Entry(1))
+            yield Measured(path, damping, units.DAMPING.unit(joint.type), size)
 
 
 SPRING_RULES: tuple[Rule[Facts], ...] = (
-    Rule(
-        name="stiff springs",
-        fields="`spring`",
-        measure=_soft_ends,
+    Rule("stiff springs", "`spring`", _soft_ends,
         size="stiffness of the pair at rest, times 1 rad (the reach), over the robot's weight at its reach",
-        high=1000,
-        usual=4,
-        finding="makes {stiffness} at rest, {size} times the robot's weight at its reach per rad (per reach)",
+        high=1000, usual=4,
         reason="such a pair yields by a thousandth under the whole weight; shipped robots have 0.03 to 100",
-        slips=TOO_STIFF,
-        explained_by=SIZES,
-    ),
-    Rule(
-        name="stiff transmissions",
-        fields="`stiffness`, `spring` of elastic joints",
-        measure=_stiff_transmissions,
+        finding="makes {stiffness} at rest, {size} times the robot's weight at its reach per rad (per reach)",
+        slips=TOO_STIFF, explained_by=SIZES),
+    Rule("stiff transmissions", "`stiffness`, `spring` of elastic joints", _stiff_transmissions,
         size="stiffness at rest times 1 rad, of revolute joints, over the weight of the robot at its reach",
-        high=5000,
-        usual=300,
-        finding="is {size} times the weight of the robot at its reach per rad",
+        high=5000, usual=300,
         reason="with strain wave gears even light arms stay below; prismatic joints may be stiffer",
-        slips=TOO_STIFF,
-        advice="if it does not yield, take `type: rigid`",
-        explained_by=SIZES,
-    ),
-    Rule(
-        name="soft transmissions",
-        fields="`stiffness`, `spring` of elastic joints",
-        measure=_soft_transmissions,
+        finding="is {size} times the weight of the robot at its reach per rad",
+        slips=TOO_STIFF, advice="if it does not yield, take `type: rigid`", explained_by=SIZES),
+    Rule("soft transmissions", "`stiffness`, `spring` of elastic joints", _soft_transmissions,
         size="1 rad or the reach over the deflection under what the weight of the stretched arm can ask",
-        low=4,
-        usual=50,
+        low=4, usual=50, reason="the arm would hang down",
         finding="yields by more than 0.25 rad (of the reach) to what the weight of the stretched arm can ask",
-        reason="the arm would hang down",
-        slips=TOO_SOFT,
-        explained_by=SIZES,
-    ),
-    Rule(
-        name="hardening of springs",
-        fields="`spring`",
-        measure=lambda facts: _hardening(facts, 1.0, of_pairs=True),
-        size="stiffness at a deflection of half a turn (of the reach), over that at rest",
-        low=1.5,
-        finding="is at {deflection} but {size} times as stiff as at rest",
+        slips=TOO_SOFT, explained_by=SIZES),
+    Rule("hardening of springs", "`spring`", lambda facts: _hardening(facts, 1.0, of_pairs=True),
+        size="stiffness at a deflection of half a turn (of the reach), over that at rest", low=1.5,
         reason="a pair that hardly hardens cannot change its stiffness",
-        advice="check the units of its constants: rad, not deg (m, not mm)",
-    ),
-    Rule(
-        name="early hardening of springs",
-        fields="`spring`",
-        measure=lambda facts: _hardening(facts, SMALL_SHARE),
-        size=f"stiffness at {SMALL_SHARE:g} of half a turn (of the reach), over that at rest",
-        high=2,
-        finding="is already at {deflection} {size} times as stiff as at rest",
+        finding="is at {deflection} but {size} times as stiff as at rest",
+        advice="check the units of its constants: rad, not deg (m, not mm)"),
+    Rule("early hardening of springs", "`spring`", lambda facts: _hardening(facts, SMALL_SHARE),
+        size=f"stiffness at {SMALL_SHARE:g} of half a turn (of the reach), over that at rest", high=2,
         reason="springs of shipped robots take forty times the deflection to become twice as stiff",
-        advice="check the units of its constants: N m/rad^3, say, not N mm/rad^3",
-    ),
-    Rule(
-        name="deflections",
-        fields="`max_deflection`, `file` of a table",
-        measure=_deflections,
-        size="turns (twice the reach)",
-        high=0.5,
-        usual=0.05,
-        finding="is a deflection of more than half a turn (than the reach)",
+        finding="is already at {deflection} {size} times as stiff as at rest",
+        advice="check the units of its constants: N m/rad^3, say, not N mm/rad^3"),
+    Rule("deflections", "`max_deflection`, `file` of a table", _deflections,
+        size="turns (twice the reach)", high=0.5, usual=0.05,
         reason="springs in joints do not wind up so far",
-        slips=(DEGREES, Slip("mm", 1e-3)),
-        in_angles=True,
-    ),
-    Rule(
-        name="limits of stiffness",
-        fields="`limits.stiffness`",
-        measure=_stiffness_limits,
-        size="over the lowest that the springs give at rest",
-        low=1,
-        high=500,
-        usual=2,
-        finding="is {size} times the lowest that the springs give, {lower} {unit}",
+        finding="is a deflection of more than half a turn (than the reach)",
+        slips=(DEGREES, MILLIMETRES), in_angles=True),
+    Rule("limits of stiffness", "`limits.stiffness`", _stiffness_limits,
+        size="over the lowest that the springs give at rest", low=1, high=500, usual=2,
         reason="below 1 nothing is within the limits, and springs do not become so much stiffer",
-        slips=(*TOO_SOFT, *TOO_STIFF),
-        advice="check the units of limits and springs",
-    ),
-)
+        finding="is {size} times the lowest that the springs give, {lower} {unit}",
+        slips=(*TOO_SOFT, *TOO_STIFF), advice="check the units of limits and springs"),
+    Rule("ranges of dampers", "`damper.range`", _largest_dampings,
+        size="over 2 sqrt(I sigma), with the inertia of the stretched arm and the least stiffness",
+        low=1e-3, high=100, usual=0.7,
+        reason="below a thousandth nothing is calmed, above a hundred the joint creeps",
+        finding="gives the stretched arm on its springs a damping ratio of {size}",
+        slips=SLIPS_OF_DAMPING, explained_by=SIZES,
+        advice="check the units of damping, stiffness and inertia"),
+)  # fmt: skip

@@ -1,0 +1,326 @@
+"""Rules on motors, gears, windings, viscous damping and dry friction of a robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from vsacli.actuators.friction import Friction
+from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.base import units
+from vsacli.base.variables import VARIABLES
+from vsacli.documents.fields import declared
+from vsacli.documents.plausibility import Measured, Rule, Slip
+from vsacli.documents.record_numbers import Entry, NumberPath
+from vsacli.robot.joint import Joint
+from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, FASTEST, RPM, SIZES, Measure
+from vsacli.robot.plausibility.facts import Facts, joint_path, motors, ratio
+
+TINY = 0.1
+"""m; the rotors of shorter robots, fingers say, outweigh them by far behind their gears."""
+
+DAMPING_IN_MILLIMETRES = Slip("N mm s/rad", 1e-3)
+OTHER_TORQUES = (Slip("N mm", 1e-3), Slip("N cm", 1e-2), Slip("mN m", 1e-3))
+WHICH_SIDE = "with `gear_ratio` it is that of the motor's shaft, without that on the joint's side"
+GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
+"""Rules on what the motors' sizes behind the gear follow from, and what they are compared with."""
+
+
+class _Driven(NamedTuple):
+    """A motor with its joint. A property is NaN without a bound (`torque`, `velocity`), gravity (`load`)."""
+
+    facts: Facts
+    number: int
+    joint: Joint
+    at: NumberPath
+    motor: Motor
+
+    @property
+    def behind(self) -> JointMotor:
+        """The motor as its joint has it, behind the gear."""
+        return self.motor.at_joint
+
+    @property
+    def carries(self) -> bool:
+        """Whether it moves with the joint; one that only sets the springs may be small and fast."""
+        last = self.at[-1]
+        return bool(self.joint.actuator.has(VARIABLES["phi"])[last.number if isinstance(last, Entry) else 0])
+
+    @property
+    def torque(self) -> float:
+        """Its largest torque behind the gear."""
+        return _bounded(self.behind.max_torque)
+
+    @property
+    def link_inertia(self) -> float:
+        """Of the link alone about its joint."""
+        return float(self.facts.sizes.inertias[self.number])
+
+    @property
+    def scale(self) -> float:
+        """The weight of the robot at its reach."""
+        return self.facts.sizes.scale(self.joint)
+
+    @property
+    def load(self) -> float:
+        """What the weight of the stretched arm can ask of the joint."""
+        return float(self.facts.sizes.loads[self.number]) if any(self.facts.gravity) else math.nan
+
+    @property
+    def velocity(self) -> float:
+        """Its largest velocity behind the gear."""
+        return _bounded(self.behind.max_velocity)
+
+    def unit(self, name: str) -> str:
+        """The unit of a field; a motor behind a gear is one of rotation."""
+        kind = self.joint.type if name == "gear_ratio" or self.motor.gear_ratio is None else "revolute"
+        return declared(Motor)[name][0].quantity.unit(kind)
+
+    def path(self, name: str) -> NumberPath:
+        """The path to a field."""
+        return joint_path(self.number, self.joint, *self.at, name)
+
+    def measured(self, name: str, size: float) -> Measured:
+        """A field with a size."""
+        return Measured(self.path(name), getattr(self.motor, name), self.unit(name), size)
+
+
+def _bounded(value: float) -> float:
+    return value if math.isfinite(value) else math.nan
+
+
+def _all_motors(facts: Facts) -> Iterator[_Driven]:
+    for number, joint in facts.driven:
+        for at, motor in motors(joint):
+            yield _Driven(facts, number, joint, at, motor)
+
+
+def _motors(
+    name: str, size: Callable[[_Driven], float] | None = None, *, unit: str = "", carrying: bool = False
+) -> Measure:
+    """A field of the motors; its size is |value|, NaN if 0 or infinite, or made from the motor.
+
+    Args:
+        name: of the field.
+        size: makes the size.
+        unit: passes over motors whose field has another one.
+        carrying: whether to pass over motors that do not move with their joint.
+    """
+
+    def measure(facts: Facts) -> Iterator[Measured]:
+        for driven in _all_motors(facts):
+            if unit in ("", driven.unit(name)) and (driven.carries or not carrying):
+                value = getattr(driven.motor, name) or math.nan
+                yield driven.measured(name, _bounded(abs(value)) if size is None else size(driven))
+
+    return measure
+
+
+def _heavy_rotor(driven: _Driven) -> float:
+    sizes = driven.facts.sizes
+    lever = sizes.extent if driven.joint.is_revolute else 1.0
+    return ratio(driven.behind.inertia, sizes.mass * lever**2) if sizes.extent > TINY else math.nan
+
+
+def _output_velocity(driven: _Driven) -> float:
+    return driven.velocity if driven.joint.is_revolute else math.nan
+
+
+def _joint_velocity(driven: _Driven) -> float:
+    """Largest velocity that the motor allows the joint, over the limit of the joint."""
+    return ratio(driven.velocity, max(map(abs, driven.joint.limits.velocity)))
+
+
+def _speed_voltage(driven: _Driven) -> float:
+    """Voltage that the largest velocity of a motor makes, over its largest voltage."""
+    constant, bound = driven.motor.torque_constant, driven.motor.max_voltage
+    if constant is None or bound is None:
+        return math.nan
+    return constant * _bounded(driven.motor.max_velocity) / _bounded(bound)
+
+
+def _damping(number: int, joint: Joint, size: float) -> Measured:
+    path = joint_path(number, joint, "damping")
+    return Measured(path, joint.damping, units.DAMPING.unit(joint.type), size)
+
+
+def _braking(facts: Facts) -> Iterator[Measured]:
+    """What damping takes at the largest velocity of the joint, over the largest torque; 0 without a limit."""
+    for driven in _all_motors(facts):
+        joint, motor = driven.joint, driven.behind
+        velocity = min(motor.max_velocity, max(map(abs, joint.limits.velocity)))
+        if velocity < FASTEST and driven.carries:
+            yield driven.measured("damping", motor.damping * velocity / motor.max_torque)
+            torque = sum(each.max_torque for each in joint.actuator.motors)
+            yield _damping(driven.number, joint, joint.damping * velocity / torque)
+
+
+def _joint_damping(facts: Facts) -> Iterator[Measured]:
+    for number, joint in enumerate(facts.joints):
+        yield _damping(number, joint, ratio(joint.damping, facts.sizes.scale(joint)))
+
+
+class _Rubbing(NamedTuple):
+    """Dry friction of a motor, or of a joint: without a gear, and without a largest torque."""
+
+    path: NumberPath
+    friction: Friction
+    joint: Joint
+    scale: float
+    unit: str
+    gear: float = 1.0
+    max_torque: float = math.nan
+
+
+def _rubbing(facts: Facts) -> Iterator[_Rubbing]:
+    for driven in _all_motors(facts):
+        friction, joint, gear = driven.motor.friction, driven.joint, abs(driven.motor.gear_ratio or 1.0)
+        if friction is not None:
+            path, unit, bound = driven.path("friction"), driven.unit("max_torque"), driven.motor.max_torque
+            yield _Rubbing(path, friction, joint, driven.scale, unit, gear, _bounded(bound))
+    for number, joint in enumerate(facts.joints):
+        if joint.friction is not None:
+            path, unit = joint_path(number, joint, "friction"), units.TORQUE.unit(joint.type)
+            yield _Rubbing(path, joint.friction, joint, facts.sizes.scale(joint), unit)
+
+
+def _coulomb(size: Callable[[_Rubbing, float], float]) -> Measure:
+    """Coulomb friction as it is written, once if it is the same in both directions."""
+
+    def measure(facts: Facts) -> Iterator[Measured]:
+        for rubbing in _rubbing(facts):
+            backward, forward = rubbing.friction.coulomb
+            sides = {Entry(0): backward, Entry(1): forward} if backward != forward else {None: forward}
+            for side, torque in sides.items():
+                path = (*rubbing.path, "coulomb", *(() if side is None else (side,)))
+                yield Measured(path, torque, rubbing.unit, size(rubbing, torque))
+
+    return measure
+
+
+def _widths(facts: Facts) -> Iterator[Measured]:
+    for rubbing in _rubbing(facts):
+        if rubbing.joint.is_revolute:
+            width = rubbing.friction.width
+            yield Measured((*rubbing.path, "width"), width, "rad/s", width / rubbing.gear)
+
+
+GEAR_RULES: tuple[Rule[Facts], ...] = (
+    Rule("gear ratios", "`gear_ratio`", _motors("gear_ratio", unit="1"),
+        size="turns of the motor to one of the joint", low=1, high=5000, usual=100,
+        reason="gears of joints reduce; several stages reach some thousands",
+        finding="is {size} turns of the motor to one of the joint",
+        advice="it is the motor's turns over those of the joint, e.g. 100"),
+    Rule("gear ratios of prismatic joints", "`gear_ratio`", _motors("gear_ratio", unit="rad/m"),
+        size="rad/m", low=5, high=1e5, usual=600,
+        reason="a screw of 0.06 mm a turn has 100,000, a wheel of 0.4 m diameter 5",
+        finding="turns the motor by {size} rad for each metre", slips=(Slip("rad/mm", 1e3),),
+        advice="of a screw it is 2*pi over the travel of a turn in m, e.g. 2*pi/0.020"),
+)  # fmt: skip
+
+MOTOR_RULES: tuple[Rule[Facts], ...] = (
+    Rule("light rotors", "`motor.inertia`",
+        _motors("inertia", lambda m: ratio(m.behind.inertia, m.link_inertia), carrying=True),
+        size="on the joint's side of the gear, over the inertia of the link about its joint", low=0.005,
+        reason="gears multiply the rotor by the square of their ratio, and direct drives have large rotors",
+        finding="is, on the joint's side of the gear, {size} of the inertia of the link about its joint",
+        advice="is it the rotor's own? Then give `gear_ratio` too, or multiply by its square",
+        explained_by=GEARS),
+    Rule("heavy rotors", "`motor.inertia`", _motors("inertia", _heavy_rotor, carrying=True),
+        size="on the joint's side of the gear, over mass times reach squared (mass) of the robot",
+        high=100, usual=0.1,
+        reason="such a motor would feel nothing of the robot; those shorter than 0.1 m are passed over",
+        finding="is, on the joint's side of the gear, {size} times mass times reach squared of the robot",
+        slips=(Slip("kg cm^2", 1e-4), Slip("g cm^2", 1e-7), Slip("kg mm^2", 1e-6)),
+        advice=WHICH_SIDE, explained_by=GEARS),
+    Rule("damping of motors", "`motor.damping`",
+        _motors("damping", lambda m: m.motor.damping / m.motor.inertia),
+        size="1/s, over the inertia of the motor", high=500,
+        reason="a motor that is let go runs on for more than 2 ms",
+        finding="stops the motor alone at a rate of {size} 1/s",
+        slips=(DAMPING_IN_MILLIMETRES, Slip("N m s/krpm", 0.03 / math.pi)),
+        advice="check the units of damping and inertia"),
+    Rule("velocities of motors", "`max_velocity`", _motors("max_velocity", unit="rad/s", carrying=True),
+        size="rad/s, as written", high=2500, usual=400, reason="robots have no faster motors",
+        finding="is more than 24,000 turns a minute", slips=(RPM, DEGREES_PER_SECOND), in_angles=True),
+    Rule("velocities of motors behind the gear", "`max_velocity`",
+        _motors("max_velocity", _output_velocity, unit="rad/s", carrying=True),
+        size="rad/s, on the joint's side of the gear", high=FASTEST, usual=4,
+        reason="limbs do not turn so fast",
+        finding="is, on the joint's side of the gear, {size} rad/s", slips=(RPM, DEGREES_PER_SECOND),
+        advice="with `gear_ratio` it would be that of the motor's shaft",
+        explained_by=(*GEARS, "velocities of motors")),
+    Rule("velocities of motors and joints", "`max_velocity`, `limits.velocity`",
+        _motors("max_velocity", _joint_velocity, unit="rad/s", carrying=True),
+        size="on the joint's side of the gear, over the limit of the joint", high=8,
+        reason="the limit of a joint is about what its motor can do",
+        finding="lets the joint go {size} times as fast as its `limits.velocity`",
+        slips=(RPM, DEGREES_PER_SECOND), advice="check the units of both", in_angles=True,
+        explained_by=(*GEARS, "velocities of motors", "velocities of motors behind the gear")),
+    Rule("weak motors", "`max_torque`",
+        _motors("max_torque", lambda m: ratio(m.torque, m.load), carrying=True),
+        size="on the joint's side of the gear, over what the weight of the stretched arm can ask",
+        low=0.05, usual=2,
+        reason="such a motor could accelerate the arm by a twentieth of gravity",
+        finding="is, on the joint's side of the gear, {size} of what the weight of the stretched arm can ask",
+        advice="is it the motor's own? Then give `gear_ratio` too, or multiply by it", explained_by=GEARS),
+    Rule("strong motors", "`max_torque`",
+        _motors("max_torque", lambda m: ratio(m.torque, m.scale), carrying=True),
+        size="on the joint's side of the gear, over the weight of the robot at its reach",
+        high=300, usual=0.5, reason="it would lift 300 such robots",
+        finding="is, on the joint's side of the gear, {size} times the weight of the robot at its reach",
+        slips=OTHER_TORQUES, advice=WHICH_SIDE, explained_by=GEARS),
+)  # fmt: skip
+
+RESISTANCE_RULES: tuple[Rule[Facts], ...] = (
+    Rule("damping beside torque", "`damping`, `motor.damping`", _braking,
+        size="torque that it takes at the largest velocity, over the largest torque of the motors",
+        high=1, usual=0.05,
+        reason="the joint could not go as fast as its limits say",
+        finding="takes, at the largest velocity of the joint, {size} times the largest torque of its motors",
+        slips=(DAMPING_IN_MILLIMETRES._replace(instead_of="N m s/rad"),),
+        explained_by=(*GEARS, "velocities of motors", "velocities of motors and joints", "weak motors")),
+    Rule("damping of joints", "`damping`", _joint_damping,
+        size="torque at 1 rad/s (force at 1 m/s) over the weight of the robot at its reach",
+        high=500, usual=1e-3,
+        reason="the robot could hardly move; placeholders in descriptions of real robots come to 50",
+        finding="brakes, at 1 rad/s or 1 m/s, with {size} times the weight of the robot at its reach",
+        slips=(DAMPING_IN_MILLIMETRES,), explained_by=(*SIZES, "damping beside torque")),
+    Rule("dry friction beside torque", "`motor.friction.coulomb`",
+        _coulomb(lambda rubbing, torque: torque / rubbing.max_torque),
+        size="over the largest torque of the motor", high=1, usual=0.1,
+        reason="such a motor could not move at all",
+        finding="is {size} times the largest torque of the motor", slips=OTHER_TORQUES, explained_by=GEARS),
+    Rule("dry friction beside weight", "`friction.coulomb`, `motor.friction.coulomb`",
+        _coulomb(lambda rubbing, torque: ratio(torque * rubbing.gear, rubbing.scale)),
+        size="on the joint's side of the gear, over the weight of the robot at its reach",
+        high=100, usual=0.05, reason="a hundred such robots would hang on the joint without moving it",
+        finding="is, on the joint's side of the gear, {size} times the weight of the robot at its reach",
+        slips=OTHER_TORQUES, advice=WHICH_SIDE, explained_by=(*SIZES, *GEARS, "dry friction beside torque")),
+    Rule("widths of friction", "`friction.width`, `motor.friction.width` of revolute joints", _widths,
+        size="rad/s, on the joint's side of the gear", high=3, usual=0.05,
+        reason="that is as fast as joints go, so that it would be viscous friction",
+        finding="smooths friction over {size} rad/s on the joint's side of the gear",
+        slips=(DEGREES_PER_SECOND, RPM), explained_by=GEARS),
+)  # fmt: skip
+
+WINDING_RULES: tuple[Rule[Facts], ...] = (
+    Rule("torque constants", "`torque_constant`", _motors("torque_constant"),
+        size="N m/A", low=1e-4, high=30, usual=0.1,
+        reason="the smallest motors have 0.0003 N m/A, direct drives as wide as a door a few",
+        finding="is that of no motor", slips=(Slip("mN m/A", 1e-3), Slip("N cm/A", 1e-2)),
+        advice="from volts per 1000 turns a minute it is 0.00955 N m/A for each of them"),
+    Rule("resistances of windings", "`resistance`", _motors("resistance"),
+        size="ohm", low=1e-3, high=1000,
+        reason="large motors have some milliohm, those of watches hundreds of ohm",
+        finding="is that of no winding of a robot's motor", slips=(Slip("mohm", 1e-3),)),
+    Rule("voltages at the largest velocity", "`torque_constant`, `max_velocity`, `max_voltage`",
+        _motors("torque_constant", _speed_voltage),
+        size="that the velocity makes, over the largest voltage", high=5, usual=0.8,
+        reason="the motor could not go a fifth as fast as its limit says",
+        finding="makes {size} times the largest voltage at the motor's largest velocity",
+        slips=(Slip("mN m/A", 1e-3),), explained_by=("velocities of motors", "torque constants")),
+)  # fmt: skip
+
+DRIVE_RULES = (*GEAR_RULES, *MOTOR_RULES, *RESISTANCE_RULES, *WINDING_RULES)
