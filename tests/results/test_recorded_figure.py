@@ -13,7 +13,9 @@ TIME = np.linspace(0, 10, 400)
 FREQUENCIES = np.geomspace(0.5, 100, 50)
 
 
-def curve(name: str = "elbow.q", *, rms: float = 1e-4, cutoff: float = 5.0) -> RecordedCurve:
+def curve(
+    name: str = "elbow.q", *, rms: float = 1e-4, cutoff: float = 5.0, above: float = np.nan
+) -> RecordedCurve:
     """A sine with noise that a spline leaves."""
     residual = rms * np.cos(900 * TIME)
     motion = FREQUENCIES**-4.0
@@ -28,7 +30,7 @@ def curve(name: str = "elbow.q", *, rms: float = 1e-4, cutoff: float = 5.0) -> R
         rms=rms,
         noise=1e-4,
         inside=(0.5, 9.0),
-        spectrum=Spectrum(FREQUENCIES, motion + 1e-5, motion, 1e-5, cutoff),
+        spectrum=Spectrum(FREQUENCIES, motion + 1e-5, motion, 1e-5, cutoff, above),
         highest=Highest("d4q", "rad/s^4", 4, 0.0123 if rms else np.nan),
     )
 
@@ -56,6 +58,13 @@ def test_the_report_s_numbers_are_drawn_where_they_belong() -> None:
         assert band.get_extents().transformed(axes.transData.inverted()).x1 == pytest.approx(5.0)
 
 
+def test_noise_that_a_filter_made_smooth_is_no_band_of_the_motion() -> None:
+    _, _, spectrum, _ = recorded_figure([curve(above=2.0)], "log").axes
+    ends = [patch.get_extents().transformed(spectrum.transData.inverted()) for patch in spectrum.patches]
+    assert [end.x1 for end in ends] == pytest.approx([2.0, 5.0])
+    assert spectrum.get_title(loc="left") == "motion to 2 Hz, 65 knots"
+
+
 def test_the_highest_derivative_is_weighed_by_the_frequency() -> None:
     _, _, spectrum, highest = recorded_figure([curve()], "log").axes
     ratio = highest.lines[0].get_ydata() / spectrum.lines[0].get_ydata()
@@ -69,7 +78,7 @@ def test_a_spline_through_all_samples_has_no_band_and_no_residual() -> None:
 
 
 def test_a_joint_at_rest_is_said_to_be_so() -> None:
-    nothing = Spectrum(FREQUENCIES, np.zeros(50), np.zeros(50), 1e-18, np.nan)
+    nothing = Spectrum(FREQUENCIES, np.zeros(50), np.zeros(50), 1e-18, np.nan, np.nan)
     still = Curve(TIME, np.full(400, 0.3))
     rest = curve(rms=0.0)._replace(recorded=still, fitted=still, spectrum=nothing)
     signal, _, spectrum, _ = recorded_figure([rest], "log").axes

@@ -17,6 +17,7 @@ class Spectrum(NamedTuple):
         fitted: of the spline at the same times, (bands,).
         noise: of white noise as large as the report states; 0 if it states none.
         cutoff: frequency up to which the spline follows the samples, Hz; NaN if it follows all of them.
+        above: frequency above which noise that a filter made smooth prevails, Hz; NaN if there is none.
     """
 
     frequencies: FloatArray
@@ -24,6 +25,7 @@ class Spectrum(NamedTuple):
     fitted: FloatArray
     noise: float
     cutoff: float
+    above: float
 
 
 class Highest(NamedTuple):

@@ -142,7 +142,7 @@ def _curve(
         noise=float(stated["noise"]),
         inside=(record.start + time[0] + ends["start"], record.start + time[-1] - ends["end"]),
         # the residual is small, and so is the error of its interpolation where stamps are uneven
-        spectrum=_spectrum(even, smooth + np.interp(even, time, residual), smooth, float(stated["noise"])),
+        spectrum=_spectrum(even, smooth + np.interp(even, time, residual), smooth, stated),
         highest=Highest(
             name=profile.signal.names[-1],
             unit=_unit(profile.signal, -1, member, joint_types),
@@ -160,7 +160,9 @@ def _unit(signal: Signal, order: int, member: int, joint_types: Sequence[str]) -
     return quantity.unit(joint_types[member])
 
 
-def _spectrum(time: FloatArray, recorded: FloatArray, fitted: FloatArray, noise: float) -> Spectrum:
+def _spectrum(
+    time: FloatArray, recorded: FloatArray, fitted: FloatArray, stated: Mapping[str, Any]
+) -> Spectrum:
     """Return densities in bands of equal width in octaves, from samples at equal steps."""
     count, step = len(time), float(time[1] - time[0])
     window = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** WINDOW_POWER
@@ -179,4 +181,6 @@ def _spectrum(time: FloatArray, recorded: FloatArray, fitted: FloatArray, noise:
     passed = np.flatnonzero(shared > FOLLOWED * own)
     last = int(passed[-1]) if passed.size else len(starts) - 1
     cutoff = math.nan if last == len(starts) - 1 else float(frequencies[last : last + 2].mean())
-    return Spectrum(frequencies, np.sqrt(own), np.sqrt(smooth), noise * math.sqrt(2 * step), cutoff)
+    noise = float(stated["noise"]) * math.sqrt(2 * step)
+    above = float(stated.get("filtered_noise", {}).get("above", math.nan))
+    return Spectrum(frequencies, np.sqrt(own), np.sqrt(smooth), noise, cutoff, above)

@@ -16,7 +16,7 @@ from matplotlib.patches import Patch
 from vsacli.results.plots.drawing import ZERO, draw_curve
 from vsacli.results.plots.panels import PANEL_WIDTH, AxesGrid, add_title, complete, folding, share_time
 from vsacli.results.plots.styles import DIFFERENCE, LineStyle, house_style, line_handle, line_style
-from vsacli.results.recorded_curves import Highest, RecordedCurve
+from vsacli.results.recorded_curves import Highest, RecordedCurve, Spectrum
 
 COLUMNS, MOST_ROWS = 4, 14
 ROW_HEIGHT = 1.8
@@ -29,6 +29,7 @@ _SAMPLES: dict[str, Any] = {"color": "0.65", "linewidth": 3.0}
 _NOISE: dict[str, Any] = {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (1, 2))}
 _CUTOFF: dict[str, Any] = {"color": "0.3", "linewidth": 1.0, "linestyle": (0, (5, 2))}
 _BAND: dict[str, Any] = {"facecolor": "0.93", "edgecolor": "none", "zorder": 0.4}
+_FILTERED: dict[str, Any] = {"facecolor": "#f3d9d9", "edgecolor": "none", "zorder": 0.4}
 _ENDS: dict[str, Any] = {"facecolor": "#fde9c8", "edgecolor": "none", "zorder": 0.4}
 _FIT = LineStyle(line_style(1).color, "-", "")
 
@@ -115,18 +116,33 @@ def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> l
         axes.loglog(spectrum.frequencies, noise, **_NOISE)
     axes.set_ylim(max(LEAST_DENSITY * float(np.max(fitted)), float(np.min(recorded)) / 3), 3 * top)
     axes.set_xlim(spectrum.frequencies[0], spectrum.frequencies[-1])
-    if math.isnan(spectrum.cutoff):
-        return []
-    axes.axvspan(spectrum.frequencies[0], spectrum.cutoff, **_BAND)
-    axes.axvline(spectrum.cutoff, **_CUTOFF)
-    return [Patch(**_BAND, label="motion's band"), Line2D([], [], **_CUTOFF, label="cut-off of the spline")]
+    return _draw_bands(axes, spectrum)
+
+
+def _draw_bands(axes: Axes, spectrum: Spectrum) -> list[Artist]:
+    """Shade the motion's band, and noise that the spline follows up to its cut-off."""
+    first, last = float(spectrum.frequencies[0]), float(spectrum.frequencies[-1])
+    handles: list[Artist] = []
+    end = last if math.isnan(spectrum.cutoff) else spectrum.cutoff
+    motion = float(np.fmin(spectrum.cutoff, spectrum.above))
+    if not math.isnan(motion):
+        axes.axvspan(first, motion, **_BAND)
+        handles.append(Patch(**_BAND, label="motion's band"))
+    if spectrum.above < end:
+        axes.axvspan(spectrum.above, end, **_FILTERED)
+        handles.append(Patch(**_FILTERED, label="noise that a filter made smooth"))
+    if end < last:
+        axes.axvline(end, **_CUTOFF)
+        handles.append(Line2D([], [], **_CUTOFF, label="cut-off of the spline"))
+    return handles
 
 
 def _followed(curve: RecordedCurve) -> str:
+    cutoff, above = curve.spectrum.cutoff, curve.spectrum.above
     if not np.any(curve.spectrum.recorded):
         return "at rest"
-    cutoff = curve.spectrum.cutoff
-    return "all is motion" if math.isnan(cutoff) else f"motion to {cutoff:.3g} Hz, {curve.knots} knots"
+    end = np.fmin(cutoff, above)
+    return "all is motion" if math.isnan(end) else f"motion to {end:.3g} Hz, {curve.knots} knots"
 
 
 def _determined(highest: Highest) -> str:
