@@ -58,6 +58,8 @@ def test_the_reader_refuses_times_that_no_run_has(damaged, tmp_path, sentence):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_relies_on_the_reader(vsacli, damaged, tmp_path, command):
+    if command == "page":
+        pytest.importorskip("bokeh")
     damaged(DAMAGE["3.99 s follows 4 s, at sample 1"])
     (tmp_path / "m.csv").write_text("time,base.q\n0,1\n1,2\n2,3\n3,3\n4,5\n")
     before = {path.name for path in tmp_path.iterdir()}
