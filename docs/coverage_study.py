@@ -15,10 +15,9 @@ import numpy as np
 from vsacli import Result, Trajectory, inverse_dynamics, load_robot
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.estimation.solution import solution
-from vsacli.studies.identification.motors.motor_system import motor_systems
-from vsacli.studies.identification.motors.unknowns import GROUPS
-from vsacli.studies.identification.records.signals import conditioned
+from vsacli.studies.identification.conditioning import conditioned
+from vsacli.studies.identification.fitted_system import solution
+from vsacli.studies.identification.motor_equations import GROUPS, motor_systems
 
 ROOT = Path(__file__).resolve().parents[1]
 FIGURE = ROOT / "docs" / "images" / "identification-coverage.png"

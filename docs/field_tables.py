@@ -8,9 +8,33 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from vsacli.documents.fields import FINITE, REQUIRED, declared
-from vsacli.documents.kinds.nested import refused_in
-from vsacli.documents.records import Field, on_one_line
+from vsacli.base.texts import MOST_LETTERS
+from vsacli.base.units import DIMENSIONLESS, Quantity
+from vsacli.documents.field_kinds import Field, on_one_line
+from vsacli.documents.fields import (
+    FINITE,
+    REQUIRED,
+    Boolean,
+    Choice,
+    Integer,
+    Interval,
+    Items,
+    Kind,
+    Name,
+    NamedNumbers,
+    Number,
+    OneOf,
+    OneOrMore,
+    OwnKind,
+    Pair,
+    PerJoint,
+    Record,
+    Share,
+    TableFile,
+    Text,
+    Vector,
+    declared,
+)
 
 Variants = Mapping[str, type]
 
@@ -75,13 +99,87 @@ def _not_supported(cls: type) -> Iterator[str]:
         yield f"Part of the format, but not supported yet, so refused: {', '.join(refused)}.\n"
 
 
+def refused_in(cls: type) -> Iterator[str]:
+    """Keys and words in a record class that belong to the format but are not supported yet."""
+    yield from getattr(cls, "not_yet", ())
+    for name, (field, _) in declared(cls).items():
+        yield from _refused(field.kind, name)
+
+
+def _refused(kind: Kind, name: str) -> Iterator[str]:
+    match kind:
+        case Choice():
+            yield from (f"{name}: {word}" for word in kind.not_yet)
+        case OneOf():
+            yield from (f"{name}: {{type: {word}}}" for word in kind.not_yet)
+        case Record(cls):
+            yield from (f"{name}.{word}" for word in refused_in(cls))
+        case Items(item=item) | Pair(item):
+            yield from _refused(item, name)
+
+
+def words_of(kind: Kind) -> str:
+    """What a value is, in a few words with its unit."""
+    match kind:
+        case OwnKind():
+            return kind.words
+        case Record():
+            return "mapping"
+        case OneOf(variants):
+            return f"mapping; `type`: {' or '.join(f'`{name}`' for name in variants)}"
+        case OneOrMore(item=item):
+            return f"{words_of(item)}; or a list of these"
+        case Items(item=item):
+            return "list" if kind.records else f"list, each {words_of(item)}"
+        case Pair(item):
+            return f"{words_of(item)}; or a list of two"
+    return _words_of_numbers(kind) if kind.unit else _words_of_one(kind)
+
+
+def _words_of_numbers(kind: Kind) -> str:
+    unit = _unit(kind.unit or DIMENSIONLESS)
+    match kind:
+        case Share():
+            return "share, such as `3 %` or `0.03`"
+        case Vector(length=length):
+            return f"{length} numbers, {unit}"
+        case Interval(lowest=lowest):
+            alone = {None: "-x to x", -math.inf: "upper"}.get(lowest, f"{lowest} to x")
+            return f"[lower, upper], or one number x ({alone}), {unit}"
+        case PerJoint():
+            return f"per joint, {unit}"
+    assert isinstance(kind, Number)
+    return unit
+
+
+def _words_of_one(kind: Kind) -> str:
+    match kind:
+        case Name():
+            return f"text in one line, of at most {MOST_LETTERS} letters"
+        case Text(identifier=identifier):
+            return "text of letters, digits, `_` and `-`" if identifier else "text"
+        case Choice(options=options, words=words):
+            return words or " or ".join(f"`{option}`" for option in options)
+        case TableFile(columns=columns):
+            return f"CSV file with the columns {', '.join(f'`{column}`' for column in columns)}"
+    return {
+        Integer: "whole number",
+        Boolean: "`true` or `false`",
+        NamedNumbers: "mapping from names to numbers in SI units",
+    }[type(kind)]
+
+
+def _unit(unit: Quantity) -> str:
+    return "number" if unit == DIMENSIONLESS else str(unit)
+
+
 def _summary(cls: type) -> str:
     return inspect.cleandoc(cls.__doc__ or "")
 
 
 def _fields(cls: type, prefix: str) -> Iterator[Row | Choices]:
     for name, (field, default) in declared(cls).items():
-        key = f"{prefix}{name}{field.kind.marks}"
+        key = f"{prefix}{name}{'[]' if isinstance(field.kind, Items) else ''}"
         yield Row(f"{prefix}{name}", _value(field), _default(default), field.doc)
         records = field.kind.records
         if "" in records:
@@ -91,7 +189,7 @@ def _fields(cls: type, prefix: str) -> Iterator[Row | Choices]:
 
 
 def _value(field: Field) -> str:
-    words = field.kind.words
+    words = words_of(field.kind)
     check = field.check
     return words if check is None or check is FINITE else f"{words}; {check.requirement}"
 

@@ -32,13 +32,13 @@ from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.cli.console import Exit
 from vsacli.cli.main import vsacli
 from vsacli.control.poles import PolesFile
-from vsacli.documents.column_source import ColumnSource
+from vsacli.documents.columns_file import ColumnSource
 from vsacli.documents.plausibility import Rule
 from vsacli.files.examples import Example, examples, examples_root, opening_comment
 from vsacli.robot.file import RobotFile
 from vsacli.robot.plausibility import ROBOT_RULES
 from vsacli.studies.sizing import CatalogueMotor
-from vsacli.studies.sweeps.kept import KEPT
+from vsacli.studies.sweeps.columns import KEPT
 from vsacli.studies.sweeps.study_file import StudyFile
 from vsacli.trajectory.file import content
 from vsacli.trajectory.plausibility import TRAJECTORY_RULES

@@ -24,12 +24,11 @@ from samples.command_line import installed
 from samples.marks import slow
 
 import vsacli
-from vsacli.analysis.ladder import LADDER_BOUND
-from vsacli.analysis.self_check import SPRING_BOUND
+from vsacli.analysis.derivative_check import LADDER_BOUND, SPRING_BOUND
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN
 from vsacli.cli.main import vsacli as group
 from vsacli.documents.source import MAX_DOCUMENT_BYTES
-from vsacli.documents.yaml_tree import MAX_LEVELS, MAX_NODES
+from vsacli.documents.tree import MAX_LEVELS, MAX_NODES
 
 REPOSITORY = Path(__file__).parents[1]
 README = REPOSITORY / "README.md"

@@ -22,8 +22,8 @@ from samples.robots import vsa_3r
 from vsacli import inverse_dynamics
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.laws.quadratic import Quadratic
+from vsacli.actuators.laws.law import PairSolution
+from vsacli.actuators.laws.tendons import Quadratic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import margin, reach_flags
 from vsacli.analysis.run import Run

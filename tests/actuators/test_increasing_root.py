@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from samples.mechanisms import DEVICES
 
-from vsacli.actuators.mechanisms.ratios.increasing_root import MAX_STEPS, increasing_root
+from vsacli.actuators.mechanisms.ratios.scales import MAX_STEPS, increasing_root
 from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.tracing import Kind, trace

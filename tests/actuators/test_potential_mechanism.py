@@ -16,10 +16,10 @@ from samples.marks import slow_but
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.laws import Cubic
-from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.potentials.potential import BranchStart, Potential, PotentialRange
-from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
-from vsacli.actuators.mechanisms.ratios.awas import Awas
+from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import Maccepa
+from vsacli.actuators.mechanisms.ratios.ratio import Awas
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.reach import reach_flags
 from vsacli.base.errors import InputError, InvalidRecordError

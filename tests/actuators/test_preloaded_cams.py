@@ -13,10 +13,9 @@ from oracles import cam_scan
 from samples.marks import slow_but
 from samples.mechanisms import profile
 
-from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
-from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
-from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import PreloadedCam
+from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import Maccepa, PreloadedCam
 from vsacli.actuators.reach import reach
 from vsacli.base.arrays import FloatArray
 

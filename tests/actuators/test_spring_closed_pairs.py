@@ -7,9 +7,8 @@ import pytest
 from samples.springs import residuals
 
 from vsacli.actuators.laws import Exponential, PairSolution, Quadratic, Sinh, SpringLaw
-from vsacli.actuators.laws.exponential import ExponentialPair
-from vsacli.actuators.laws.quadratic import QuadraticTwins
 from vsacli.actuators.laws.sinh import SinhPair
+from vsacli.actuators.laws.tendons import ExponentialPair, QuadraticTwins
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.pairs.solver import IteratedPair
 from vsacli.base.arrays import FloatArray

@@ -10,11 +10,10 @@ from samples.springs import SPRINGS, measured, on_side_2, stiffness_under
 from scipy.optimize import brentq
 
 from vsacli.actuators.laws import Cubic, FourBar, Polynomial, SpringLaw
-from vsacli.actuators.laws.tendon import Mirrored
+from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.actuators.pairs.balance import Balance
-from vsacli.actuators.pairs.critical_curves import sample_hardening
-from vsacli.actuators.pairs.fold_map import FoldMap, map_folds
-from vsacli.actuators.pairs.folds import outermost_fold
+from vsacli.actuators.pairs.critical_points import sample_hardening
+from vsacli.actuators.pairs.folds import FoldMap, map_folds, outermost_fold
 from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)

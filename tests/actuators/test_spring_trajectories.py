@@ -14,11 +14,10 @@ from samples.marks import slow_but
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.exponential import Exponential
 from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.laws.quadratic import Quadratic
 from vsacli.actuators.laws.sinh import Sinh
+from vsacli.actuators.laws.tendons import Exponential, Quadratic
 from vsacli.analysis.result import Result
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has

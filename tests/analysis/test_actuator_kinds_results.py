@@ -22,12 +22,15 @@ from samples.robots import vsa_3r
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.integrated_deflections import integrate_deflections
-from vsacli.results.plots import compare_files, plot_feasibility, plot_stored
+from vsacli.results.charts.figures import feasibility
+from vsacli.results.charts.stored import StoredCharts
+from vsacli.results.plots import compare_files, plot_stored
+from vsacli.results.plots import drawn as drawn_sheet
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
-from vsacli.studies.remedies import suggest
-from vsacli.studies.remedies.suggestions import NotPossible, StiffnessOffset, StiffnessProfile
+from vsacli.studies.search import suggest
+from vsacli.studies.search.suggestions import NotPossible, StiffnessOffset, StiffnessProfile
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -247,7 +250,10 @@ def compared_panels(*results: Any) -> list[Any]:
 
 
 def test_no_stiffness_panel_for_a_rigid_joint_and_no_corridor_for_an_elastic_one() -> None:
-    for figure, first in ((plot_stored(drawn())["motion"], 1), (plot_feasibility(drawn()), 0)):
+    for figure, first in (
+        (plot_stored(drawn())["motion"], 1),
+        (drawn_sheet(feasibility(StoredCharts([drawn()]))), 0),
+    ):
         shoulder, elbow = figure.axes[first:]
         assert titles([shoulder, elbow]) == ["shoulder", "elbow"]
         assert (len(shoulder.collections), len(elbow.collections)) == (0, 1)

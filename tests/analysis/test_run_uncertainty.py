@@ -10,7 +10,7 @@ from samples.blurred import Blurred
 from samples.robots import vsa_3r
 
 from vsacli import inverse_dynamics
-from vsacli.actuators.limit_check import LimitCheck
+from vsacli.actuators.reach import LimitCheck
 from vsacli.analysis.joint_report import JointUncertainty, Spread
 from vsacli.analysis.report import VERDICTS, Report
 from vsacli.analysis.run import Run

@@ -14,7 +14,7 @@ from samples.marks import slow
 from samples.robots import random_robot, vsa_3r
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.analysis.ladder import LADDER_BOUND, ROUNDING_GAIN, ladder
+from vsacli.analysis.derivative_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.analysis.report import Report
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
@@ -156,7 +156,7 @@ def fast_recording(**options: Any) -> Trajectory:
 def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     """Those of long chains are computed some after the others."""
     whole = ladder(*load("7R"))
-    monkeypatch.setattr("vsacli.analysis.ladder.usual_block", lambda _joints: 200)
+    monkeypatch.setattr("vsacli.analysis.derivative_check.usual_block", lambda _joints: 200)
     assert ladder(*load("7R")) == whole
 
 

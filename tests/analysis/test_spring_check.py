@@ -8,7 +8,7 @@ import pytest
 from samples.shipped import shipped_run
 
 from vsacli import inverse_dynamics
-from vsacli.analysis.ladder import LADDER_BOUND
+from vsacli.analysis.derivative_check import LADDER_BOUND
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine import NUMPY, Choice, Kernel
 from vsacli.dynamics.balances import BalancedDynamics

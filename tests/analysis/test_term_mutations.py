@@ -10,8 +10,7 @@ from samples.term_mutations import MUTATIONS, Mutation, mutated_run
 from samples.valid_runs import valid_run
 
 from vsacli import inverse_dynamics
-from vsacli.analysis.ladder import LADDER_BOUND
-from vsacli.analysis.self_check import SHAFT_BOUND, SelfCheck
+from vsacli.analysis.derivative_check import LADDER_BOUND, SHAFT_BOUND, SelfCheck
 from vsacli.compute.engine.compiled_engine import kernel_code
 
 THEORY = Path(__file__).parents[2] / "docs" / "theory.md"
@@ -80,6 +79,6 @@ def test_the_noise_of_stiff_springs_hides_no_wrong_term(monkeypatch: pytest.Monk
     check = inverse_dynamics(robot, trajectory).report.self_check
     assert check.passed
     assert check.ladder > LADDER_BOUND  # which it exceeds without cause
-    rates = "actuators.mechanisms.potentials.potential_state:PotentialState.rates"
+    rates = "actuators.mechanisms.potentials.potential_energy:PotentialState.rates"
     Mutation("tau_e'", "", rates, "dtau_e + u", "1.01 * dtau_e + u").apply(monkeypatch)
     assert not inverse_dynamics(robot, trajectory).report.self_check.passed

@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from vsacli.base import staging
+from vsacli.base import storage
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import ENDING, Interrupted, unwinding_when_ended
 from vsacli.base.outputs import Outputs, Staged
@@ -162,7 +162,7 @@ def test_a_file_of_several_names_is_not_replaced(project: Path) -> None:
 
 def test_a_name_that_a_killed_run_gave_is_no_further_one(project: Path) -> None:
     """It keeps the old file under a second name while the new one gets the first."""
-    script = "from vsacli.base.staging import staging_name; print(staging_name())"
+    script = "from vsacli.base.storage import staging_name; print(staging_name())"
     dead = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     os.link(project / "a", project / dead.stdout.strip())
     write(project, overwrite=True)
@@ -207,25 +207,25 @@ def test_content_is_on_the_disk_before_the_file_has_its_name(
 
 
 def test_the_leavings_of_dead_processes_are_swept_and_no_others(tmp_path: Path) -> None:
-    script = "from vsacli.base.staging import staging_name; print(staging_name())"
+    script = "from vsacli.base.storage import staging_name; print(staging_name())"
     dead = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     left = dead.stdout.strip()
-    living = staging.staging_name()
+    living = storage.staging_name()
     elsewhere = left.replace(left.split("-")[1], "0" * 12)
     used_again = "-".join([*living.split("-")[:3], "1", living.split("-")[4]])
     strange = [".vsacli-1.tmp", "vsacli.tmp", left + "x"]
     for name in (left, living, elsewhere, used_again, *strange):
         (tmp_path / name).write_text("half", encoding="utf-8")
     (tmp_path / left.replace(left[-20:-4], "0" * 16)).mkdir()
-    owners = {each.path.name: each.owner for each in staging.unfinished(tmp_path)}
-    assert owners[left] is staging.Owner.ENDED
-    assert owners[living] is staging.Owner.RUNNING
-    assert owners[elsewhere] is staging.Owner.ELSEWHERE
+    owners = {each.path.name: each.owner for each in storage.unfinished(tmp_path)}
+    assert owners[left] is storage.Owner.ENDED
+    assert owners[living] is storage.Owner.RUNNING
+    assert owners[elsewhere] is storage.Owner.ELSEWHERE
     assert len(owners) == 5
     with Outputs() as outputs:
         outputs.file(tmp_path / "a")
     kept = {living, elsewhere, *strange, "a"}
-    if staging._start(os.getpid()) == staging.UNKNOWN_START:
+    if storage._start(os.getpid()) == storage.UNKNOWN_START:
         kept.add(used_again)  # a system that does not say when a process began
     assert {path.name for path in tmp_path.iterdir()} == kept
 

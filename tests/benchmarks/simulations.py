@@ -16,7 +16,7 @@ from timing import Seconds, cpu_seconds, medians
 from vsacli import Gains, InitialError, simulate
 from vsacli.compute.engine import libraries
 from vsacli.control.simulation import Simulation
-from vsacli.control.simulation.equations.recorded_equations import RecordedEquations
+from vsacli.control.simulation.loop_equations import RecordedEquations
 
 TEXT, RECORDED, COMPILED = "text", "recorded", "compiled"
 

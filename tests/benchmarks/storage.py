@@ -20,7 +20,7 @@ from timing import cpu_seconds, medians
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.analysis.result import Result
 from vsacli.base.arrays import AnyArray
-from vsacli.results.store.chunks import chunk_rows
+from vsacli.results.store.new_file import chunk_rows
 
 SAMPLES = 20_000
 POSITION_NOISE, STIFFNESS_NOISE = 2e-5, 0.5

@@ -13,7 +13,9 @@ from samples.figures import rest_to_rest
 
 from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integrate_deflections
 from vsacli.dynamics.inverse import Stop
-from vsacli.results.plots import FEASIBILITY_VARIABLES, plot_feasibility
+from vsacli.results.charts.figures import FEASIBILITY_VARIABLES, feasibility
+from vsacli.results.charts.stored import StoredCharts
+from vsacli.results.plots import drawn as drawn_sheet
 
 PNG = b"\x89PNG\r\n\x1a\n"
 FIGURE = "figures/vsa_3r-soft-feasibility.png"
@@ -24,11 +26,11 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """The figures that commands draw."""
     drawn: list[Figure] = []
 
-    def drawing(result) -> Figure:
-        drawn.append(plot_feasibility(result))
+    def drawing(sheet) -> Figure:
+        drawn.append(drawn_sheet(sheet))
         return drawn[-1]
 
-    monkeypatch.setattr("vsacli.results.plots.plot_feasibility", drawing)
+    monkeypatch.setattr("vsacli.results.plots.figures.drawn", drawing)
     return drawn
 
 
@@ -126,7 +128,7 @@ def test_upper_end_of_the_corridor_is_drawn():
     above = result.read("stiffness") > upper
     bounded = rest_to_rest(sigma=(850, 1275), stiffness_upper=upper, flags=above.astype(np.uint16))
     assert set(FEASIBILITY_VARIABLES) <= set(bounded.variables)
-    for axes in plot_feasibility(bounded).axes:
+    for axes in drawn_sheet(feasibility(StoredCharts([bounded]))).axes:
         assert any((line.get_ydata() == 1200).all() for line in axes.lines)
         ((start, _),) = shaded(axes)
         assert 2 < start < 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 import threading
@@ -51,7 +52,10 @@ def test_a_file_that_is_written_behind_the_run_does_not_pile_up_in_memory(tmp_pa
 
 
 class LineCount:
-    """Counts executed lines of Python, and jumps back to one, in this thread and those it starts."""
+    """Counts executed lines of Python, and jumps back to one, in this thread and those it starts.
+
+    What earlier tests left to the garbage collector, whose finalizers would count, is collected before.
+    """
 
     def __init__(self) -> None:
         self.lines = 0
@@ -62,6 +66,8 @@ class LineCount:
 
     def __enter__(self):
         self._before = sys.gettrace(), threading.gettrace()
+        gc.collect()
+        gc.disable()
         threading.settrace(self._trace)
         sys.settrace(self._trace)
         return self
@@ -69,6 +75,7 @@ class LineCount:
     def __exit__(self, *_error):
         sys.settrace(self._before[0])
         threading.settrace(self._before[1])
+        gc.enable()
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from samples.command_line import REPOSITORY, ROBOT, edited
 from samples.marks import slow
 
-from vsacli.documents.changes import read_changes
+from vsacli.documents.reading import read_changes
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
 

@@ -15,8 +15,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import OF_ANY_ROBOT
 from vsacli.cli.console import Exit
-from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.simulation import StoredSimulation
+from vsacli.results.store.reader import StoredResult, StoredSimulation
 
 FEEDBACK = ("--controller", "feedback-linearization")
 

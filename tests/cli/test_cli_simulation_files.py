@@ -17,7 +17,7 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, contents, edit
 
 from vsacli.base.arrays import FloatArray
 from vsacli.results.plots import compare_files
-from vsacli.results.store.simulation import open_stored
+from vsacli.results.store.reader import open_stored
 
 FIGURES = ("motion", "position-error", "stiffness-error", "motor-torque")
 JOINTS = ("base", "shoulder", "elbow")

@@ -24,7 +24,7 @@ from vsacli.compute.engine.compiler import FLAGS, Library
 from vsacli.compute.engine.engines import Kernel, TracedEngine, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.tracing import Kind, Program, is_of_calls, trace
-from vsacli.compute.tracing.row_calls import CallingRowFunction
+from vsacli.compute.tracing.row_functions import CallingRowFunction
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.model import Robot
@@ -109,7 +109,7 @@ def test_what_passes_through_is_not_copied():
 
 
 def test_operations_between_calls_go_into_bodies_of_bounded_size(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("vsacli.compute.tracing.outlining.MOST_OUTLINED", 10)
+    monkeypatch.setattr("vsacli.compute.tracing.calls.MOST_OUTLINED", 10)
 
     def powers(rows: Sequence[Any]) -> list[Any]:
         x, y = rows

@@ -18,11 +18,10 @@ from vsacli import load_robot
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.exponential import Exponential
 from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.laws.quadratic import Quadratic
 from vsacli.actuators.laws.sinh import Sinh
+from vsacli.actuators.laws.tendons import Exponential, Quadratic
 from vsacli.analysis.run import Run
 from vsacli.base.flags import Flag
 from vsacli.compute.engine import choose, compiler

@@ -14,7 +14,7 @@ from samples.command_line import ROBOT
 from samples.marks import needs_compiler, slow
 from samples.robots import random_motion, vsa_3r
 
-from vsacli.base.staging import staging_name
+from vsacli.base.storage import staging_name
 from vsacli.compute.engine import cache, choose
 from vsacli.compute.engine.cache import (
     CHECKSUM,
@@ -139,7 +139,7 @@ def test_full_disk_is_told_and_leaves_nothing(folder: Path, monkeypatch: pytest.
 
 
 def test_what_a_killed_process_left_is_swept(tmp_path: Path):
-    script = "from vsacli.base.staging import staging_name; print(staging_name())"
+    script = "from vsacli.base.storage import staging_name; print(staging_name())"
     dead = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     old, new = (tmp_path / name for name in (dead.stdout.strip(), staging_name()))
     for left in (old, new):

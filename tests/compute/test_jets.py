@@ -11,7 +11,7 @@ from samples.marks import slow_but
 
 from vsacli.compute.jets import FUNCTIONS, Jet, Truncation
 from vsacli.compute.tracing import Kind, trace
-from vsacli.compute.tracing.python_code import RowFunction
+from vsacli.compute.tracing.row_functions import RowFunction
 from vsacli.documents.expression import Grammar, parse
 
 X = sympy.symbols("x y z", positive=True)

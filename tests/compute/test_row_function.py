@@ -14,7 +14,7 @@ from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.choice import TRACE_FROM
 from vsacli.compute.engine.engines import TracedEngine, kernel_program
 from vsacli.compute.rows import RowKernel, RowLayout
-from vsacli.compute.tracing.python_code import RowFunction
+from vsacli.compute.tracing.row_functions import RowFunction
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.model import Robot

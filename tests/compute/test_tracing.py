@@ -12,7 +12,7 @@ from samples.programs import carry_out, traced
 from samples.traced_functions import ELEMENTWISE, NODES, SPECIAL, operands
 
 from vsacli.compute.tracing import Symbol, Tape, TracedArray
-from vsacli.compute.tracing.python_code import StateFunction
+from vsacli.compute.tracing.python_functions import StateFunction
 
 
 @pytest.mark.parametrize("name", ELEMENTWISE)

@@ -12,8 +12,7 @@ from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
 
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.laws.pair import Pair
+from vsacli.actuators.laws.law import Pair, SpringLaw
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.compute.engine import choose

@@ -14,22 +14,21 @@ from samples.single_joint import LINK_INERTIA, single_joint, step_of
 from scipy.integrate import solve_ivp
 
 from vsacli import inverse_dynamics
+from vsacli.actuators.drivetrain import Rotors
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.friction import Friction, FrictionLaws
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
-from vsacli.actuators.rotors import Rotors
 from vsacli.base.arrays import FloatArray
 from vsacli.control.gains import Gains, Integral
 from vsacli.control.linearization import FeedbackLinearization
 from vsacli.control.simulation import InitialError, Tolerances, perturbed, simulate
-from vsacli.control.simulation.budget import Budget
-from vsacli.control.simulation.closed_loop import ClosedLoop
-from vsacli.control.simulation.equations.equations import Equations
+from vsacli.control.simulation.closed_loop import ClosedLoop, Phase
+from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.integrator import Integrator
-from vsacli.control.simulation.reference import Reference
+from vsacli.control.simulation.loop_equations import Equations
 from vsacli.control.simulation.sliding import Sliding
-from vsacli.control.simulation.state_vector import Phase
+from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import Plant, State, state_derivative
 from vsacli.robot.model import Robot
 

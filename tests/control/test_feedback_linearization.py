@@ -15,7 +15,7 @@ from samples.robots import random_robot, vsa_3r
 from samples.signals import by_name
 
 from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.quadratic import Quadratic
+from vsacli.actuators.laws.tendons import Quadratic
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import Wrench

@@ -26,13 +26,11 @@ from vsacli.base.errors import InputError
 from vsacli.compute.engine import compiler
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, perturbed, simulate
-from vsacli.control.simulation.budget import Budget
-from vsacli.control.simulation.equations.equations import Equations
-from vsacli.control.simulation.equations.loop_code import loop_code
-from vsacli.control.simulation.equations.recorded_equations import Computing, RecordedEquations
-from vsacli.control.simulation.equations.recording import record
-from vsacli.control.simulation.equations.stages import dop853_with_stages
-from vsacli.control.simulation.monte_carlo import simulate_perturbed
+from vsacli.control.simulation.compiled_loop import dop853_with_stages
+from vsacli.control.simulation.ending import Budget
+from vsacli.control.simulation.loop_code import loop_code, record
+from vsacli.control.simulation.loop_equations import Computing, Equations, RecordedEquations
+from vsacli.control.simulation.perturbation import simulate_perturbed
 
 AGREEMENT = 1e-11
 """Relative to the largest rate: rounding of 1e-16 times the condition of M, up to 1e4 with seven joints."""
@@ -228,7 +226,7 @@ def test_code_that_serves_many_runs_is_compiled_sooner(monkeypatch):
     def load(_code, _opened, _compiler, _tell, worthwhile):
         asked.append(worthwhile(1))
 
-    monkeypatch.setattr("vsacli.control.simulation.equations.recorded_equations.load", load)
+    monkeypatch.setattr("vsacli.control.simulation.loop_equations.load", load)
     alone = simulate(vsa_3r(), short_motion(3), gains=GAINS)
     assert asked == [False]
     simulate(vsa_3r(), short_motion(3), gains=GAINS, runs=100)
@@ -240,7 +238,7 @@ def test_without_a_compiler_runs_go_on(monkeypatch):
     def none():
         raise compiler.CompilerError("there is no C compiler 'cc'")
 
-    monkeypatch.setattr("vsacli.control.simulation.equations.recorded_equations.system_compiler", none)
+    monkeypatch.setattr("vsacli.control.simulation.loop_equations.system_compiler", none)
     assert _run("auto", gains=GAINS).provenance == PLAIN
     with pytest.raises(InputError, match=r"there is no C compiler 'cc'; the engine numpy needs none"):
         _run("c")

@@ -13,7 +13,7 @@ from samples.robots import vsa_3r
 from samples.simulated import mixed_3r, short_motion
 
 from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.quadratic import Quadratic
+from vsacli.actuators.laws.tendons import Quadratic
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
@@ -22,12 +22,10 @@ from vsacli.base.units import time_text
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, Sensors, Tolerances, perturbed, simulate
 from vsacli.control.simulation.boundaries import Singularity
-from vsacli.control.simulation.closed_loop import ClosedLoop
-from vsacli.control.simulation.controllers import Feedforward
-from vsacli.control.simulation.reference import Reference
+from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, Phase
+from vsacli.control.simulation.history import RateFilter
 from vsacli.control.simulation.simulate import start_state
-from vsacli.control.simulation.state_trajectory import RateFilter
-from vsacli.control.simulation.state_vector import Phase
+from vsacli.control.simulation.tabulated import Reference
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 

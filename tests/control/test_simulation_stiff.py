@@ -14,12 +14,12 @@ from samples.single_joint import LINK_INERTIA, rigid_joint, single_joint, step_o
 
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.quadratic import Quadratic
+from vsacli.actuators.laws.tendons import Quadratic
 from vsacli.actuators.motor import Motor
 from vsacli.base.errors import InputError
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, simulate
-from vsacli.control.simulation.budget import Budget
+from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.stiff import jacobian
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory

@@ -20,10 +20,9 @@ from samples.studies import DRAWN, GRID, HEAD
 from vsacli.base.errors import InputError
 from vsacli.base.units import ANGLE, MASS, POSITION
 from vsacli.documents import fields
-from vsacli.documents.expression import ExpressionError
-from vsacli.documents.fields import Check, Kind, declared
+from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.fields import Check, Kind, OwnKind, declared
 from vsacli.documents.json_schema import json_schema
-from vsacli.documents.number import evaluate
 from vsacli.documents.tree import Node, Scope
 from vsacli.files.file_kinds import DOCUMENTS, FileKind
 from vsacli.robot.file import load_robot
@@ -145,11 +144,7 @@ def checks(cls: type, seen: set[type]) -> Iterator[Check]:
     for field, _ in declared(cls).values() if cls not in seen else ():
         if isinstance(field.kind, fields.Number | fields.Integer | fields.PerJoint) and field.check:
             yield field.check
-        kind = field.kind
-        while isinstance(kind, fields.Items | fields.Pair):
-            kind = kind.item
-        inner = [kind.cls] if isinstance(kind, fields.Record) else [*getattr(kind, "variants", {}).values()]
-        for record in inner:
+        for record in field.kind.records.values():
             yield from checks(record, seen | {cls})
 
 
@@ -206,7 +201,7 @@ def test_every_expression_that_is_read_is_accepted(text: str) -> None:
 
 
 def test_a_kind_without_a_schema_is_noticed() -> None:
-    class Novel(Kind):
+    class Novel(OwnKind):
         words = "something new"
 
         def read(self, node: Node, _label: str, _scope: Scope) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,8 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from samples.command_line import REPOSITORY
 
 from vsacli.base.units import LENGTH, POSITION
+from vsacli.documents.commented import commented_document
 from vsacli.documents.fields import (
     FINITE,
     NON_NEGATIVE,
@@ -36,9 +40,7 @@ from vsacli.documents.fields import (
     text,
     value,
 )
-from vsacli.documents.kinds.nested import refused_in
-from vsacli.documents.records import Line, Values
-from vsacli.documents.resolved_fields import ResolvedField
+from vsacli.documents.record_values import ResolvedField, arrays, json_value
 
 
 @dataclass(frozen=True)
@@ -64,19 +66,38 @@ class Sledge:
     part: Wheel | Ski = value(OneOf({"wheel": Wheel, "ski": Ski}, not_yet=("rope",)), "part")
 
 
+@dataclass(frozen=True)
+class Light:
+    run: Wheel = value(Record(Wheel), "what it runs on")
+
+
+@dataclass(frozen=True)
+class Train:
+    sledges: tuple[Light, ...] = value(Items(Record(Light)), "sledges")
+    wheels: tuple[Wheel, Wheel] = value(Pair(Record(Wheel)), "front and rear")
+    gauge: float = number(LENGTH, "gauge")
+
+
+@pytest.fixture
+def of_docs(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """What the documentation is generated with."""
+    monkeypatch.syspath_prepend(REPOSITORY / "docs")
+    return importlib.import_module("field_tables")
+
+
 WHEEL, SKI = Wheel(radius=1.0, name="w"), Ski(length=2.0)
 PART = OneOf({"wheel": Wheel, "ski": Ski})
 
 
 def arrays_of(record: Any) -> Iterator[ResolvedField]:
     for name, (field, _) in declared(type(record)).items():
-        for part in field.kind.arrays(getattr(record, name), arrays_of):
+        for part in arrays(field.kind, getattr(record, name), arrays_of):
             yield part._replace(path=(name, *part.path))
 
 
 def resolved(kind: Kind, content: Any) -> dict[str, tuple[tuple[str, ...], Any]]:
     """Dimensions and values of what a kind makes of a value, by path."""
-    parts = kind.arrays(content, arrays_of)
+    parts = arrays(kind, content, arrays_of)
     return {".".join(part.path): (part.dims, part.values.tolist()) for part in parts}
 
 
@@ -109,7 +130,7 @@ def test_entries_of_a_list_share_the_arrays_whatever_fields_they_have() -> None:
 @pytest.mark.parametrize("kind", [Integer(), PerJoint(LENGTH), Items(Number(LENGTH))])
 def test_kinds_without_arrays_say_so(kind: Kind) -> None:
     with pytest.raises(TypeError, match=r"a field of the kind .* has no array form"):
-        kind.arrays((1,), arrays_of)
+        list(arrays(kind, (1,), arrays_of))
 
 
 @pytest.mark.parametrize(
@@ -162,21 +183,13 @@ def test_problems(kind: Kind, content: Any, path: tuple[str | int, ...], problem
         (Pair(Record(Wheel)), "mapping; or a list of two"),
     ],
 )
-def test_words(kind: Kind, words: str) -> None:
-    assert kind.words == words
+def test_words(of_docs: Any, kind: Kind, words: str) -> None:
+    assert of_docs.words_of(kind) == words
 
 
-def test_what_is_not_supported_yet() -> None:
-    assert list(refused_in(Sledge)) == ["run.tyre", "colour: green", "part: {type: rope}"]
-    assert list(Items(Record(Wheel)).refused("wheels")) == ["wheels.tyre"]
-    assert list(Pair(Record(Wheel)).refused("wheels")) == ["wheels.tyre"]
-    assert list(Number(LENGTH).refused("x")) == []
-
-
-def lines_of(cls: type, values: Values) -> Iterator[Line]:
-    for name, (field, _) in declared(cls).items():
-        if name in values:
-            yield from field.kind.lines(name, values[name], field.doc, lines_of)
+def test_what_is_not_supported_yet(of_docs: Any) -> None:
+    assert list(of_docs.refused_in(Sledge)) == ["run.tyre", "colour: green", "part: {type: rope}"]
+    assert list(of_docs.refused_in(Train)) == ["sledges.run.tyre", "wheels.tyre"]
 
 
 @pytest.mark.parametrize(
@@ -186,10 +199,11 @@ def lines_of(cls: type, values: Values) -> Iterator[Line]:
         (Boolean(), False, ["x: false"]),
         (PerJoint(LENGTH), {"a": 1, "b": "90 deg"}, ["x: {a: 1, b: 90 deg}"]),
         (Vector(2, LENGTH), (1.0, 2), ["x: [1, 2]"]),
-        (Record(Wheel), {"radius": 1}, ["x:", "  radius: 1"]),
+        (Record(Ski), {"length": 1}, ["x:", "  length: 1"]),
         (PART, {"type": "ski", "length": 1}, ["x:", "  type: ski", "  length: 1"]),
         (Pair(PART), {"type": "ski", "length": 1}, ["x:", "  type: ski", "  length: 1"]),
         (Items(Number(LENGTH)), [1, 2], ["x: [1, 2]"]),
+        (Items(Items(Number(LENGTH))), [[1, 2], [3]], ["x:", "  - [1, 2]", "  - [3]"]),
         (
             Items(Record(Wheel)),
             [{"radius": 1, "name": "w"}, {"radius": 2}],
@@ -198,16 +212,11 @@ def lines_of(cls: type, values: Values) -> Iterator[Line]:
     ],
 )
 def test_lines(kind: Kind, content: Any, expected: list[str]) -> None:
-    lines = list(kind.lines("x", content, "said of it", lines_of))
-    assert [line.text for line in lines] == expected
-    assert lines[0].comment == "said of it"
-
-
-def json_of(record: Any) -> dict[str, Any]:
-    return {
-        name: field.kind.json_value(getattr(record, name), json_of)
-        for name, (field, _) in declared(type(record)).items()
-    }
+    document = dataclasses.make_dataclass("Document", [("x", Any, value(kind, "said of it"))])
+    first, *lines = commented_document("f/1", document, {"x": content}).splitlines()
+    assert first == "format: f/1"
+    assert [line.partition("#")[0].rstrip() for line in lines] == expected
+    assert "said of it" in lines[0]
 
 
 @pytest.mark.parametrize(
@@ -223,13 +232,13 @@ def json_of(record: Any) -> dict[str, Any]:
     ],
 )
 def test_plain(kind: Kind, content: Any, expected: Any) -> None:
-    assert kind.json_value(content, json_of) == expected
+    assert json_value(kind, content) == expected
 
 
 def test_named_numbers_are_pairs_that_go_by_their_names():
     kind, content = NamedNumbers(), (("k", 3.0), ("turn", math.inf))
-    assert kind.json_value(content, lambda _: None) == {"k": 3.0, "turn": math.inf}
-    arrays = list(kind.arrays(content, lambda _: iter(())))
-    assert [(field.path, float(field.values)) for field in arrays] == [(("k",), 3.0), (("turn",), math.inf)]
+    assert json_value(kind, content) == {"k": 3.0, "turn": math.inf}
+    found = arrays(kind, content, lambda _: iter(()))
+    assert [(field.path, float(field.values)) for field in found] == [(("k",), 3.0), (("turn",), math.inf)]
     problems = list(kind.problems(("constants",), FINITE, content))
     assert [str(problem) for problem in problems] == ["constants.turn: must be finite, not inf"]

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vsacli.documents.expression import ExpressionError
-from vsacli.documents.number import evaluate
+from vsacli.documents.expression import ExpressionError, evaluate
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,7 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from vsacli.documents.edited import edited
-from vsacli.documents.remarks import with_errors
-from vsacli.documents.unaliased import unaliased
+from vsacli.documents.edited import edited, unaliased, with_errors
 
 ARM = """\
 # an arm

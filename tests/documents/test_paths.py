@@ -17,8 +17,8 @@ from vsacli.base.signals import POSITION
 from vsacli.documents.paths import find, replace
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
-from vsacli.trajectory.declared import Use
-from vsacli.trajectory.declared.via_points import Via
+from vsacli.trajectory.curves.types import Use
+from vsacli.trajectory.curves.via_points import Via
 
 ROBOT = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")
 CONTENT = {

@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vsacli.base.errors import InputError
+from vsacli.documents.csv_file import CHUNK, MAX_HEADER
 from vsacli.documents.source import MAX_DOCUMENT_BYTES
 from vsacli.documents.table import read_table
-from vsacli.documents.table_header import MAX_HEADER
-from vsacli.documents.table_rows import CHUNK
 
 
 @pytest.fixture

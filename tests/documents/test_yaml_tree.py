@@ -6,8 +6,7 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.documents.source import Problems
-from vsacli.documents.tree import Mapping, Scalar, Sequence
-from vsacli.documents.yaml_tree import MAX_LEVELS, MAX_NODES, parse_yaml
+from vsacli.documents.tree import MAX_LEVELS, MAX_NODES, Mapping, Scalar, Sequence, parse_yaml
 
 
 def parse(text):

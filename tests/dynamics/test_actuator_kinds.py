@@ -14,7 +14,7 @@ from samples.signals import by_name
 
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.quadratic import Quadratic
+from vsacli.actuators.laws.tendons import Quadratic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray

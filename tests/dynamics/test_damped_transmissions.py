@@ -27,8 +27,7 @@ from vsacli.analysis.run import Run
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
-from vsacli.dynamics.internal_motion import internal_motions
-from vsacli.dynamics.internal_motion.march import March
+from vsacli.dynamics.internal_motion import March, internal_motions
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes

@@ -26,7 +26,7 @@ from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag
 from vsacli.dynamics.energy import EnergyMeter, Flow
-from vsacli.dynamics.quadrature import integrals, positive_part
+from vsacli.dynamics.losses import integrals, positive_part
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 

@@ -25,12 +25,11 @@ from samples.shipped import shipped_run
 from vsacli import Trajectory, inverse_dynamics
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.exponential import Exponential
+from vsacli.actuators.laws.tendons import Exponential
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
 from vsacli.base.errors import InputError
-from vsacli.dynamics.integrated_deflections import integrate_deflections
-from vsacli.dynamics.integrated_deflections.task import Task
+from vsacli.dynamics.integrated_deflections import Task, integrate_deflections
 from vsacli.robot.model import Robot
 
 TORQUE_AGREEMENT = 1e-9
@@ -127,7 +126,7 @@ def test_recording_is_followed_from_breakpoint_to_breakpoint():
 
 @pytest.mark.slow
 def test_long_recording_drifts_a_little(monkeypatch):
-    monkeypatch.setattr("vsacli.dynamics.integrated_deflections.integration.MOST_PIECES", 20)
+    monkeypatch.setattr("vsacli.dynamics.integrated_deflections.MOST_PIECES", 20)
     smooth, rough = (integrated(ARM, recorded(101, noise)) for noise in (0.0, 1e-5))
     # A tolerance of 1e-6 of 0.1 rad a step; and steps of 0.1 s, in which a smooth motion changes little.
     assert DRIFT < max(drifts(smooth)) < 1e-9

@@ -20,8 +20,14 @@ from samples.drives import Stopped, joint_with, springs, with_joint
 from vsacli import inverse_dynamics
 from vsacli.analysis.result import Result
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
-from vsacli.dynamics.integrated_deflections import integrate_deflections
-from vsacli.dynamics.integrated_deflections.task import REASONS, SINGULAR, STALLED, UNREACHABLE, Task
+from vsacli.dynamics.integrated_deflections import (
+    REASONS,
+    SINGULAR,
+    STALLED,
+    UNREACHABLE,
+    Task,
+    integrate_deflections,
+)
 
 
 @pytest.fixture(scope="module")

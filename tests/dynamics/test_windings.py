@@ -14,8 +14,8 @@ from samples.shipped import shipped_run
 from scipy.integrate import trapezoid
 
 from vsacli import inverse_dynamics, load_robot, open_result, simulate
-from vsacli.actuators.limit_check import LIMIT_ROUNDING
 from vsacli.actuators.motor import Motor
+from vsacli.actuators.reach import LIMIT_ROUNDING
 from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.base.flags import Flag
 from vsacli.base.outputs import Outputs

@@ -17,8 +17,7 @@ from samples.marks import slow
 
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.files.info.describe import describe_trajectory
-from vsacli.files.info.extremes import free_range
-from vsacli.files.info.robot_info import describe_robot, reach, reach_bound, static_load
+from vsacli.files.info.robot_info import describe_robot, free_range, reach, reach_bound, static_load
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import Joint, Limits, Pose
 from vsacli.robot.kinematics import tip_position

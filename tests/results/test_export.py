@@ -14,7 +14,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.variables import Block
 from vsacli.results.exports import selection
-from vsacli.results.exports.csv_table import CSV
+from vsacli.results.exports.formats import CSV
 from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
 from vsacli.results.store.reader import StoredResult
 
@@ -229,7 +229,7 @@ FULL = """
 import resource
 from vsacli.base.errors import StorageError
 from vsacli.base.outputs import Outputs
-from vsacli.results.exports.csv_table import CSV
+from vsacli.results.exports.formats import CSV
 from vsacli.results.exports.result_format import export_result
 from vsacli.results.store.reader import StoredResult
 

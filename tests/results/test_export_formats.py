@@ -16,7 +16,7 @@ from scipy.io import loadmat
 
 from vsacli.base.errors import InputError
 from vsacli.base.variables import Block
-from vsacli.results.exports import FORMATS, mat_file, selection
+from vsacli.results.exports import FORMATS, formats, selection
 from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
 from vsacli.results.store.reader import StoredResult
 
@@ -85,7 +85,7 @@ def test_names_of_variables_are_names_of_matlab():
 
 
 def test_a_variable_that_is_too_large_for_matlab_is_refused_before_anything_is_written(stored, monkeypatch):
-    monkeypatch.setattr(mat_file, "MAX_VARIABLE_BYTES", 8 * 2 * SAMPLES)
+    monkeypatch.setattr(formats, "MAX_VARIABLE_BYTES", 8 * 2 * SAMPLES)
     result = stored(random_block(SAMPLES, 2))
     exported(result, "mat", ["q"])
     with pytest.raises(InputError, match=r"tau_motor has 7,712 bytes, .* below 2 GB; take a lower --rate"):
@@ -240,7 +240,7 @@ try:
         Outputs() as outputs,
     ):
         file = outputs.file("out")
-        with file.opened_for_bytes() if form.binary else file.opened() as stream:
+        with file.opened(binary=form.binary) as stream:
             export_result(result, stream, form)
 except StorageError as error:
     print(error)

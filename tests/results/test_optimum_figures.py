@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.results.plots import JointChange, Moved, change_figure, pace_figure
+from vsacli.results.charts.optimum import JointChange, Moved, change_sheet, pace_sheet
+from vsacli.results.plots import drawn
 
 TIME = np.linspace(0.0, 2.0, 50)
 
@@ -23,7 +24,7 @@ def texts(figure):
 
 
 def test_a_joint_without_stiffness_has_torques_alone():
-    figure = change_figure([joint("soft", limit=100.0), joint("stiff", np.nan)], "arm", along_path=True)
+    figure = drawn(change_sheet([joint("soft", limit=100.0), joint("stiff", np.nan)], "arm", along_path=True))
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert titles == ["soft", "soft: motors", "stiff: motors"]
     assert texts(figure) == ["as commanded", "optimum", "reachable", "limit"]
@@ -32,11 +33,11 @@ def test_a_joint_without_stiffness_has_torques_alone():
 
 
 def test_without_any_stiffness_there_are_torques_alone():
-    figure = change_figure([joint("stiff", np.nan)], "arm", along_path=False)
+    figure = drawn(change_sheet([joint("stiff", np.nan)], "arm", along_path=False))
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["stiff: motors"]
     assert figure.axes[0].get_xlabel() == "time [s]"
 
 
 def test_the_fastest_motion_as_a_whole_is_drawn_where_there_is_one():
-    assert texts(pace_figure(TIME, 1 + TIME, np.nan, "arm")) == ["optimum", "as commanded"]
-    assert texts(pace_figure(TIME, 1 + TIME, 1.5, "arm"))[-1] == "fastest as a whole"
+    assert texts(drawn(pace_sheet(TIME, 1 + TIME, np.nan, "arm"))) == ["optimum", "as commanded"]
+    assert texts(drawn(pace_sheet(TIME, 1 + TIME, 1.5, "arm")))[-1] == "fastest as a whole"

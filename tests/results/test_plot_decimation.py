@@ -10,8 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from samples.figures import rest_to_rest
 
-from vsacli.results.curves import BLOCK, read_curves
-from vsacli.results.envelopes import COLUMNS, FULL_DETAIL, column_starts, kept_samples, marked_spans
+from vsacli.results.charts.reduction import (
+    BLOCK,
+    COLUMNS,
+    FULL_DETAIL,
+    column_starts,
+    kept_samples,
+    marked_spans,
+    read_curves,
+)
 
 NAN = np.nan
 

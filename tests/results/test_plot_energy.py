@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from samples.figures import Result, rest_to_rest
 
-from vsacli.results.plots import RESULT_DRAWINGS, omitted_figures, plot_stored
+from vsacli.results.charts.figures import RESULT_DRAWINGS, omitted_figures
+from vsacli.results.plots import plot_stored
 
 WORK_1, WORK_2, ELASTIC = "work of motor 1 [J]", "work of motor 2 [J]", "elastic energy [J]"
 

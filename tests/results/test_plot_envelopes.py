@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from samples.figures import rest_to_rest
 
-from vsacli.results.curves import Curve, read_curves
-from vsacli.results.envelopes import WIDE_COLUMNS, Envelope
+from vsacli.results.charts.reduction import WIDE_COLUMNS, Curve, Envelope, read_curves
 from vsacli.results.plots import plot_stored
 
 NOISE = np.random.default_rng(1)

@@ -10,7 +10,8 @@ from matplotlib.font_manager import FontEntry
 from samples.figures import rest_to_rest
 from samples.marks import slow
 
-from vsacli.results.plots import letters, plot_stored, save_figures
+from vsacli.results.plots import plot_stored, save_figures
+from vsacli.results.plots import styles as letters
 
 SERIF = letters.findfont("DejaVu Serif")
 

@@ -14,8 +14,9 @@ from samples.figures import rest_to_rest, without
 from samples.marks import slow
 
 from vsacli.base.errors import InputError
-from vsacli.results.corridors import visible_range
-from vsacli.results.plots import RESULT_DRAWINGS, compare_files, omitted_figures, plot_stored, save_figures
+from vsacli.results.charts.figures import RESULT_DRAWINGS, omitted_figures
+from vsacli.results.charts.reduction import visible_range
+from vsacli.results.plots import compare_files, plot_stored, save_figures
 from vsacli.results.plots.styles import line_style, shortened
 
 NAN = np.nan

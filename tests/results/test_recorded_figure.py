@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vsacli.results.curves import Curve
+from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
+from vsacli.results.charts.reduction import Curve
 from vsacli.results.plots import recorded_figure
-from vsacli.results.recorded_curves import Highest, RecordedCurve, Spectrum
 
 TIME = np.linspace(0, 10, 400)
 FREQUENCIES = np.geomspace(0.5, 100, 50)

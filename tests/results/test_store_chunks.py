@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import h5py
@@ -23,11 +23,11 @@ from samples.results import (
 )
 
 from vsacli.base.errors import StorageError
+from vsacli.base.outputs import Staged
 from vsacli.base.variables import Block
-from vsacli.results.store import chunks, new_file
-from vsacli.results.store.chunks import ChunkFiller
+from vsacli.results.store import new_file
+from vsacli.results.store.new_file import ChunkFiller, NewFile
 from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.write_behind import WriteBehind
 
 ROWS = 32
 """Samples in a chunk of what two joints with two motors each have, in these tests."""
@@ -36,7 +36,7 @@ ROWS = 32
 @pytest.fixture
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Several chunks in a few samples."""
-    monkeypatch.setattr(chunks, "CHUNK_BYTES", ROWS * 2 * 2 * 8)
+    monkeypatch.setattr(new_file, "CHUNK_BYTES", ROWS * 2 * 2 * 8)
 
 
 @pytest.fixture
@@ -106,7 +106,7 @@ def test_a_thousand_joints(tmp_path: Path, samples: int) -> None:
 
 
 def test_all_chunks_are_about_equally_full(tmp_path: Path) -> None:
-    rows = chunks.CHUNK_BYTES // (2 * 2 * 8)
+    rows = new_file.CHUNK_BYTES // (2 * 2 * 8)
     one_more = write_result(tmp_path / "r.h5", random_block(rows + 1, 2), variables=["phi"], step=rows)
     assert one_more.stat().st_size < 1.3 * (rows + 1) * (8 + 2 * 2 * 8)  # 2 if the second chunk were as large
 
@@ -168,30 +168,37 @@ def test_a_disk_that_fails_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert not threads()
 
 
-def test_what_waits_is_bounded() -> None:
+@pytest.fixture
+def behind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[NewFile]:
+    """A file all of whose tasks are done in a thread; 10 bytes may wait."""
+    monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
+    monkeypatch.setattr(new_file, "BEHIND", 10)
+    file = NewFile(Staged.unnamed(tmp_path / "r.h5"))
+    yield file
+    file.discard()
+    assert not threads()
+
+
+def test_what_waits_is_bounded(behind: NewFile) -> None:
     """Nothing is done before `go`, and the caller waits once more than 10 bytes wait."""
-    go, done, behind = threading.Event(), [], WriteBehind(10)
+    go, done = threading.Event(), []
 
     def task(number: int):
         return lambda: (go.wait(), done.append(number))
 
     for number in range(5):
-        behind.put(task(number), 2)
+        behind.do(task(number), 2)
     timer = threading.Timer(0.05, lambda: (done.append("go"), go.set()))
     timer.start()
-    behind.put(task(5), 2)
+    behind.do(task(5), 2)
     assert done[:2] == ["go", 0]
     behind.wait()
     assert done == ["go", 0, 1, 2, 3, 4, 5]
-    behind.discard()
-    assert not threads()
 
 
-def test_what_goes_wrong_in_the_thread_is_raised_once_by_the_caller() -> None:
-    behind, done = WriteBehind(10), []
-    behind.put(lambda: 1 / 0, 5)
-    behind.put(lambda: done.append(1), 5)
+def test_what_goes_wrong_in_the_thread_is_raised_once_by_the_caller(behind: NewFile) -> None:
+    done = []
+    behind.do(lambda: 1 / 0, 5)
+    behind.do(lambda: done.append(1), 5)
     with pytest.raises(ZeroDivisionError):
         behind.wait()
-    behind.discard()
-    assert not threads()

@@ -11,8 +11,7 @@ from samples.marks import slow_but
 from samples.results import PlannedTrajectory, writing
 
 from vsacli.dynamics.limits import limit_checks
-from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.stored_limits import ACHIEVED
+from vsacli.results.store.reader import ACHIEVED, StoredResult
 from vsacli.robot.file import load_robot
 
 ROBOTS = sorted((REPOSITORY / "robots").rglob("*.yaml"))

@@ -14,9 +14,9 @@ from samples.studies import study
 
 from vsacli.base.errors import InputError
 from vsacli.cli.main import run
+from vsacli.results.charts.study_points import StudyPoints
 from vsacli.results.plots import compared_studies, study_figures
-from vsacli.results.plots.study_figures import StudyPoints
-from vsacli.results.store.stored_study import StoredStudy
+from vsacli.results.store.study_table import StoredStudy
 
 GRID = "vary:\n  joints.*.actuator.spring.k: [380, 400, 440]\n  duration: [3, 4, 5]\n"
 

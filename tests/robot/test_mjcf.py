@@ -28,7 +28,7 @@ from vsacli.base.errors import InputError
 from vsacli.dynamics.forward import state_derivative
 from vsacli.robot.joint import Inertia, Limits, Link, Pose
 from vsacli.robot.models.mjcf import mjcf_model
-from vsacli.robot.models.start import Start
+from vsacli.robot.models.mjcf_drives import Start
 
 ROUNDING = 1e-12
 """Of inverse dynamics, relative to the largest torque: sums of some hundred terms, each good to 1e-16, and

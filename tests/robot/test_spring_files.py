@@ -13,7 +13,7 @@ from samples.command_line import contents
 
 from vsacli import load_robot
 from vsacli.actuators.laws.table import MeasuredSpring
-from vsacli.actuators.laws.tendon import Mirrored
+from vsacli.actuators.laws.tendons import Mirrored
 
 ROBOT = """\
 format: vsacli-robot/1

@@ -12,7 +12,7 @@ from samples.urdf import joint, link, random_serial, robot, serial, write
 
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.urdf import import_urdf
-from vsacli.robot.urdf.rigid_motion import pose_matrix, roll_pitch_yaw
+from vsacli.robot.urdf.link_tree import pose_matrix, roll_pitch_yaw
 
 RIGHT = "1.5707963267948966"
 

@@ -6,7 +6,7 @@ from samples.shipped import shipped_run
 from vsacli import inverse_dynamics
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.records.signals import Filter, Signals
+from vsacli.studies.identification.conditioning import Filter, Signals
 
 
 def computed_signals(robot: str, trajectory: str) -> tuple[Robot, Signals]:

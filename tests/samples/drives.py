@@ -12,7 +12,7 @@ from samples.robots import vsa_3r
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.pair import Pair
+from vsacli.actuators.laws.law import Pair
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray

@@ -11,8 +11,7 @@ import numpy as np
 from vsacli import Trajectory, inverse_dynamics
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.records.bandwidth import bandwidth_of
-from vsacli.studies.identification.records.signals import Signals, conditioned
+from vsacli.studies.identification.conditioning import Signals, bandwidth_of, conditioned
 
 POSITION_LINES, STIFFNESS_LINES = (0.15, 0.4, 0.7), (0.2, 0.55)
 """Hz."""

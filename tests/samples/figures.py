@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vsacli.actuators.kinds import existing
 from vsacli.base.variables import OF_ANY_ROBOT, VARIABLES, Variable
+from vsacli.robot.joint import existing
 
 STIFFNESS_K, STIFFNESS_KC, MOTOR_INERTIA = 400.0, 2000.0, 3.2
 

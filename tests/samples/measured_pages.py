@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from vsacli.base.tables import ReportText
-from vsacli.results.measured_curves import MeasuredCurve
+from vsacli.results.charts.measured import MeasuredCurve
 from vsacli.results.pages import measured_page
 from vsacli.results.pages.document import Facts, InputText
 

@@ -19,12 +19,9 @@ from vsacli.actuators.mechanisms.mechanism import Mechanism
 from vsacli.actuators.mechanisms.potentials.potential import BranchStart, PotentialRange
 from vsacli.actuators.mechanisms.potentials.potential import Potential as OwnPotential
 from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
-from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
-from vsacli.actuators.mechanisms.ratios.awas import Awas
-from vsacli.actuators.mechanisms.ratios.lever import Lever
-from vsacli.actuators.mechanisms.ratios.measured_scale import MeasuredScale
-from vsacli.actuators.mechanisms.ratios.scales import PolynomialScale, Power
-from vsacli.actuators.mechanisms.ratios.sine import Sine
+from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import Maccepa
+from vsacli.actuators.mechanisms.ratios.ratio import Awas, Lever, Sine
+from vsacli.actuators.mechanisms.ratios.scales import MeasuredScale, PolynomialScale, Power
 from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
 from vsacli.actuators.mechanisms.shifted_cams import ShiftedCams
 from vsacli.actuators.motor import Motor

@@ -14,8 +14,7 @@ from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
 from vsacli.robot.models.mjcf import mjcf_model
-from vsacli.robot.models.mjcf_rotor import motor_name
-from vsacli.robot.models.start import Start
+from vsacli.robot.models.mjcf_drives import Start, motor_name
 
 
 class Compiled(NamedTuple):

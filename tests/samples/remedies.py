@@ -22,7 +22,7 @@ from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.variables import Block
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
 from vsacli.robot.model import Robot
-from vsacli.studies.remedies import Remedy, write_fixed
+from vsacli.studies.search import Remedy, write_fixed
 from vsacli.trajectory.curves import Constant, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes

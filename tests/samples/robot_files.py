@@ -11,6 +11,7 @@ import numpy as np
 import yaml
 
 from vsacli.documents.fields import declared
+from vsacli.documents.record_values import json_value
 from vsacli.documents.table import Table
 from vsacli.robot.file import FORMAT
 from vsacli.robot.model import Robot
@@ -19,7 +20,7 @@ from vsacli.robot.model import Robot
 def fields(record: Any) -> dict[str, Any]:
     """The declared fields of a record that differ from their defaults, as plain values."""
     return {
-        name: field.kind.json_value(content, fields)
+        name: json_value(field.kind, content, fields)
         for name, (field, default) in declared(type(record)).items()
         if (content := getattr(record, name)) is not None and content != default
     }

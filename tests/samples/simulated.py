@@ -14,15 +14,13 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
-from vsacli.control.simulation.budget import Budget
-from vsacli.control.simulation.closed_loop import ClosedLoop
-from vsacli.control.simulation.controllers import LinearizingFeedback
-from vsacli.control.simulation.equations.recorded_equations import Computing, RecordedEquations
-from vsacli.control.simulation.history import History, history
+from vsacli.control.simulation.closed_loop import ClosedLoop, LinearizingFeedback
+from vsacli.control.simulation.ending import Budget
+from vsacli.control.simulation.history import History, continuous, history
 from vsacli.control.simulation.integrator import Integrator, Tolerances
-from vsacli.control.simulation.reference import Reference
+from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.simulate import InitialError
-from vsacli.control.simulation.state_trajectory import continuous
+from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot

@@ -22,7 +22,7 @@ from vsacli.actuators.damper import Damper
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.friction import Friction
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.mechanisms.ratios.awas import Awas
+from vsacli.actuators.mechanisms.ratios.ratio import Awas
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.actuators.serial import Serial
@@ -71,12 +71,12 @@ def _users_of(name: str, function: Any) -> list[Any]:
     return [module for module in modules if vars(module).get(name) is function]
 
 
-BETA, SOLVE = "actuators.pairs.decoupling_matrix:beta", "actuators.pairs.decoupling_matrix:solve"
+BETA, SOLVE = "actuators.pairs.joints:beta", "actuators.pairs.joints:solve"
 DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:motor_torques"
-FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.windings:Windings.variables"
+FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.motor:Windings.variables"
 RATIO, STATE = (
     "actuators.mechanisms.ratios.ratio:ratio_partials",
-    "actuators.mechanisms.state:DeflectionState",
+    "actuators.mechanisms.mechanism:DeflectionState",
 )
 CUBIC, LOSS = "actuators.laws.cubic:Cubic", "dynamics.losses:dissipated_power"
 DAMPER, ELASTIC = "dynamics.drive:_damper_torques", "actuators.elastic:Elastic"
@@ -92,7 +92,7 @@ MUTATIONS = (
     Mutation(
         "det A (67), its first product",
         "pair",
-        "actuators.pairs.decoupling_matrix:determinant",
+        "actuators.pairs.joints:determinant",
         "one.sigma * two",
         "1.01 * one.sigma * two",
     ),
@@ -171,7 +171,7 @@ MUTATIONS = (
     Mutation(
         "friction between links",
         "pair",
-        "dynamics.joint_friction:joint_friction",
+        "dynamics.dry_friction:joint_friction",
         "tau=mul(size, tanh)",
         "tau=mul(size, tanh * 1.01)",
     ),

@@ -16,7 +16,7 @@ from vsacli import Trajectory, inverse_dynamics
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.mechanisms.potentials.potential import BranchStart, Potential, PotentialRange
-from vsacli.actuators.mechanisms.ratios.awas import Awas
+from vsacli.actuators.mechanisms.ratios.ratio import Awas
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.serial import Serial
 from vsacli.base.arrays import FloatArray

@@ -13,14 +13,14 @@ from samples.shipped import shipped_robot
 
 from vsacli.robot.joint import Pose
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.links.base_parameters import base_parameters
-from vsacli.studies.identification.links.inertial_parameters import (
+from vsacli.studies.identification.regressor import (
     all_parameters,
+    base_parameters,
     link_of,
     names,
     parameters_of,
+    regressor,
 )
-from vsacli.studies.identification.links.regressor import regressor
 
 TYPES = ("R", "P", "RRP", slow("PR"), slow("RPRR"), slow("RRRRRR"))
 

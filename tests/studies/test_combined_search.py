@@ -13,11 +13,10 @@ from samples.robots import vsa_3r
 from vsacli import suggest
 from vsacli.analysis.run import Run
 from vsacli.robot.joint import Limits
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.combination import RELATIVE_CHANGE, least_change
-from vsacli.studies.remedies.combined_search import CombinedSearch
-from vsacli.studies.remedies.slow_down import LARGEST_FACTOR, smallest_slow_down
-from vsacli.studies.remedies.task import Task
+from vsacli.studies.search.acceptance import Acceptance
+from vsacli.studies.search.combined import CombinedSearch
+from vsacli.studies.search.scans import LARGEST_FACTOR, smallest_slow_down
+from vsacli.studies.search.task import RELATIVE_CHANGE, Task, least_change
 
 FAST = rest_to_rest(0.3, rate=1000)
 

@@ -14,9 +14,8 @@ from scipy.optimize import minimize
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import Inertia, Link
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.links.base_parameters import base_parameters
-from vsacli.studies.identification.links.consistent_links import Told, consistent_links
-from vsacli.studies.identification.links.inertial_parameters import all_parameters
+from vsacli.studies.identification.consistent_links import Told, consistent_links
+from vsacli.studies.identification.regressor import all_parameters, base_parameters
 
 
 def relinked(robot: Robot, links: list[Link]) -> Robot:

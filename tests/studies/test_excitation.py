@@ -19,23 +19,23 @@ from vsacli.studies.identification.excitation import (
     Excitation,
     ImpossibleError,
     excitation_text,
+    fisher,
+    plan,
     plan_excitation,
-    predicted_errors,
-    search,
 )
-from vsacli.studies.identification.excitation.allowed import MARGIN
+from vsacli.studies.identification.excitation.family import MARGIN
 
 BETWEEN = 0.01
 """Relative excess over a margin of what lies between the times at which it is kept; see
-`design.SAMPLES_PER_PERIOD`."""
+`family.SAMPLES_PER_PERIOD`."""
 
 
 @pytest.fixture(autouse=True, scope="module")
 def _short_searches() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(search, "STARTS", 9)
-        patch.setattr(search, "STEPS", 30)
-        patch.setattr(predicted_errors, "RECORDS", 1)
+        patch.setattr(plan, "STARTS", 9)
+        patch.setattr(plan, "STEPS", 30)
+        patch.setattr(fisher, "RECORDS", 1)
         yield
 
 

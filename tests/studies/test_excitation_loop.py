@@ -14,11 +14,11 @@ from samples.shipped import shipped_robot
 
 from vsacli import identify
 from vsacli.robot.parameters import parameters
-from vsacli.studies.identification.excitation import Noise, plan_excitation, predicted_errors, search
-from vsacli.studies.identification.excitation.predicted_errors import executed, noisy_record
+from vsacli.studies.identification.excitation import Noise, fisher, plan, plan_excitation
+from vsacli.studies.identification.excitation.fisher import executed, noisy_record
 from vsacli.studies.identification.identification import WORDS, solutions
-from vsacli.studies.identification.motors.unknowns import with_friction
-from vsacli.studies.identification.system_reports import numbers_of
+from vsacli.studies.identification.identification_report import numbers_of
+from vsacli.studies.identification.motor_equations import with_friction
 
 POSITION_NOISE, TORQUE_SHARE = 2e-5, 0.003
 """Rad (m), and over the largest torque of a case, below."""
@@ -58,9 +58,9 @@ LOOSE = ("damping", "friction", "mechanism", "coupled_inertia")
 
 @pytest.fixture(autouse=True)
 def _short_searches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(search, "STARTS", 9)
-    monkeypatch.setattr(search, "STEPS", 40)
-    monkeypatch.setattr(predicted_errors, "RECORDS", 1)
+    monkeypatch.setattr(plan, "STARTS", 9)
+    monkeypatch.setattr(plan, "STEPS", 40)
+    monkeypatch.setattr(fisher, "RECORDS", 1)
 
 
 @pytest.mark.slow
@@ -94,7 +94,7 @@ SEEDS = 20
 @pytest.mark.slow
 def test_numbers_scatter_by_what_was_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twenty records with noise of their own. Numbers that are held at zero half of the time do not count."""
-    monkeypatch.setattr(predicted_errors, "RECORDS", 3)
+    monkeypatch.setattr(fisher, "RECORDS", 3)
     robot, noise, random = shipped_robot("rp_2"), Noise(2e-5, 0.5), np.random.default_rng(1)
     planned = plan_excitation(robot, duration=8, noise=noise)
     joints, block = range(len(robot.joints)), executed(robot, planned.trajectory)

@@ -15,8 +15,8 @@ from samples.misfits import PLANTS, random_case, write
 from samples.shipped import shipped_robot
 
 from vsacli import identify
-from vsacli.studies.identification.estimation.additions import addition
-from vsacli.studies.identification.estimation.equations import Equations
+from vsacli.studies.identification.estimation import Equations
+from vsacli.studies.identification.explanations import addition
 from vsacli.studies.identification.identification_report import Identification
 
 FIRST = 2000

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vsacli.base.arrays import FloatArray
-from vsacli.studies.identification.records.signals import conditioned
+from vsacli.studies.identification.conditioning import conditioned
 
 OMEGA = 2 * np.pi * np.array([0.3, 0.7, 1.1])
 AMPLITUDE = np.array([0.5, 0.3, 0.2])

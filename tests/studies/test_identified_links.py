@@ -26,15 +26,13 @@ from vsacli import (
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.studies.identification import fitted_text
-from vsacli.studies.identification.estimation.solution import Solution, solution
-from vsacli.studies.identification.identification_report import OK
-from vsacli.studies.identification.links.found_links import doubts_of, found_links
-from vsacli.studies.identification.links.inertial_parameters import parameters_of
-from vsacli.studies.identification.links.link_system import link_system
-from vsacli.studies.identification.motors.motor_system import motor_systems
-from vsacli.studies.identification.motors.unknowns import GROUPS
-from vsacli.studies.identification.records.signals import Signals, conditioned
-from vsacli.studies.identification.system_reports import numbers_of
+from vsacli.studies.identification.conditioning import Signals, conditioned
+from vsacli.studies.identification.consistent_links import doubts_of, found_links
+from vsacli.studies.identification.fitted_system import Solution, solution
+from vsacli.studies.identification.identification_report import OK, numbers_of
+from vsacli.studies.identification.link_equations import link_system
+from vsacli.studies.identification.motor_equations import GROUPS, motor_systems
+from vsacli.studies.identification.regressor import parameters_of
 
 SEEDS = 20
 POSITION_NOISE, TORQUE_NOISE = 2e-5, 0.5  # rad or m, N m or N

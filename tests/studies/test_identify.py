@@ -14,9 +14,8 @@ from samples.shipped import shipped_robot, shipped_run
 from vsacli import identify, inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.estimation.solution import solution
-from vsacli.studies.identification.motors.motor_system import motor_systems
-from vsacli.studies.identification.motors.unknowns import GROUPS, with_friction
+from vsacli.studies.identification.fitted_system import solution
+from vsacli.studies.identification.motor_equations import GROUPS, motor_systems, with_friction
 
 ARM = Excitation(position=[0, 0, 0], reach=[0.4] * 3, stiffness=[1400] * 3, swing=[300] * 3)
 

@@ -10,9 +10,7 @@ from samples.marks import slow
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.studies.identification.estimation.equations import Equations
-from vsacli.studies.identification.estimation.gauss_newton import gauss_newton
-from vsacli.studies.identification.estimation.least_squares import Fit, least_squares
+from vsacli.studies.identification.estimation import Equations, Fit, gauss_newton, least_squares
 
 TRUTH = np.array([3.0, -1.0, 0.5, 20.0])
 DRAWS = 200

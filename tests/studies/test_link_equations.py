@@ -7,9 +7,10 @@ import pytest
 from samples.computed_signals import computed_signals
 from samples.marks import slow_but
 
-from vsacli.studies.identification.estimation.least_squares import least_squares
-from vsacli.studies.identification.links.link_equations import Given, LinkUnknowns, link_equations
-from vsacli.studies.identification.motors.unknowns import FRICTION, MOTORS, SPRINGS, unknowns
+from vsacli.studies.identification.estimation import least_squares
+from vsacli.studies.identification.link_equations import LinkSystem, link_system
+from vsacli.studies.identification.motor_equations import FRICTION, MOTORS, SPRINGS, unknowns
+from vsacli.studies.identification.regressor import base_parameters
 
 RUNS = {
     "coupled_1r": "coupled_1r",
@@ -26,14 +27,13 @@ RUNS = {
 @pytest.mark.parametrize("robot", slow_but(("mixed_3r", "rp_2"), RUNS))
 def test_equations_of_links_hold_and_their_slopes_are_derivatives(robot: str) -> None:
     loaded, signals = computed_signals(robot, RUNS[robot])
-    sought = LinkUnknowns.of(loaded, (MOTORS, FRICTION))
-    found = link_equations(loaded, sought, signals)
+    system = link_system(loaded, (MOTORS, FRICTION))
+    found = system.of_record(system.before, signals)
     assert set(found.group) == {f"link of {joint.name}" for joint in loaded.joints}
     assert found.predicted == pytest.approx(found.measured, abs=1e-12 * np.abs(found.measured).max())
-    for place, number in enumerate(sought.numbers, len(sought.base.kept)):
+    for place, number in enumerate(system.sought, len(system.base.kept)):
         step = 0.1 * number.value or 1.0  # they are linear, so that it may be large
-        moved = tuple(each._replace(value=each.value + step * (each is number)) for each in sought.numbers)
-        other = link_equations(loaded, sought._replace(numbers=moved), signals)
+        other = system.of_record(system.before + step * np.eye(len(system.before))[place], signals)
         slope = (other.predicted - found.predicted) / step
         size = np.abs(found.predicted).max() / step
         assert slope == pytest.approx(found.slopes[:, place], abs=1e-11 * size)  # rounding
@@ -41,29 +41,28 @@ def test_equations_of_links_hold_and_their_slopes_are_derivatives(robot: str) ->
 
 def test_a_periodic_excitation_tells_all_base_parameters_of_the_papers_arm() -> None:
     robot, signals = computed_signals("vsa_3r", "vsa_3r_excitation")
-    sought = LinkUnknowns.of(robot, ())
-    elsewhere = sought._replace(present=sought.present + 0.1)
-    found = link_equations(robot, sought, signals)
-    equations = found._replace(predicted=found.slopes @ elsewhere.present)
-    fit = least_squares([equations], elsewhere.present)
+    system = link_system(robot, ())
+    elsewhere = system.before + 0.1
+    found = system.of_record(system.before, signals)
+    fit = least_squares([found._replace(predicted=found.slopes @ elsewhere)], elsewhere)
     assert not fit.inseparable
-    assert fit.values == pytest.approx(sought.present, abs=1e-9)  # condition 33
+    assert fit.values == pytest.approx(system.before, abs=1e-9)  # condition 33
 
 
 def test_what_springs_carry_changes_with_their_numbers() -> None:
     robot, signals = computed_signals("vsa_3r", "vsa_3r_excitation")
-    sought = LinkUnknowns.of(robot, ())
+    base = base_parameters(robot)
     given = [each for index in range(3) for each in unknowns(robot, index, (SPRINGS,))]
     errors = np.diag(np.arange(1.0, len(given) + 1))
-    slopes = link_equations(robot, sought, signals, Given(tuple(given), errors)).errors
+    system = LinkSystem(robot, base, (), given, errors)
+    slopes = system.of_record(system.before, signals).errors
     assert slopes is not None
     for place, each in enumerate(given):
         step = 1e-3 * each.value
-        moved = (
-            link_equations(robot.replace(str(each), each.value + sign * step), sought, signals).measured
-            for sign in (1, -1)
+        moved = (robot.replace(str(each), each.value + sign * step) for sign in (1, -1))
+        ahead, behind = (
+            LinkSystem(one, base, ()).of_record(system.before, signals).measured for one in moved
         )
-        ahead, behind = moved
         assert (ahead - behind) / (2 * step) == pytest.approx(
             slopes[:, place] / (place + 1), rel=1e-9, abs=1e-12
         )
@@ -71,7 +70,7 @@ def test_what_springs_carry_changes_with_their_numbers() -> None:
 
 def test_a_motion_from_rest_to_rest_leaves_combinations() -> None:
     robot, signals = computed_signals("vsa_3r", "rest_to_rest")
-    sought = LinkUnknowns.of(robot, ())
-    fit = least_squares([link_equations(robot, sought, signals)], sought.present)
-    words = [each.words(sought.names) for each in fit.inseparable]
+    system = link_system(robot, ())
+    fit = least_squares([system.of_record(system.before, signals)], system.before)
+    words = [each.words(system.names) for each in fit.inseparable]
     assert any("elbow.Iyz" in each and "elbow.Izz*" in each for each in words)

@@ -7,8 +7,7 @@ import pytest
 from samples.computed_signals import computed_signals
 from samples.marks import slow_but
 
-from vsacli.studies.identification.motors.motor_equations import motor_equations, motor_names
-from vsacli.studies.identification.motors.unknowns import unknowns
+from vsacli.studies.identification.motor_equations import MotorSystem, motor_names, unknowns
 
 RUNS = {
     "vsa_3r": "rest_to_rest",
@@ -33,17 +32,16 @@ def test_equations_of_motors_hold_and_their_slopes_are_derivatives(robot: str) -
         if not joint.actuator.sprung:
             continue
         chosen = unknowns(loaded, index, ("springs", "motors", "friction"))
-        values = np.array([each.value for each in chosen])
-        found = motor_equations(loaded, index, chosen, values, signals)
+        system = MotorSystem(loaded, index, chosen)
+        values = system.before
+        found = system.of_record(values, signals)
         size = np.max(np.abs(found.measured))
         assert set(found.group) == set(motor_names(loaded, index))
         assert np.max(np.abs(found.predicted - found.measured)) < 1e-9 * size  # rounding of filters
         for place, value in enumerate(values):
             step = 1e-4 * (abs(value) or 1.0)
             ahead, behind = (
-                motor_equations(
-                    loaded, index, chosen, values + sign * step * np.eye(len(values))[place], signals
-                )
+                system.of_record(values + sign * step * np.eye(len(values))[place], signals)
                 for sign in (1, -1)
             )
             slope = (ahead.predicted - behind.predicted) / (2 * step)

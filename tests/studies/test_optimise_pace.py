@@ -10,15 +10,11 @@ from samples.marks import slow
 from samples.remedies import pendulum, rest_to_rest
 
 from vsacli import inverse_dynamics, load_trajectory, optimize
-from vsacli.studies.optimisation.cheapest_pace import CheapestPaceSearch
-from vsacli.studies.optimisation.criteria import CRITERIA, Scale
-from vsacli.studies.optimisation.paced_joints import PacedJoint
-from vsacli.studies.optimisation.paced_motion import PacedMotion
-from vsacli.studies.optimisation.paced_search import instants_of
-from vsacli.studies.optimisation.paced_splines import PacedSpaces
-from vsacli.studies.optimisation.periods import Ends
-from vsacli.studies.optimisation.retimed import retimed
-from vsacli.studies.optimisation.spline_space import SplineSpace
+from vsacli.studies.search.criteria import CRITERIA, Scale
+from vsacli.studies.search.loads import Ends
+from vsacli.studies.search.paced_motion import PacedJoint, PacedMotion, instants_of, retimed
+from vsacli.studies.search.paced_search import CheapestPaceSearch
+from vsacli.studies.search.splines import PacedSpaces, SplineSpace
 
 DURATION = 0.4
 SPAN = (0.0, DURATION)

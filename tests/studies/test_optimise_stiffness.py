@@ -14,11 +14,11 @@ from samples.marks import slow
 from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.drive import drive
-from vsacli.studies.optimisation.criteria import CRITERIA
-from vsacli.studies.optimisation.spline_space import SplineSpace
-from vsacli.studies.optimisation.stiffness import StiffnessSearch
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.admissible_stiffness import admissible_stiffness, joint_loads
+from vsacli.studies.search.acceptance import Acceptance, admissible_stiffness
+from vsacli.studies.search.criteria import CRITERIA
+from vsacli.studies.search.loads import joint_loads
+from vsacli.studies.search.splines import SplineSpace
+from vsacli.studies.search.stiffness import StiffnessSearch
 
 MARGIN = 0.03
 SHOULDER = 1

@@ -11,9 +11,8 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
 from samples.remedies import pendulum, rest_to_rest
 
 from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
-from vsacli.studies.optimisation.paced_motion import PACE_ORDERS, Speeds
-from vsacli.studies.optimisation.retimed import retimed
-from vsacli.studies.optimisation.spline_space import SplineSpace
+from vsacli.studies.search.paced_motion import PACE_ORDERS, Speeds, retimed
+from vsacli.studies.search.splines import SplineSpace
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from samples.command_line import REPOSITORY
 from samples.remedies import pendulum, rest_to_rest, written
 
 from vsacli import Robot, Trajectory, inverse_dynamics, load_robot, load_trajectory, optimize
-from vsacli.studies.remedies import Remedy
+from vsacli.studies.search import Remedy
 from vsacli.trajectory.times import RecordedTimes
 
 MARGIN = 0.03

@@ -12,9 +12,9 @@ from samples.remedies import written
 
 from vsacli import Trajectory, load_robot, load_trajectory
 from vsacli.base.errors import InputError
-from vsacli.studies.remedies import Remedy
-from vsacli.studies.remedies.changed_stiffness import with_raised_stiffness
-from vsacli.studies.remedies.suggestions import OtherPreload
+from vsacli.studies.search import Remedy
+from vsacli.studies.search.changed_motion import with_raised_stiffness
+from vsacli.studies.search.suggestions import OtherPreload
 
 FACTOR = 1.4142
 ROBOT = REPOSITORY / "robots" / "vsa_3r.yaml"

@@ -12,7 +12,7 @@ from samples.shipped import shipped_robot, shipped_run
 
 from vsacli import Trajectory, load_trajectory, sensitivity
 from vsacli.robot.model import Robot
-from vsacli.studies.sensitivities.reversals import Reversals
+from vsacli.studies.sensitivities.band import Reversals
 
 FORWARD, BACKWARD = 1.2, 0.7
 DRAWS = 400_000

@@ -23,9 +23,8 @@ from vsacli.dynamics.elastic_torques import joint_state, link_constants, link_to
 from vsacli.dynamics.recursion import recursion
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.parameters import parameters
-from vsacli.studies.sensitivities.drive_derivatives import drive_derivatives
-from vsacli.studies.sensitivities.link_derivatives import torque_slopes
-from vsacli.studies.sensitivities.sensitivity_run import SensitivityRun
+from vsacli.studies.sensitivities.joint_derivatives import drive_derivatives
+from vsacli.studies.sensitivities.slopes import SensitivityRun, torque_slopes
 
 WEIGHTS = {-3: -1 / 60, -2: 3 / 20, -1: -3 / 4, 1: 3 / 4, 2: -3 / 20, 3: 1 / 60}
 """Central differences of sixth order."""
@@ -238,7 +237,7 @@ def test_blocks_of_steps_are_joined(monkeypatch):
     robot, trajectory = loaded("mixed_3r")
     masses = ["joints.*.link.mass"]
     whole = sensitivity(robot, trajectory, masses, "1%")
-    monkeypatch.setattr("vsacli.studies.sensitivities.sensitivity_run.BLOCK_SLOPES", 20_000)
+    monkeypatch.setattr("vsacli.studies.sensitivities.slopes.BLOCK_SLOPES", 20_000)
     assert len(list(SensitivityRun(robot, trajectory, masses))) > 1
     parts = sensitivity(robot, trajectory, masses, "1%")
     for one, other in zip(whole.parameters, parts.parameters, strict=True):

@@ -28,7 +28,7 @@ from vsacli import (
 from vsacli.studies.sizing import sized_text
 from vsacli.studies.sizing.catalogue import read_catalogue
 from vsacli.studies.sizing.choices import choices
-from vsacli.studies.sizing.gears import Gears
+from vsacli.studies.sizing.ratios import Gears
 
 RUN = 1e-9
 """Relative to peaks: torques of a run are multiplied by the ratio there, here the load is divided by it."""

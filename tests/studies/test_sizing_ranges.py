@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from vsacli.base.arrays import FloatArray
 from vsacli.studies.sizing import CatalogueMotor
-from vsacli.studies.sizing.motor_demand import MotorDemand
+from vsacli.studies.sizing.demand import MotorDemand
 from vsacli.studies.sizing.ratios import ratios_within, shares
 from vsacli.studies.sizing.shaft import Shaft
 

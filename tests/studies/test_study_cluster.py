@@ -16,9 +16,7 @@ from typing import Any
 import pytest
 from samples.studies import DRAWN, GRID, content, study
 
-from vsacli.studies.sweeps.executors.job import Job
-from vsacli.studies.sweeps.executors.task import answer
-from vsacli.studies.sweeps.rows import Computer
+from vsacli.studies.sweeps.rows import Computer, Job, answer
 from vsacli.studies.sweeps.study import load_study
 
 MANY = DRAWN.replace("samples: 6", "samples: 60")
@@ -147,7 +145,7 @@ sys.meta_path.insert(0, Lacking())
             "other rows would be computed here: vsacli is 0.0 instead of ",
         ),
         (
-            "from vsacli.studies.sweeps.executors.task import Computer\nimport os\n"
+            "from vsacli.studies.sweeps.rows import Computer\nimport os\n"
             "Computer.row = lambda *_: os._exit(1)\n",
             "runs lost with their processes: 6",
         ),

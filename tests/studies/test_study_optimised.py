@@ -12,8 +12,8 @@ from samples.studies import HEAD, column, content, study
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory, optimize
 from vsacli.cli.optimize import optimize as command
-from vsacli.studies.optimisation.criteria import CRITERIA
-from vsacli.studies.sweeps.optimised import MINIMIZED, VARIED
+from vsacli.studies.search.criteria import CRITERIA
+from vsacli.studies.sweeps.study_file import MINIMIZED, VARIED
 
 ONE_JOINT = HEAD.replace("arm.yaml", "tendon.yaml").replace("move.yaml", "pull.yaml")
 """The arm with one joint, which takes less time."""

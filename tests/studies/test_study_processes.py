@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from samples.studies import DRAWN, GRID, content, study
 
-from vsacli.studies.sweeps.executors.processes import Processes
+from vsacli.studies.sweeps.executors import Processes
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.rows import Computer, lost
 from vsacli.studies.sweeps.run_study import gather
@@ -40,7 +40,7 @@ def test_a_worker_that_is_killed_costs_its_run(tmp_path: Path) -> None:
     with Processes(found, 1) as workers:
         rows = workers.rows(range(6))
         computed = [next(rows)]
-        os.kill(workers._workers[0].process.pid or 0, signal.SIGKILL)
+        os.kill(workers.workers[0].process.pid or 0, signal.SIGKILL)
         computed += rows
     assert [row.error for row in computed if row.lost] == [
         "the process that computed it was ended by SIGKILL"

@@ -14,13 +14,12 @@ from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, WRENCH
-from vsacli.studies.remedies import Remedy, check_fixed_target
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
-from vsacli.studies.remedies.combination import AS_IT_IS
-from vsacli.studies.remedies.task import Task
+from vsacli.studies.search import Remedy, check_fixed_target
+from vsacli.studies.search.acceptance import Acceptance
+from vsacli.studies.search.changed_motion import with_changed_stiffness
+from vsacli.studies.search.task import AS_IT_IS, Task
 from vsacli.trajectory.curves import Constant, RestToRest
-from vsacli.trajectory.curves.piecewise import stepwise
+from vsacli.trajectory.curves.steps import stepwise
 from vsacli.trajectory.curves.via_points import ViaPoints
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.trajectory import Trajectory

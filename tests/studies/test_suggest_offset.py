@@ -24,16 +24,16 @@ from samples.robots import vsa_3r
 
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.exponential import Exponential
 from vsacli.actuators.laws.sinh import Sinh
+from vsacli.actuators.laws.tendons import Exponential
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
 from vsacli.robot.joint import Limits
-from vsacli.studies.remedies import suggest
-from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.remedies.admissible_stiffness import joint_loads
-from vsacli.studies.remedies.stiffness_offset import smallest_offset
-from vsacli.studies.remedies.suggestions import NotPossible, StiffnessOffset
+from vsacli.studies.search import suggest
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.loads import joint_loads
+from vsacli.studies.search.scans import smallest_offset
+from vsacli.studies.search.suggestions import NotPossible, StiffnessOffset
 from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN = 0.01

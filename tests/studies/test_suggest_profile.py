@@ -26,12 +26,11 @@ from vsacli.analysis.run import Run, inverse_dynamics
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.joint import Limits
-from vsacli.studies.remedies import suggest
-from vsacli.studies.remedies.acceptance import Acceptance
-from vsacli.studies.remedies.combination import AS_IT_IS
-from vsacli.studies.remedies.nearest_spline import Bounds, NoSplineError, nearest_spline
-from vsacli.studies.remedies.suggestions import NotPossible
-from vsacli.studies.remedies.task import Task
+from vsacli.studies.search import suggest
+from vsacli.studies.search.acceptance import Acceptance
+from vsacli.studies.search.nearest_profile import Bounds, NoSplineError, nearest_spline
+from vsacli.studies.search.suggestions import NotPossible
+from vsacli.studies.search.task import AS_IT_IS, Task
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory

@@ -12,8 +12,8 @@ from samples.remedies import pendulum, written
 
 from vsacli import Robot, Trajectory, inverse_dynamics, load_trajectory, suggest
 from vsacli.robot.joint import Limits
-from vsacli.studies.remedies import Remedy
-from vsacli.studies.remedies.changed_stiffness import with_changed_stiffness
+from vsacli.studies.search import Remedy
+from vsacli.studies.search.changed_motion import with_changed_stiffness
 
 VARIABLES = {"max_torque": "tau_motor", "max_velocity": "dtheta", "position": "q", "velocity": "dq"}
 """What limits bound."""

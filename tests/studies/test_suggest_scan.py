@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from vsacli.studies.remedies.acceptance import smallest_confirmed
+from vsacli.studies.search.scans import smallest_confirmed
 
 
 @dataclass

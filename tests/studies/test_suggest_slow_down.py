@@ -24,8 +24,8 @@ from samples.robots import vsa_3r
 
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.robot.joint import Limits
-from vsacli.studies.remedies.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.remedies.slow_down import Factors, smallest_slow_down
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.scans import Factors, smallest_slow_down
 from vsacli.trajectory.trajectory import Trajectory
 
 

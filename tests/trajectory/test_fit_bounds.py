@@ -9,8 +9,8 @@ from samples.noisy_records import MOTIONS, record
 from scipy.interpolate import make_interp_spline
 
 from vsacli.trajectory.fits import SMOOTH, fit_samples
-from vsacli.trajectory.fits.bounds import CAUTION, IMPULSES, SHORTEST_IMPULSE, unresolved, vibrations
-from vsacli.trajectory.fits.spectral_lines import Lines, is_rounding
+from vsacli.trajectory.fits.fit import CAUTION, IMPULSES, SHORTEST_IMPULSE, unresolved, vibrations
+from vsacli.trajectory.fits.noise import Lines, is_rounding
 
 
 @pytest.fixture(scope="module")

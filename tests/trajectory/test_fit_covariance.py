@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline
 from scipy.signal import butter, filtfilt
 
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, fit_samples
-from vsacli.trajectory.fits.covariance import local_basis
+from vsacli.trajectory.fits.least_squares import local_basis
 
 
 def uneven_times(count, seed=0):

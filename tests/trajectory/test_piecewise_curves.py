@@ -10,7 +10,7 @@ import pytest
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.curves import Constant, RestToRest
-from vsacli.trajectory.curves.piecewise import Chain, Jump, stepwise
+from vsacli.trajectory.curves.steps import Chain, Jump, stepwise
 from vsacli.trajectory.curves.via_points import ViaPoints
 
 SPAN = (0.1, 2.8)  # times that are no binary fractions

@@ -22,12 +22,10 @@ from samples.noisy_records import (
 )
 from scipy.interpolate import BSpline
 
-from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, fit_samples, search
-from vsacli.trajectory.fits.bins import Bins, uniform_basis
-from vsacli.trajectory.fits.moments import Moments
-from vsacli.trajectory.fits.noise import filtered_noise
+from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, fit_samples, resolution
+from vsacli.trajectory.fits.bins import Bins, Moments, uniform_basis
+from vsacli.trajectory.fits.noise import Lines, filtered_noise, spectral_lines
 from vsacli.trajectory.fits.penalised import Model
-from vsacli.trajectory.fits.spectral_lines import Lines, spectral_lines
 from vsacli.trajectory.trajectory import Trajectory
 
 EPS = np.finfo(float).eps
@@ -338,7 +336,7 @@ def test_long_records_start_from_stretches(monkeypatch):
     for motion in (pauses, sweep):
         of = record(motion, "white, 1e-5 rad", 5)
         whole = fitted(of)
-        monkeypatch.setattr(search, "MOST_SPANS_OF_GRID", 64)
+        monkeypatch.setattr(resolution, "MOST_SPANS_OF_GRID", 64)
         parts = fitted(of)
         monkeypatch.undo()
         assert len(parts.parts[0].knots) == len(whole.parts[0].knots)

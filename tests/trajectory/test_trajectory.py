@@ -11,7 +11,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import Constant, RestToRest
-from vsacli.trajectory.curves.piecewise import Chain
+from vsacli.trajectory.curves.steps import Chain
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.times import RecordedTimes, UniformTimes

@@ -10,9 +10,9 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from vsacli.actuators.elasticity import Elasticity
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.limit_check import LimitCheck, OfJoint, within
+from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.reach import LimitCheck, OfJoint, within
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray

@@ -13,12 +13,11 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants, SpringLoad
 from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.pairs.decoupling_matrix import beta, determinant, solve
+from vsacli.actuators.pairs.joints import beta, determinant, solve
 from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
-from vsacli.actuators.reach import Reach, deflections_within_reach
+from vsacli.actuators.reach import OfJoint, Reach, deflections_within_reach
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base.arrays import BoolArray, FloatArray

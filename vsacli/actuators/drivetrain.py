@@ -1,11 +1,8 @@
-"""Motors and springs of all joints in a row, whatever the actuators: what the equations of motion need.
-
-Arrays over motors have the motors on their last axis, joint by joint, motor 1 before motor 2. Springs come
-before the motors of joints that have any; values of them have one entry for each such motor.
-"""
+"""Motors and springs of all joints in a row, with the inertia B of rotors, for the equations of motion."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -14,10 +11,62 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
 from vsacli.actuators.friction import FrictionLaws
-from vsacli.actuators.rotors import Rotors
-from vsacli.actuators.windings import Windings
-from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.actuators.motor import Windings
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.variables import VARIABLES
+
+
+def largest_coupling(first: float, second: float) -> float:
+    """Return what the size of a coupled inertia must be below, or B is not positive definite.
+
+    Args:
+        first: inertia of one rotor, on the same side of its gear as the coupled one.
+        second: that of the other.
+    """
+    return math.sqrt(first * second)
+
+
+class Rotors:
+    """Rotors of all motors with springs in a row, joint by joint; arrays (..., motors).
+
+    Where motor 2 is carried around by motor 1, both feel either acceleration: B is a symmetric 2x2 matrix.
+    """
+
+    def __init__(self, actuators: Sequence[Actuator]) -> None:
+        motors = [
+            (motor.inertia, each.coupled_rotors, 1 - 2 * side)
+            for each in actuators
+            for side, motor in enumerate(each.motors)
+        ]
+        self._inertia, self._coupling, to_other = np.array(motors).reshape(-1, 3).T
+        self._coupled = np.flatnonzero(self._coupling)
+        self._other = self._coupled + to_other[self._coupled].astype(np.intp)
+
+    def torques(self, ddtheta: FloatArray) -> FloatArray:
+        """B theta''."""
+        torques: FloatArray = self._inertia * ddtheta
+        if self._coupled.size:
+            torques[..., self._coupled] += self._coupling[self._coupled] * ddtheta[..., self._other]
+        return torques
+
+    def accelerations(self, torques: FloatArray) -> FloatArray:
+        """Theta'' = B^-1 of what is left of the motors' torques."""
+        accelerations: FloatArray = torques / self._inertia
+        if self._coupled.size:
+            here, other = self._coupled, self._other
+            share = self._coupling[here] / self._inertia[other]
+            effective = self._inertia[here] - share * self._coupling[here]
+            accelerations[..., here] = (torques[..., here] - share * torques[..., other]) / effective
+        return accelerations
+
+    def held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """Theta'' where some motors are held, and the torques that hold these, 0 of others; (..., motors)."""
+        apart = held.copy()
+        apart[..., self._coupled] |= held[..., self._other]
+        moving = np.where(apart, torques / self._inertia, self.accelerations(torques))
+        accelerations = np.where(held, 0.0, moving)
+        return accelerations, np.where(held, torques - self.torques(accelerations), 0.0)
+
 
 SIDES = 2
 """Motors that a joint has at most."""

@@ -13,11 +13,9 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
 from vsacli.actuators.elasticity import Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.laws.rows import SpringRows
-from vsacli.actuators.limit_check import LimitCheck, OfJoint
+from vsacli.actuators.laws.law import PairSolution, SpringRows
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import Reach
+from vsacli.actuators.reach import LimitCheck, OfJoint, Reach
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.transmission import Command, Transmission, single_motor
 from vsacli.base import units

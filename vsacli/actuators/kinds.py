@@ -6,15 +6,11 @@ Adding a kind of actuator is adding a class derived from `vsacli.actuators.actua
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.base.errors import InputError
 from vsacli.base.lazy import LazyRegistry
-
-if TYPE_CHECKING:
-    from vsacli.base.variables import Variable
 
 ACTUATORS = LazyRegistry(
     {
@@ -42,12 +38,3 @@ def example(name: str, joint_type: str) -> dict[str, Any]:
     if joint_type not in MECHANISMS[name].joint_types:
         raise InputError.one(f"{name} turns about an axis, and drives no {joint_type} joint")
     return {"type": "serial", **ACTUATORS["serial"].example(joint_type, name)}
-
-
-def existing(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:
-    """Which columns of a variable of joints exist, for each joint by its kind of actuator.
-
-    A kind that is not known may have them all.
-    """
-    every = [True] * (2 if "motor" in variable.dims else 1)
-    return [ACTUATORS[kind].has(variable) if kind in ACTUATORS else every for kind in kinds]

@@ -1,17 +1,126 @@
-"""Is a step reachable, regular and within limits? Margins and flags of one joint, over samples."""
+"""Is a sample attainable, regular and within limits? Margins and flags of one joint, over samples."""
 
 from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Mapping
 from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN, Flag, marked
+from vsacli.actuators.laws.law import PairSolution
+from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
+from vsacli.base.flags import LIMITS, NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN, Flag, has, marked
+from vsacli.base.variables import VARIABLES, deviation
+
+LIMIT_ROUNDING = 1e-9
+"""Relative excess over a limit that is none, so that a motion may run along its limit."""
+
+ALLOWED_DEVIATIONS, LARGEST_ALLOWANCE = 2.0, 0.01
+"""Standard deviations, and share of a limit's range, by which an uncertain value may seem to exceed it."""
+
+OfJoint = Mapping[str, AnyArray]
+"""Variables of one joint by name, (samples,), those of its motors (2, samples)."""
+
+
+class Excess(NamedTuple):
+    """Where a limit is exceeded most.
+
+    Attributes:
+        first: index of the first step beyond the limit.
+        step: index of the worst one.
+        value: of the variable there.
+        bound: the end of the range that it is beyond.
+        size: how far.
+    """
+
+    first: int
+    step: int
+    value: float
+    bound: float
+    size: float
+
+
+class LimitCheck(NamedTuple):
+    """A finite limit of a joint: which result variable must stay in which range.
+
+    Attributes:
+        flag: the bit that says it does not.
+        variable: name of the variable.
+        motor: 1 or 2 if the variable is one of a motor, else None.
+        range: lower and upper bound.
+    """
+
+    flag: Flag
+    variable: str
+    motor: int | None
+    range: tuple[float, float]
+
+    def unit(self, joint_type: str) -> str:
+        """Unit of the variable at a joint of this type."""
+        return VARIABLES[self.variable].quantity.unit(joint_type)
+
+    def values(self, of_joint: OfJoint) -> FloatArray:
+        """What is bounded, (samples,), out of the variables of the joint."""
+        rows = of_joint[self.variable]
+        return rows if self.motor is None else rows[self.motor - 1]
+
+    def flags(self, of_joint: OfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
+        """The bit where the range is left by more than rounding and an allowance; NaN does not leave it."""
+        allowed = LIMIT_ROUNDING * self._largest + allowance
+        return marked(self.flag, self._outside(self.values(of_joint)) > allowed)
+
+    def allowance(self, of_joint: OfJoint) -> FloatArray | float:
+        """How far outside values may seem to be since they are uncertain, (samples,); 0 if they are not.
+
+        Twice the standard deviation, but at most 1 % of the range, or of the bound if there is only one; none
+        where the bit is no limit, but says that there is no way.
+        """
+        deviations = of_joint.get(deviation(self.variable))
+        if deviations is None:
+            return 0.0
+        of_motor = deviations if self.motor is None else deviations[self.motor - 1]
+        return np.minimum(ALLOWED_DEVIATIONS * np.nan_to_num(of_motor), self.largest_allowance)
+
+    @property
+    def largest_allowance(self) -> float:
+        """How far outside values may seem to be at most, however uncertain they are."""
+        if self.flag not in LIMITS:
+            return 0.0
+        width = self.range[1] - self.range[0]
+        return LARGEST_ALLOWANCE * (width if np.isfinite(width) else self._largest)
+
+    def clearance(self, of_joint: OfJoint) -> FloatArray:
+        """How far within the range values are, relative to its larger end; negative outside, NaN for NaN."""
+        clearance: FloatArray = self._outside(self.values(of_joint)) / -(self._largest or 1.0)
+        return clearance
+
+    def worst(self, of_joint: OfJoint, flags: FlagArray) -> Excess | None:
+        """The worst of the steps that have the bit among these flags, (samples,); None if there is none."""
+        values = self.values(of_joint)
+        outside = np.nan_to_num(self._outside(values), nan=-np.inf)
+        hit = has(flags, self.flag) & (outside > 0)
+        if not hit.any():
+            return None
+        step = int(np.where(hit, outside, -np.inf).argmax())
+        value, (lower, upper) = float(values[step]), self.range
+        return Excess(int(hit.argmax()), step, value, lower if value < lower else upper, float(outside[step]))
+
+    @property
+    def _largest(self) -> float:
+        """The larger finite bound in size; 0 if there is none."""
+        return max((abs(bound) for bound in self.range if np.isfinite(bound)), default=0.0)
+
+    def _outside(self, values: FloatArray) -> FloatArray:
+        """How far values lie outside the range; zero or negative inside, NaN for NaN."""
+        return np.maximum(self.range[0] - values, values - self.range[1])
+
+
+def within(bound: float) -> tuple[float, float]:
+    """The range of a quantity whose size is bounded."""
+    return -bound, bound
 
 
 def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:

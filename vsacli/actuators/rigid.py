@@ -9,8 +9,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator, PlaceholderConstants
-from vsacli.actuators.limit_check import OfJoint
 from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command, Transmission, single_motor
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import Record, check_fields, value

@@ -12,15 +12,13 @@ from typing import Any, Self
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator, Carried, PlaceholderConstants
+from vsacli.actuators.drivetrain import largest_coupling
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms import MECHANISMS
-from vsacli.actuators.mechanisms.mechanism import Mechanism
-from vsacli.actuators.mechanisms.state import MechanismState
+from vsacli.actuators.mechanisms.mechanism import Mechanism, MechanismState
 from vsacli.actuators.motor import JointMotor, Motor
-from vsacli.actuators.reach import deflections_within_reach
-from vsacli.actuators.rotors import largest_coupling
+from vsacli.actuators.reach import OfJoint, deflections_within_reach
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base import units

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vsacli.actuators.elasticity import Elasticity, ElasticState, Torques
-from vsacli.actuators.laws.rows import SpringRows
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.law import SpringRows, SpringState
 from vsacli.base.arrays import FloatArray
 
 

@@ -6,8 +6,7 @@ from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
-    from vsacli.analysis.result import Result
-    from vsacli.analysis.result_file import open_result
+    from vsacli.analysis.result import Result, open_result
     from vsacli.analysis.run import inverse_dynamics
 
 __all__ = [

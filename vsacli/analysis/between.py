@@ -8,15 +8,22 @@ step that is nearest to it gets the flags that hold there.
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.analysis.clearances import bounded_quantities, clearances
 from vsacli.analysis.joint_report import Worst
-from vsacli.analysis.minima import KNOWN, ROUNDING, Brackets, Known, brackets, narrowed
+from vsacli.analysis.minima import (
+    KNOWN,
+    ROUNDING,
+    Brackets,
+    Known,
+    bounded_quantities,
+    brackets,
+    clearances,
+    narrowed,
+)
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, IndexArray
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import usual_block
@@ -79,7 +86,7 @@ class Minima(NamedTuple):
 
 
 class Between:
-    """Looks between the steps of a run while its blocks pass.
+    """A search for minima between the samples of a run, while its blocks pass.
 
     Args:
         robot: the robot.
@@ -113,20 +120,46 @@ class Between:
         self._least_between: dict[int, tuple[float, Worst]] = {}
         self._found: list[Minima] = []
         self._passed = 0
+        looking = not self.notes and bool(self.quantities)
+        self._scans = looking and trajectory.samples < SCANNED
+        self._looks = looking and not self._scans
+        self._known: Known | None = None
+        self._seen = 0.0 if self._looks else math.inf
 
-    def marked(self, blocks: Iterable[Block]) -> Iterator[tuple[Block, list[Minima]]]:
-        """The blocks of the run with flags that hold between the steps as well, and the minima they are of.
-
-        A block passes when two steps after it are known, since a minimum around the first of these may be
-        nearest to its last step.
-        """
-        if self.notes or not self.quantities:
-            yield from ((block, []) for block in blocks)
-        elif self._trajectory.samples < SCANNED:
+    def look(self, block: Block) -> None:
+        """Look around each sample of the next block as computed, as far as the next sample is known."""
+        if self._scans:
             self._scan()
-            yield from map(self._passing, blocks)
-        else:
-            yield from self._looked(blocks)
+            self._scans = False
+        elif self._looks:
+            steps = block.time, clearances(self.quantities, block)
+            before = self._known
+            self._known = Known(0, *steps).opened() if before is None else before.last(2).followed_by(*steps)
+            ended = self._known.stop == self._trajectory.samples
+            self._search(self._known.closed() if ended else self._known, self._known)
+            self._seen = math.inf if ended else self._known.stop - 1
+
+    def knows(self, samples: int) -> bool:
+        """Return whether the surroundings of so many samples after those that passed are known.
+
+        Two samples after them must be, since a minimum around the first of these may be nearest to the last.
+        """
+        return self._passed + samples < self._seen
+
+    def mark(self, block: Block) -> list[Minima]:
+        """Give the next block flags that hold between its samples; return the minima that are nearest."""
+        stop, own, later = self._passed + len(block.time), [], []
+        for found in self._found:
+            inside = found.step < stop
+            if inside.any():
+                own.append(found.where(inside)._replace(step=found.step[inside] - self._passed))
+            if not inside.all():
+                later.append(found.where(~inside))
+        for found in own:
+            bits = np.where(found.crossed, found.block.flags[:, 0], 0)
+            np.bitwise_or.at(block.flags, (found.step, found.joint), bits)
+        self._found, self._passed = later, stop
+        return own
 
     def add(self, minima: Minima) -> None:
         """Take minima into the report, which have passed and are part of the run."""
@@ -145,19 +178,6 @@ class Between:
             if clearance < self._least_at_steps[number]:
                 reports[self._joint[number]][worst.kind] = worst
         return reports
-
-    def _looked(self, blocks: Iterable[Block]) -> Iterator[tuple[Block, list[Minima]]]:
-        """Look around each step when the next one is known."""
-        held: deque[Block] = deque()
-        known = None
-        for block in blocks:
-            held.append(block)
-            steps = block.time, clearances(self.quantities, block)
-            known = Known(0, *steps).opened() if known is None else known.last(2).followed_by(*steps)
-            ended = known.stop == self._trajectory.samples
-            self._search(known.closed() if ended else known, known)
-            while held and (ended or self._passed + len(held[0].time) < known.stop - 1):
-                yield self._passing(held.popleft())
 
     def _scan(self) -> None:
         """Look at all of a run of few steps, at evenly many times from each step to the next."""
@@ -236,21 +256,6 @@ class Between:
         """So many times in blocks of the usual size."""
         count = usual_block(self._joints)
         return (slice(start, start + count) for start in range(0, times, count))
-
-    def _passing(self, block: Block) -> tuple[Block, list[Minima]]:
-        """A block with its flags, and the minima that are nearest to its steps."""
-        stop, own, later = self._passed + len(block.time), [], []
-        for found in self._found:
-            inside = found.step < stop
-            if inside.any():
-                own.append(found.where(inside)._replace(step=found.step[inside] - self._passed))
-            if not inside.all():
-                later.append(found.where(~inside))
-        for found in own:
-            bits = np.where(found.crossed, found.block.flags[:, 0], 0)
-            np.bitwise_or.at(block.flags, (found.step, found.joint), bits)
-        self._found, self._passed = later, stop
-        return block, own
 
 
 def _of_joints(block: Block) -> dict[str, AnyArray]:

@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 from vsacli.analysis import report_text as text
+from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.analysis.dry_friction import dry_friction_lines
-from vsacli.analysis.energy_text import energy_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
-from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
-from vsacli.analysis.trouble_text import sentences
-from vsacli.analysis.uncertainty_text import uncertainty_lines
+from vsacli.analysis.report_text import energy_lines
+from vsacli.analysis.trouble_text import sentences, uncertainty_lines
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.tables import ReportText
 

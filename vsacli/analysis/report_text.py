@@ -1,4 +1,4 @@
-"""The report as text: headline, table, a sentence for each kind of trouble, what to know before a start."""
+"""The report of a run as text for a terminal: headline, table, energy, and what to know before a start."""
 
 from __future__ import annotations
 
@@ -7,10 +7,43 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
+from vsacli.analysis.derivative_check import SHAFT_BOUND, SelfCheck
 from vsacli.analysis.joint_report import JointDrift, JointReport
-from vsacli.analysis.self_check import SHAFT_BOUND, SelfCheck
 from vsacli.base.texts import together
 from vsacli.base.units import POSITION, TORQUE, VELOCITY, time_text
+from vsacli.dynamics.energy import JointEnergy
+
+
+def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str]:
+    """From names, types and energies of joints: sums, if all have them, and the joints with the most."""
+    energies = [energy for _, _, energy in joints]
+    if not any(math.isnan(energy.spent) for energy in energies):
+        spent, recovered = (
+            number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
+        )
+        name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
+        held = f"; springs hold up to {number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
+        yield f"energy: motors spend {spent} J, take back {recovered} J{held}"
+        yield from _losses(energies)
+    paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
+    if paired:
+        name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
+        unit = TORQUE.unit(joint_type)
+        effort, load = f"{number(most.co_contraction)} {unit}", f"{number(most.load)} {unit}"
+        yield f"co-contraction: up to {effort} rms for each motor ({name}), its load takes {load}"
+
+
+def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
+    """What friction and windings take, of a robot whose file says so."""
+    taken = {
+        "friction and damping take {} J": [energy.dissipated for energy in energies],
+        "the windings turn {} J into heat": [energy.copper_loss for energy in energies],
+    }
+    known = {words: [loss for loss in losses if loss is not None] for words, losses in taken.items()}
+    sums = [words.format(number(sum(losses))) for words, losses in known.items() if losses]
+    if sums:
+        yield "losses: " + ", ".join(sums)
+
 
 WIDTH = 78
 JOINTS_PER_LINE = 3

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from itertools import starmap
+from collections import deque
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.analysis.between import Between, Minima
-from vsacli.analysis.friction_passages import FrictionPassages
+from vsacli.analysis.between import Between
+from vsacli.analysis.derivative_check import DRIFT_BOUND, SPRING_BOUND, BalanceCheck, SelfCheck, ladder
+from vsacli.analysis.dry_friction import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
-from vsacli.analysis.ladder import ladder
 from vsacli.analysis.report import Report
-from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, BalanceCheck, SelfCheck
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
@@ -24,8 +23,8 @@ from vsacli.base.units import time_text
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, Tell, choose, unheard
 from vsacli.dynamics.balances import BALANCES, BalancedDynamics
+from vsacli.dynamics.energy import RunEnergy
 from vsacli.dynamics.inverse import block_of, fitted, usual_block
-from vsacli.dynamics.run_energy import RunEnergy
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -105,19 +104,27 @@ class Run:
         self._between = Between(robot, trajectory, near_singular, self._compute, self._judged)
         self._balances = BalanceCheck(robot, trajectory.samples)
         self._samples = 0
+        self._stopped = False
 
     def __iter__(self) -> Iterator[Block]:
-        """The blocks; none is kept while the next is computed, since those of long chains are large."""
-        passed = self._between.marked(self._steps())
-        return starmap(self._added, _until_infeasible(passed) if self._stop_on_infeasible else passed)
+        """Yield the blocks in time order; each is released before the next is computed."""
+        waiting: deque[Block] = deque()
+        for block in self._computed():
+            self._between.look(block)
+            waiting.append(block)
+            del block
+            while waiting and self._between.knows(len(waiting[0].time)) and not self._stopped:
+                yield self._merged(waiting.popleft())
+            if self._stopped:
+                return
 
-    def _steps(self) -> Iterator[Block]:
-        """All steps, in blocks, with what holds at them; of several threads all but one compute ahead."""
+    def _computed(self) -> Iterator[Block]:
+        """Return all samples in blocks, as computed; of several threads all but one compute ahead."""
         starts = range(0, self.trajectory.samples, self._block_samples)
         motions = (self.trajectory.block(start, start + self._block_samples) for start in starts)
         if self.choice.threads == 1 or not self._ahead:
             return map(self._compute, motions)
-        from vsacli.base.ahead import ahead
+        from vsacli.base.background import ahead
 
         return ahead(self._compute, motions)
 
@@ -131,13 +138,18 @@ class Run:
         """With the limits that are exceeded beyond what recorded signals leave uncertain."""
         return block if self._uncertainty is None else self._uncertainty.judged(block)
 
-    def _added(self, block: Block, between: Sequence[Minima]) -> Block:
-        """The block with deviations and the energy that the motors have spent, merged into the report.
+    def _merged(self, block: Block) -> Block:
+        """Return the next block with flags that hold between its samples, deviations and motor energy.
 
-        Args:
-            block: the next steps.
-            between: minima that are nearest to them.
+        It is merged into the report, up to the first infeasible sample if the run stops there.
         """
+        between = self._between.mark(block)
+        if self._stop_on_infeasible:
+            infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
+            self._stopped = bool(infeasible.any())
+        if self._stopped:
+            last = int(infeasible.argmax())
+            block, between = block.taken(slice(last + 1)), [each.where(each.step <= last) for each in between]
         if self._uncertainty is not None:
             block = self._uncertainty.add(block)
         self._samples += len(block.time)
@@ -247,19 +259,6 @@ def inverse_dynamics(
         robot, trajectory, stop_on_infeasible=stop_on_infeasible, deflections=deflections, engine=engine
     )
     return Result(**_joined(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
-
-
-def _until_infeasible(
-    passed: Iterable[tuple[Block, list[Minima]]],
-) -> Iterator[tuple[Block, list[Minima]]]:
-    """Blocks with their minima up to the first infeasible step."""
-    for block, minima in passed:
-        infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
-        if infeasible.any():
-            last = int(infeasible.argmax())
-            yield block.taken(slice(last + 1)), [each.where(each.step <= last) for each in minima]
-            return
-        yield block, minima
 
 
 def _integrated(

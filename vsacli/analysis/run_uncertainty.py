@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vsacli.actuators.limit_check import ALLOWED_DEVIATIONS
-from vsacli.actuators.reach import margin
+from vsacli.actuators.reach import ALLOWED_DEVIATIONS, margin
 from vsacli.analysis.joint_report import JUDGED, JointUncertainty, Spread, Worst
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray
 from vsacli.base.flags import Flag, has

@@ -10,18 +10,16 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self, TextIO
+from typing import Any, Self
 
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import interrupts_deferred
-from vsacli.base.staging import remove, staging_name, sweep
-from vsacli.base.storage import already_there, check_target, reporting_storage_errors
-from vsacli.base.streams import STANDARD
+from vsacli.base.storage import STANDARD, remove, reporting_storage_errors, staging_name, sweep
 
 
 @dataclass(frozen=True)
 class Staged:
-    """A file to be, or a folder of them.
+    """A file to be, or a folder of them. A full or failing disk raises a StorageError.
 
     Attributes:
         path: what it is called by the user.
@@ -35,50 +33,26 @@ class Staged:
 
     @classmethod
     def unnamed(cls, path: Path) -> Staged:
-        """A file that goes with the temporary folder it is in."""
+        """Create a file that goes with the temporary folder it is in."""
         with reporting_storage_errors(path):
             path.touch()
         return cls(path, path, path)
 
-    def write_text(self, text: str) -> None:
-        """Write a text.
+    @contextlib.contextmanager
+    def opened(self, *, binary: bool = False) -> Iterator[Any]:
+        """Open for bytes, or for text whose lines end as the writer says."""
+        how: dict[str, Any] = {"mode": "wb"} if binary else {"mode": "w", "encoding": "utf-8", "newline": ""}
+        with reporting_storage_errors(self.path), self.temporary.open(**how) as stream:
+            yield stream
 
-        Raises:
-            StorageError: the disk is full or fails.
-        """
+    def write_text(self, text: str) -> None:
+        """Write a text."""
         self.write_bytes(text.encode("utf-8"))
 
-    @contextlib.contextmanager
-    def opened(self) -> Iterator[TextIO]:
-        """Open for text whose lines end as the writer says.
-
-        Raises:
-            StorageError: the disk is full or fails.
-        """
-        with (
-            reporting_storage_errors(self.path),
-            self.temporary.open("w", encoding="utf-8", newline="") as stream,
-        ):
-            yield stream
-
-    @contextlib.contextmanager
-    def opened_for_bytes(self) -> Iterator[BinaryIO]:
-        """Open for bytes, whoever writes them.
-
-        Raises:
-            StorageError: the disk is full or fails.
-        """
-        with reporting_storage_errors(self.path), self.temporary.open("wb") as stream:
-            yield stream
-
     def write_bytes(self, content: bytes) -> None:
-        """Write bytes.
-
-        Raises:
-            StorageError: the disk is full or fails.
-        """
-        with reporting_storage_errors(self.path):
-            self.temporary.write_bytes(content)
+        """Write bytes."""
+        with self.opened(binary=True) as stream:
+            stream.write(content)
 
 
 class Outputs:
@@ -121,7 +95,7 @@ class Outputs:
         return self._files[-1]
 
     def check(self, path: str | Path) -> Path:
-        """Refuse what cannot be staged; the file that is meant, links followed.
+        """Refuse what cannot be staged; return the file that is meant, links followed.
 
         Raises:
             StorageError, InputError: as `file`.
@@ -133,8 +107,12 @@ class Outputs:
         if any(target == each.target for each in self._files):
             raise InputError.one("would be written twice by this command; choose different names", path)
         if self._in_new_folder(target) is None:
-            self._check_inputs(path)
-            check_target(path, overwrite=self._overwrite)
+            there = [each for each in self._inputs if os.path.exists(each)]
+            if os.path.exists(path) and any(os.path.samefile(path, each) for each in there):
+                message = "is read by this command; choose another name for its output"
+                raise InputError.one(message, path)
+            with reporting_storage_errors(path):
+                _check_target(path, target, overwrite=self._overwrite)
         return target
 
     def folder(self, path: str | Path) -> None:
@@ -164,23 +142,18 @@ class Outputs:
         return tuple(file.path for file in self._files)
 
     def _in_new_folder(self, target: Path) -> Path | None:
-        """Where a file or folder is staged as part of a folder that is new."""
+        """Return where a file or folder is staged as part of a folder that is new."""
         for folder in self._folders.values():
             if target.is_relative_to(folder.target):
                 return folder.temporary / target.relative_to(folder.target)
         return None
 
     def _staging(self, target: Path) -> Path:
-        """A name in the folder of a target, from which earlier runs' leavings are removed."""
+        """Return a name in the folder of a target, from which earlier runs' leavings are removed."""
         if all(target.parent != each.parent for each in self._temporaries):
             sweep(target.parent)
         self._temporaries.append(target.with_name(staging_name()))
         return self._temporaries[-1]
-
-    def _check_inputs(self, path: str | Path) -> None:
-        there = [each for each in self._inputs if os.path.exists(each)]
-        if os.path.exists(path) and any(os.path.samefile(path, each) for each in there):
-            raise InputError.one("is read by this command; choose another name for its output", path)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
@@ -216,7 +189,12 @@ class Outputs:
     def _name(self, file: Staged, undo: contextlib.ExitStack) -> None:
         if self._overwrite and file.target.exists():
             kept = self._staging(file.target)
-            _keep(file.target, kept)
+            try:
+                os.link(file.target, kept)
+            except OSError:  # no hard links here (exFAT, some network shares)
+                import shutil
+
+                shutil.copy2(file.target, kept)
             _take_permissions(file.temporary, file.target.stat())
             file.temporary.replace(file.target)
             undo.callback(kept.replace, file.target)
@@ -225,14 +203,32 @@ class Outputs:
             undo.callback(file.target.unlink)
 
 
-def _keep(path: Path, kept: Path) -> None:
-    """A second name for a file, or a copy where the file system has none (exFAT, some network shares)."""
-    try:
-        os.link(path, kept)
-    except OSError:
-        import shutil
+def _check_target(path: str | Path, target: Path, *, overwrite: bool | None) -> None:
+    """Refuse to write a file that `path` means if it is none, may not be replaced, or has several names."""
+    if target.is_dir():
+        raise StorageError(path, "is a folder; give the name of a file")
+    if not target.parent.is_dir():
+        raise StorageError(path, f"there is no folder {target.parent}; create it or choose another one")
+    if not target.exists():
+        return
+    if not target.is_file():
+        raise StorageError(path, "is not a regular file and cannot be replaced")
+    if not overwrite:
+        raise _already_there(path, optional=overwrite is not None)
+    if target.stat().st_nlink > 1:
+        sweep(target.parent)  # a run that was killed while it named this file has left it a second name
+        if (names := target.stat().st_nlink) > 1:  # the others would keep the old content
+            raise StorageError(
+                path,
+                f"has {names} names (hard links), of which only this one would get the new content; choose "
+                "another name, or remove this one first",
+            )
 
-        shutil.copy2(path, kept)
+
+def _already_there(path: str | Path, *, optional: bool) -> StorageError:
+    """Return the error of a file that must not be replaced, by a command that may have an option for that."""
+    advice = "replace it with --overwrite" if optional else "remove it first"
+    return StorageError(path, f"exists already; choose another name, or {advice}")
 
 
 def _take_permissions(path: Path, replaced: os.stat_result) -> None:
@@ -262,10 +258,10 @@ def _name_without_replacing(file: Staged, *, optional: bool) -> None:
     try:
         os.link(file.temporary, file.target)
     except FileExistsError as error:
-        raise already_there(file.path, optional=optional) from error
+        raise _already_there(file.path, optional=optional) from error
     except OSError as error:  # no hard links here
         if file.target.exists():
-            raise already_there(file.path, optional=optional) from error
+            raise _already_there(file.path, optional=optional) from error
         file.temporary.replace(file.target)
 
 

@@ -1,15 +1,33 @@
-"""What can be in the way of writing a file, and the sentences for it."""
+"""Files on the way: unfinished ones and their names, folders for temporary ones, standard input.
+
+What is not finished has a hidden name that tells its process, from which a later run knows whether somebody
+still works on it. What the system refuses becomes a `StorageError` with a sentence about the file.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import enum
 import errno
 import os
-from collections.abc import Iterator
+import platform
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 from vsacli.base.errors import StorageError
-from vsacli.base.staging import remove, staging_name, sweep
+
+STANDARD = "-"
+"""Stands for a standard stream on a command line; a file of that name is `./-`."""
+
+BYTES_PER_READ = 2**20
+
+UNCHECKED_BYTES = 2**24
+"""Size up to which a file is sooner written than its disk is asked for room."""
 
 _REASON = {
     errno.ENOSPC: "the disk is full",
@@ -19,10 +37,6 @@ _REASON = {
     errno.EROFS: "the file system is read-only",
     errno.ENAMETOOLONG: "the file name is too long",
 }
-
-
-UNCHECKED_BYTES = 2**24
-"""Size up to which a file is sooner written than its disk is asked for room."""
 
 
 @contextlib.contextmanager
@@ -35,7 +49,7 @@ def reporting_storage_errors(path: str | Path) -> Iterator[None]:
 
 
 def storage_error(path: str | Path, error: OSError) -> StorageError:
-    """The sentence for an operating system error met while writing `path`."""
+    """Return the sentence for an operating system error met while writing `path`."""
     return StorageError(path, f"cannot be written: {reason(error)}; nothing was changed there")
 
 
@@ -50,9 +64,155 @@ def reporting_temporary_errors() -> Iterator[None]:
         raise StorageError("folder for temporary files", message) from error
 
 
+def reason(error: OSError) -> str:
+    """Return what an operating system error says, a clause."""
+    return _REASON.get(error.errno or 0, error.strerror or str(error))
+
+
+def check_free_space(path: str | Path, size: int) -> None:
+    """Refuse a file of `size` bytes that its disk has no room for, from `UNCHECKED_BYTES` on.
+
+    Raises:
+        StorageError: with both sizes in MB.
+    """
+    if size < UNCHECKED_BYTES:
+        return
+    import shutil
+
+    with reporting_storage_errors(path):
+        free = shutil.disk_usage(Path(os.path.realpath(path)).parent).free
+    if size > free:
+        raise StorageError(
+            path,
+            f"needs {size / 1e6:.0f} MB, but the disk has {free / 1e6:.0f} MB left; "
+            "free some space, or store fewer variables with --variables",
+        ) from OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+_NAME = re.compile(r"\.vsacli-(?P<host>[0-9a-f]{12})-(?P<process>\d+)-(?P<start>\d+)-[0-9a-f]{16}\.tmp")
+
+UNKNOWN_START = 0
+"""Of a process, where the system does not say when it began."""
+
+
+class Owner(enum.StrEnum):
+    """Who works on a file that is not finished: a process of this host or another one."""
+
+    ENDED = "ended"
+    RUNNING = "running"
+    ELSEWHERE = "elsewhere"
+
+
+class Unfinished(NamedTuple):
+    """A file, or a folder of them, that is not finished.
+
+    Attributes:
+        path: the file.
+        owner: who works on it.
+        size: bytes so far.
+    """
+
+    path: Path
+    owner: Owner
+    size: int
+
+
+def staging_name() -> str:
+    """Return a hidden name of its own; it tells host, process, and when the process began."""
+    process = os.getpid()
+    return f".vsacli-{_host()}-{process}-{_start(process)}-{os.urandom(8).hex()}.tmp"
+
+
+def sweep(folder: Path) -> None:
+    """Remove what processes of this host left in a folder when they were killed.
+
+    What belongs to a living process stays, and what comes from another host, whose processes nobody here
+    can see: the folder may be on a network share.
+    """
+    for path, owner in _staged(folder):
+        if owner is Owner.ENDED:
+            remove(path)
+
+
+def unfinished(folder: Path) -> list[Unfinished]:
+    """Return what is not finished in a folder, or was left there."""
+    return [Unfinished(path, owner, size_of(path)) for path, owner in sorted(_staged(folder))]
+
+
+def _staged(folder: Path) -> list[tuple[Path, Owner]]:
+    """Return each staged file of a folder, if it can be read, with its owner."""
+    with contextlib.suppress(OSError):
+        owners = ((path, owner_of(path.name)) for path in folder.iterdir())
+        return [(path, owner) for path, owner in owners if owner is not None]
+    return []
+
+
+def owner_of(name: str) -> Owner | None:
+    """Return who works on a staged file of a name; None if it is no such name."""
+    found = _NAME.fullmatch(name)
+    if found is None:
+        return None
+    if found["host"] != _host():
+        return Owner.ELSEWHERE
+    process = int(found["process"])
+    try:
+        os.kill(process, 0)  # asks only whether there is one
+    except ProcessLookupError:
+        return Owner.ENDED
+    except OSError:
+        return Owner.RUNNING  # somebody else's
+    same = _start(process) == int(found["start"])
+    return Owner.RUNNING if same else Owner.ENDED  # the number of an ended process is used again
+
+
+def size_of(path: Path) -> int:
+    """Return the bytes of a file, or of all files in a folder; 0 if it has gone."""
+    size = 0
+    with contextlib.suppress(OSError):
+        size = sum(map(size_of, path.iterdir())) if is_folder(path) else path.lstat().st_size
+    return size
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a path is a folder itself, no link to one."""
+    return path.is_dir() and not path.is_symlink()
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a folder, if it is there and the system allows it."""
+    if is_folder(path):
+        import shutil
+
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+
+
+@cache
+def _host() -> str:
+    """Return this host, and what its numbers of processes refer to: containers may share a name."""
+    import hashlib
+
+    try:
+        namespace = os.readlink("/proc/self/ns/pid")
+    except OSError:
+        namespace = ""
+    return hashlib.sha256(f"{platform.node()} {namespace}".encode()).hexdigest()[:12]
+
+
+def _start(process: int) -> int:
+    """Return when a process began, in clock ticks since the system did (proc(5))."""
+    try:
+        status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return UNKNOWN_START
+    return int(status.rpartition(")")[2].split()[19])  # field 22; the name, field 2, may hold spaces
+
+
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """A new folder, which goes with all that is in it at the end of the context.
+    """Make a folder, which goes with all that is in it at the end of the context.
 
     Those of killed processes are removed. What the disk refuses to take in it is told as a fault of the
     folder for temporary files, whatever the file there is called.
@@ -80,74 +240,48 @@ def temporary_folder() -> Iterator[Path]:
         remove(folder)
 
 
-def check_target(path: str | Path, *, overwrite: bool | None) -> Path:
-    """The file that `path` means, links followed, if it may be written.
-
-    Args:
-        path: the file.
-        overwrite: whether it may be replaced; None if the command has no option for that.
-
-    Raises:
-        StorageError: it exists and may not be replaced, it is no regular file or has several names, or its
-            folder does not exist.
-    """
-    with reporting_storage_errors(path):
-        target = Path(os.path.realpath(path))
-        if target.is_dir():
-            raise StorageError(path, "is a folder; give the name of a file")
-        if not target.parent.is_dir():
-            raise StorageError(path, f"there is no folder {target.parent}; create it or choose another one")
-        if target.exists() and not target.is_file():
-            raise StorageError(path, "is not a regular file and cannot be replaced")
-        if target.exists():
-            if not overwrite:
-                raise already_there(path, optional=overwrite is not None)
-            _check_names(path, target)
-    return target
+_copies: ContextVar[Mapping[str, str]] = ContextVar("copies", default={})  # noqa: B039 - never changed
 
 
-def _check_names(path: str | Path, target: Path) -> None:
-    """Refuse to replace a file of several names: the others would keep the old content.
+def place_of(path: str | os.PathLike[str]) -> str:
+    """Return where to find what a file holds: at its path, or in a copy.
+
+    Standard input has one, since it can be read only once, and whatever `reading_copies` says.
 
     Raises:
-        StorageError: it has several.
+        OSError: standard input is closed, or cannot be read.
+        StorageError: there is no room for the copy.
     """
-    if target.stat().st_nlink > 1:
-        sweep(target.parent)  # a run that was killed while it named this file has left it a second name
-        if (names := target.stat().st_nlink) > 1:
-            raise StorageError(
-                path,
-                f"has {names} names (hard links), of which only this one would get the new content; choose "
-                "another name, or remove this one first",
-            )
+    name = os.fspath(path)
+    copies = _copies.get()
+    if name in copies:
+        return copies[name]
+    return _standard_input() if name == STANDARD else name
 
 
-def check_free_space(path: str | Path, size: int) -> None:
-    """Refuse a file of `size` bytes that its disk has no room for, from `UNCHECKED_BYTES` on.
-
-    Raises:
-        StorageError: with both sizes in MB.
-    """
-    if size < UNCHECKED_BYTES:
-        return
-    import shutil
-
-    with reporting_storage_errors(path):
-        free = shutil.disk_usage(Path(os.path.realpath(path)).parent).free
-    if size > free:
-        raise StorageError(
-            path,
-            f"needs {size / 1e6:.0f} MB, but the disk has {free / 1e6:.0f} MB left; "
-            "free some space, or store fewer variables with --variables",
-        ) from OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+@contextlib.contextmanager
+def reading_copies(copies: Mapping[str, str]) -> Iterator[None]:
+    """Within this context, files of these paths are read elsewhere."""
+    token = _copies.set(copies)
+    try:
+        yield
+    finally:
+        _copies.reset(token)
 
 
-def reason(error: OSError) -> str:
-    """What an operating system error says, a clause."""
-    return _REASON.get(error.errno or 0, error.strerror or str(error))
+@cache
+def _standard_input() -> str:
+    """Return a copy that goes with the process: inputs are read more than once, to name lines."""
+    import atexit
 
-
-def already_there(path: str | Path, *, optional: bool) -> StorageError:
-    """What to say of a file that must not be replaced, by a command that may have an option for that."""
-    advice = "replace it with --overwrite" if optional else "remove it first"
-    return StorageError(path, f"exists already; choose another name, or {advice}")
+    if sys.stdin is None:
+        raise OSError(0, "standard input is closed")
+    kept = contextlib.ExitStack()
+    atexit.register(kept.close)
+    copy = kept.enter_context(temporary_folder()) / "stdin"
+    with reporting_temporary_errors():
+        file = kept.enter_context(copy.open("wb", buffering=0))
+    while piece := sys.stdin.buffer.read(BYTES_PER_READ):
+        with reporting_temporary_errors():
+            file.write(piece)
+    return str(copy)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.remedies import Suggestions
+    from vsacli.studies.search import Suggestions
 
 
 @click.command(
@@ -105,7 +105,7 @@ def check_feasibility(
     from vsacli.analysis.run import Run
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.remedies import check_fixed_target, suggest
+    from vsacli.studies.search import check_fixed_target, suggest
 
     margin = NEAR_SINGULAR_MARGIN if near_singular is None else near_singular
     check_near_singular(margin)
@@ -137,13 +137,14 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
     """Compute, and draw the figure from a result file that exists no longer than it takes."""
     from vsacli.base.outputs import Staged
     from vsacli.base.storage import temporary_folder
-    from vsacli.results.plots import (
+    from vsacli.results.charts.figures import (
         FEASIBILITY,
         FEASIBILITY_VARIABLES,
-        FigureFiles,
         check_drawable,
-        plot_feasibility,
+        feasibility,
     )
+    from vsacli.results.charts.stored import StoredCharts
+    from vsacli.results.plots import FigureFiles
     from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
 
@@ -153,13 +154,13 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
         file = Staged.unnamed(place / "result.h5")
         report = compute(run, talk, ResultWriter(file, run.robot, run.trajectory, FEASIBILITY_VARIABLES))
         with StoredResult.open(file.temporary) as result:
-            figures.save({FEASIBILITY: plot_feasibility(result)})
+            figures.save({FEASIBILITY: feasibility(StoredCharts([result]))})
     return report
 
 
 def _write_fixed(suggestions: Suggestions, number: int, path: str, outputs: Outputs, talk: Talk) -> None:
     """Write one of the suggestions, if there is one, and say what was written."""
-    from vsacli.studies.remedies import write_fixed
+    from vsacli.studies.search import write_fixed
 
     remedies = suggestions.remedies
     if number <= len(remedies):

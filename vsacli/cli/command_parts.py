@@ -11,18 +11,18 @@ import click
 from click.core import ParameterSource
 
 from vsacli.base.errors import InputError
-from vsacli.base.streams import STANDARD
+from vsacli.base.storage import STANDARD
 from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_json, say_text
 from vsacli.cli.file_names import FILE
 
 if TYPE_CHECKING:
     from vsacli.analysis.report import Report
     from vsacli.analysis.run import Run
-    from vsacli.documents.changes import Changes
+    from vsacli.documents.reading import Changes
     from vsacli.results.store.reader import StoredResult
     from vsacli.results.store.writer import ResultWriter
     from vsacli.robot.model import Robot
-    from vsacli.studies.remedies import Suggestions
+    from vsacli.studies.search import Suggestions
     from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -171,7 +171,7 @@ def load_inputs(robot_path: str, trajectory_path: str, talk: Talk, changes: tupl
 @contextmanager
 def _naming_option() -> Iterator[None]:
     """Say of a change that cannot be made where it comes from."""
-    from vsacli.documents.changes import ChangeError
+    from vsacli.documents.reading import ChangeError
 
     try:
         yield
@@ -183,7 +183,7 @@ def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
     """Those of the robot and those of the trajectory."""
     if not changes:
         return {}, {}
-    from vsacli.documents.changes import read_changes
+    from vsacli.documents.reading import read_changes
     from vsacli.trajectory.changes import divided
 
     return divided(read_changes(changes))

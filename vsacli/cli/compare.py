@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from vsacli.base.outputs import Outputs
-    from vsacli.results.measured_curves import MeasuredCurve
+    from vsacli.results.charts.measured import MeasuredCurve
     from vsacli.results.pages.document import InputText
     from vsacli.studies.measured import Comparison
 
@@ -74,8 +74,8 @@ def compare(
     check_plotted(folder)
     from vsacli.base.outputs import Outputs
     from vsacli.cli.plot_page import page_asked_for
-    from vsacli.results.pages.facts import input_text
-    from vsacli.results.store.simulation import open_stored
+    from vsacli.results.pages.document import input_text
+    from vsacli.results.store.reader import open_stored
     from vsacli.studies.measured import compare as compared
 
     with Outputs(overwrite=overwrite, inputs=[result, recording, *filter(None, [columns])]) as outputs:
@@ -94,13 +94,14 @@ def compare(
 
 def _draw(comparison: Comparison, stem: str, folder: str, file_format: str, outputs: Outputs) -> None:
     """A figure for each variable that was measured."""
-    from vsacli.results.plots import FigureFiles, measured_figure
+    from vsacli.results.charts.measured import measured_sheet
+    from vsacli.results.plots import FigureFiles
 
     curves = _curves(comparison)
     files = FigureFiles(curves, folder, stem, file_format, outputs)
     title = ", ".join(Path(path).stem for path in (comparison.result, comparison.recording))
     files.save(
-        {variable: measured_figure(of_it, f"{title}: {variable}") for variable, of_it in curves.items()}
+        {variable: measured_sheet(of_it, f"{title}: {variable}") for variable, of_it in curves.items()}
     )
 
 
@@ -109,8 +110,7 @@ def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
     from vsacli.base.texts import one_line
     from vsacli.base.version import __version__
     from vsacli.results.pages import measured_page
-    from vsacli.results.pages.document import Facts
-    from vsacli.results.pages.facts import printable, source_text
+    from vsacli.results.pages.document import Facts, printable, source_text
 
     report = printable(comparison.as_text())
     facts = Facts(
@@ -129,7 +129,7 @@ def _curves(comparison: Comparison) -> dict[str, list[MeasuredCurve]]:
     """The signals that were compared, by variable."""
     import numpy as np
 
-    from vsacli.results.measured_curves import MeasuredCurve
+    from vsacli.results.charts.measured import MeasuredCurve
 
     curves: dict[str, list[MeasuredCurve]] = {}
     for each in comparison.signals:

@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from vsacli.base.errors import InputError
-from vsacli.base.streams import STANDARD
+from vsacli.base.storage import STANDARD
 from vsacli.cli.command_parts import (
     example,
     overwrite_option,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from vsacli.results.exports.result_format import ResultFormat
     from vsacli.results.store.reader import StoredResult
     from vsacli.robot.model import Robot
-    from vsacli.robot.models.start import Start
+    from vsacli.robot.models.mjcf_drives import Start
 
 ENDINGS = {
     "csv": (".csv",),
@@ -189,7 +189,7 @@ def _inputs(robot: Robot, start: str | None) -> list[str]:
 def _read_start(path: str, robot: Robot) -> Start:
     """The first step of a result of the robot."""
     from vsacli.results.store.reader import StoredResult
-    from vsacli.robot.models.start import Start
+    from vsacli.robot.models.mjcf_drives import Start
 
     with StoredResult.open(path) as result:
         if result.joint_names != robot.joint_names:
@@ -202,9 +202,9 @@ def _export_result(
     file: str, output: str | None, form: ResultFormat, options: dict[str, Any], overwrite: bool, talk: Talk
 ) -> int:
     from vsacli.base.outputs import Outputs
-    from vsacli.files.resampled import at_rate
+    from vsacli.files.repetition import at_rate
     from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
-    from vsacli.results.store.simulation import open_stored
+    from vsacli.results.store.reader import open_stored
 
     try:
         with ExitStack() as stack:
@@ -228,5 +228,5 @@ def _export_result(
 def _write(stored: StoredResult, file: Staged, form: ResultFormat, options: dict[str, Any]) -> None:
     from vsacli.results.exports.result_format import export_result
 
-    with file.opened_for_bytes() if form.binary else file.opened() as stream:
+    with file.opened(binary=form.binary) as stream:
         export_result(stored, stream, form, **options)

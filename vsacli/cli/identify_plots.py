@@ -7,20 +7,21 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
-    from vsacli.results.measured_curves import MeasuredCurve
+    from vsacli.results.charts.measured import MeasuredCurve
     from vsacli.studies.identification import Identification
 
 
 def draw_figures(found: Identification, robot: str, folder: str, file_format: str, outputs: Outputs) -> None:
     """A figure for each record."""
-    from vsacli.results.plots import FigureFiles, measured_figure
+    from vsacli.results.charts.measured import measured_sheet
+    from vsacli.results.plots import FigureFiles
 
     curves = _curves(found)
     names = {record: f"{number}-{Path(record).stem}" for number, record in enumerate(curves, 1)}
     files = FigureFiles(names.values(), folder, Path(robot).stem, file_format, outputs)
     files.save(
         {
-            names[record]: measured_figure(
+            names[record]: measured_sheet(
                 of_it, f"{found.robot}, {Path(record).stem}: predicted by the numbers found, filtered"
             )
             for record, of_it in curves.items()
@@ -41,8 +42,7 @@ def identification_page(found: Identification, columns: str | None) -> str:
     from vsacli.base.texts import one_line
     from vsacli.base.version import __version__
     from vsacli.results.pages import measured_page
-    from vsacli.results.pages.document import Facts
-    from vsacli.results.pages.facts import printable, source_text, tone_of
+    from vsacli.results.pages.document import Facts, printable, source_text, tone_of
 
     report = printable(found.as_text())
     provenance = [
@@ -64,7 +64,7 @@ def identification_page(found: Identification, columns: str | None) -> str:
 
 def _curves(found: Identification) -> dict[str, list[MeasuredCurve]]:
     """The torques of each record, by its path."""
-    from vsacli.results.measured_curves import MeasuredCurve
+    from vsacli.results.charts.measured import MeasuredCurve
 
     curves: dict[str, list[MeasuredCurve]] = {}
     for each in found.torques:

@@ -107,7 +107,7 @@ def _cache(folder: str, clear: bool) -> dict[str, Any]:
 
 def _extract(file: str, folder: str, talk: Talk) -> None:
     from vsacli.base.outputs import Outputs
-    from vsacli.documents.changes import written
+    from vsacli.documents.reading import written
     from vsacli.files.repetition import extract
 
     found = extract(file)

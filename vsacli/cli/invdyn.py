@@ -28,8 +28,6 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER, HDF5_FILE
-from vsacli.cli.plot import draw_staged
-from vsacli.cli.plot_recording import RECORDING, recording_figure
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -124,6 +122,8 @@ def invdyn(
         writer = ResultWriter(file, *inputs, variables, provenance=provenance, precision=precision)
         report = compute(run, talk, writer)
         if figures is not None:
+            from vsacli.cli.plot import draw_staged, recording_figure
+
             draw_staged(file, figures, talk)
             if inputs.trajectory.estimates:
                 figures.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
@@ -137,7 +137,9 @@ def _figures(
 ) -> FigureFiles:
     """Stage those that the variables which are stored allow, and that of a recording."""
     from vsacli.base.variables import VARIABLES
-    from vsacli.results.plots import FigureFiles, drawable_figures, result_drawings
+    from vsacli.cli.plot import RECORDING
+    from vsacli.results.charts.figures import drawable_figures, result_drawings
+    from vsacli.results.plots import FigureFiles
 
     stored = VARIABLES if variables is None else variables
     drawn = drawable_figures(result_drawings(inputs.robot.has), stored)

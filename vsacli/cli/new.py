@@ -9,7 +9,7 @@ import click
 
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.mechanisms import MECHANISMS
-from vsacli.base.streams import STANDARD
+from vsacli.base.storage import STANDARD
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE

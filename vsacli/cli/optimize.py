@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from vsacli.analysis.result import Result
     from vsacli.base.arrays import FloatArray
     from vsacli.base.outputs import Outputs
-    from vsacli.results.plots import Moved
+    from vsacli.results.charts.optimum import Moved
     from vsacli.robot.joint import Joint
-    from vsacli.studies.optimisation import Optimum
+    from vsacli.studies.search import Optimum
     from vsacli.trajectory.trajectory import Trajectory
 
 CHANGE, PACE = "optimum", "pace"
@@ -109,9 +109,8 @@ def optimize(
     inputs = load_inputs(robot, trajectory, talk, changes)
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.base.outputs import Outputs
-    from vsacli.studies.optimisation import optimize as optimized
-    from vsacli.studies.optimisation import searches
-    from vsacli.studies.remedies import Remedy, check_fixed_target, write_fixed
+    from vsacli.studies.search import Remedy, check_fixed_target, searches, write_fixed
+    from vsacli.studies.search import optimize as optimized
 
     vary = vary or ("timing" if minimize == "time" else "stiffness")
     names, stem = (CHANGE,) if vary == "stiffness" else (CHANGE, PACE), run_stem(robot, trajectory)
@@ -148,8 +147,9 @@ def _draw(
 ) -> None:
     """What changes at each joint, and the pace if that varies."""
     from vsacli.analysis.run import inverse_dynamics
-    from vsacli.results.plots import FigureFiles, JointChange, change_figure, pace_figure
-    from vsacli.studies.optimisation import path_at
+    from vsacli.results.charts.optimum import JointChange, change_sheet, pace_sheet
+    from vsacli.results.plots import FigureFiles
+    from vsacli.studies.search.paced_motion import path_at
 
     before, after = (inverse_dynamics(found.robot, each) for each in (asked, best))
     place = after.time - best.start
@@ -166,16 +166,16 @@ def _draw(
         for index, joint in enumerate(found.robot.joints)
     ]
     title = f"{found.robot_name}, {found.asked}"
-    figures = {CHANGE: change_figure(joints, title, along_path=found.pace is not None)}
+    figures = {CHANGE: change_sheet(joints, title, along_path=found.pace is not None)}
     if found.pace is not None:
         uniform = math.nan if found.timing is None else asked.duration / found.timing.uniform
-        figures[PACE] = pace_figure(place, 1 / found.pace(place), uniform, title)
+        figures[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, title)
     FigureFiles(figures, folder, stem, "png", outputs).save(figures)
 
 
 def _moved(result: Result, place: FloatArray, index: int) -> Moved:
     """What a joint, by index, does at places."""
-    from vsacli.results.plots import Moved
+    from vsacli.results.charts.optimum import Moved
 
     stiffness, lower, upper = (
         row[:, index] for row in (result.stiffness, result.stiffness_lower, result.stiffness_upper)

@@ -1,4 +1,4 @@
-"""`vsacli plot`."""
+"""`vsacli plot`: figures and pages of results, simulations and studies, and of recordings."""
 
 from __future__ import annotations
 
@@ -9,23 +9,24 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from vsacli.base.errors import InputError, StorageError
 from vsacli.cli.command_parts import example, format_option, overwrite_option, result_line, words_of
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, FOLDER
-from vsacli.cli.plot_recording import (
-    RECORDING,
-    draw_recording,
-    has_recording,
-    is_recording,
-    recording_figure,
-)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from vsacli.base.outputs import Outputs, Staged
     from vsacli.results.plots import FigureFiles
+    from vsacli.results.plots.figures import Figures
+    from vsacli.results.store.excerpt import Span
     from vsacli.results.store.reader import StoredResult
+    from vsacli.robot.model import Robot
+    from vsacli.trajectory.recorded.samples import SampledProfile
+
+RECORDING = "recording"
+"""Name of the figure that shows how noise in a recording was judged."""
 
 
 @click.command(
@@ -194,8 +195,9 @@ def _are_studies(paths: list[Path]) -> bool:
 
 def _draw_studies(paths: list[Path], target: _Target) -> None:
     """Draw the figures of a study, or compare how probable margins are in several."""
-    from vsacli.results.plots import COMPARISON, compared_studies, study_figures
-    from vsacli.results.store.stored_study import StoredStudy
+    from vsacli.results.charts.comparison import COMPARISON
+    from vsacli.results.plots import compared_studies, study_figures
+    from vsacli.results.store.study_table import StoredStudy
 
     stem = "-".join(path.stem for path in paths)
     with ExitStack() as stack:
@@ -209,8 +211,8 @@ def _draw_studies(paths: list[Path], target: _Target) -> None:
 
 def _draw_file(path: Path, shown: _Shown, target: _Target, talk: Talk) -> None:
     """Draw the figures of one file, and that of the recording that it was computed from."""
-    from vsacli.results.plots import chosen_figures
-    from vsacli.results.store.simulation import open_stored
+    from vsacli.results.charts.figures import chosen_figures
+    from vsacli.results.store.reader import open_stored
 
     with open_stored(path) as stored:
         talk.detail(result_line(stored))
@@ -229,7 +231,7 @@ def _draw_file(path: Path, shown: _Shown, target: _Target, talk: Talk) -> None:
 
 def draw_staged(file: Staged, figures: FigureFiles, talk: Talk) -> None:
     """Draw the figures of a file that this command has written."""
-    from vsacli.results.store.simulation import open_stored
+    from vsacli.results.store.reader import open_stored
 
     with open_stored(file.temporary) as stored:
         _draw(stored, file.path, figures, talk)
@@ -243,7 +245,8 @@ def _draw(
     variables: tuple[str, ...] | None = None,
 ) -> None:
     """Draw the figures of an open file and say which it has not the variables for."""
-    from vsacli.results.plots import draw_stored, drawings_of, omitted_figures
+    from vsacli.results.charts.figures import drawings_of, omitted_figures
+    from vsacli.results.plots import draw_stored
 
     if variables is None:
         for reason in omitted_figures(drawings_of(stored), stored.variables).values():
@@ -254,8 +257,9 @@ def _draw(
 
 
 def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Talk) -> None:
-    from vsacli.results.plots import compare_files, comparison_names
-    from vsacli.results.store.simulation import open_stored
+    from vsacli.results.charts.comparison import comparison_names
+    from vsacli.results.plots import compare_files
+    from vsacli.results.store.reader import open_stored
 
     stem = "-".join(path.stem for path in paths)
     files = target.figures(comparison_names(shown.variables), stem)
@@ -264,3 +268,97 @@ def _draw_comparison(paths: list[Path], shown: _Shown, target: _Target, talk: Ta
         for each in opened:
             talk.detail(result_line(each))
         files.save(compare_files([shown.of(each) for each in opened], shown.variables))
+
+
+def is_recording(path: str) -> bool:
+    """Return whether a file is a CSV table or a trajectory; false if that cannot be told."""
+    from vsacli.files.file_kinds import FileKind, recognise
+
+    try:
+        return recognise(path) in (FileKind.TABLE, FileKind.TRAJECTORY)
+    except (InputError, StorageError):
+        return False  # those who read results and simulations say what is wrong with it
+
+
+def draw_recording(
+    path: str,
+    robot_path: str | None,
+    joints: tuple[str, ...],
+    span: Span,
+    staged: Callable[[list[str], str], FigureFiles],
+    talk: Talk,
+) -> None:
+    """Draw the figure of a recording, or of a trajectory with recorded signals.
+
+    Args:
+        path: the file.
+        robot_path: the robot that it is of; None: joints are those of the columns.
+        joints: names of those to show; all if there are none.
+        span: first and last time to show, s.
+        staged: stages files for figures, given their names and what these begin with.
+        talk: shows how far the fit is.
+
+    Raises:
+        InputError: the file cannot be used, or nothing was fitted to it.
+        StorageError: the figure cannot be written.
+    """
+    from vsacli.documents.source import is_table
+    from vsacli.files.placeholder_robot import placeholder_robot
+    from vsacli.files.recordings.fit_curves import table_profiles
+    from vsacli.robot.file import load_robot
+    from vsacli.trajectory.file import load_trajectory
+
+    robot = placeholder_robot(path).robot if robot_path is None else load_robot(robot_path)
+    figures = staged([RECORDING], Path(path).stem)
+    if is_table(path):
+        profiles = table_profiles(path, robot, talk.fitting)
+    else:
+        profiles = [*load_trajectory(path, robot, progress=talk.fitting).estimates.values()]
+    if not any(profile.fitted for profile in profiles):
+        reason = "its signals are not recorded, or recorded with all derivatives"
+        raise InputError.one(f"has no spline to be shown: {reason}; plot the result of `vsacli invdyn`", path)
+    figures.save(recording_figure(robot, profiles, path, joints, span))
+
+
+def recording_figure(
+    robot: Robot,
+    profiles: Iterable[SampledProfile],
+    file: str | Path,
+    joints: tuple[str, ...] = (),
+    span: Span | None = None,
+) -> Figures:
+    """Return the figure of recorded signals, by its name.
+
+    Args:
+        robot: that was recorded.
+        profiles: the signals; a spline was fitted to at least one.
+        file: named in the title and in errors.
+        joints: names of those to show; all if there are none.
+        span: first and last time to show, s; all if it is None.
+
+    Raises:
+        InputError: there is no such joint, or no sample at these times.
+    """
+    from vsacli.files.recordings.fit_curves import recorded_curves
+    from vsacli.results.plots import recorded_figure
+    from vsacli.results.store.excerpt import WHOLE
+
+    curves = recorded_curves(profiles, robot.joint_types, file, joints, span or WHOLE)
+    return {RECORDING: recorded_figure(curves, f"{Path(file).stem}: recorded signals and their splines")}
+
+
+def has_recording(stored: StoredResult, talk: Talk) -> bool:
+    """Return whether the recording that a result was computed from can be drawn; a note says if it cannot."""
+    from vsacli.base.version import __version__
+
+    if stored.kind != "result" or not stored.report_json.get("fits"):
+        return False
+    inputs, made_by = stored.inputs(), stored.provenance()["generated_by"]
+    if not inputs or any(each.content is None for each in inputs):
+        reason = "the result does not hold it"
+    elif made_by != (this := f"vsacli {__version__}"):
+        reason = f"the result was computed by {made_by}, and this is {this}"
+    else:
+        return True
+    talk.note(f"{stored.path}: no figure of its recording: {reason}")
+    return False

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from vsacli.base.progress import Bar
     from vsacli.results.pages import RemedyText
     from vsacli.results.store.reader import StoredResult
-    from vsacli.studies.remedies import Suggestions
+    from vsacli.studies.search import Suggestions
 
 MENDABLE = ("infeasible", "singular", "over_limit")
 """Verdicts on results for which remedies are looked for."""
@@ -45,7 +45,7 @@ def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
         InputError: what a page needs is not installed.
         StorageError: as `Outputs.folder` and `Outputs.file`.
     """
-    from vsacli.results.pages.library import plotting_library
+    from vsacli.results.pages.document import plotting_library
 
     plotting_library()
     outputs.folder(folder)
@@ -67,7 +67,7 @@ def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
     from vsacli.files.stored_reports import stored_report
     from vsacli.results.pages import result_page
     from vsacli.results.store.excerpt import Excerpt
-    from vsacli.results.store.simulation import open_stored
+    from vsacli.results.store.reader import open_stored
 
     with ExitStack() as stack:
         whole = [stack.enter_context(open_stored(path)) for path in paths]
@@ -102,7 +102,7 @@ def _remedy(result: StoredResult, talk: Talk) -> RemedyText | None:
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.files.repetition import rebuilt
     from vsacli.results.pages import RemedyText
-    from vsacli.studies.remedies import suggest
+    from vsacli.studies.search import suggest
 
     try:
         provenance = result.provenance()
@@ -139,7 +139,7 @@ def _command(result: StoredResult, suggestions: Suggestions) -> tuple[str, str]:
     """What a shell does next: write the first suggestion, or list all again; announced, and as a command."""
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.base.texts import one_line
-    from vsacli.documents.changes import written
+    from vsacli.documents.reading import written
 
     inputs = result.inputs()
     files = [_named(each.path) for role in ("robot", "trajectory") for each in inputs if each.role == role]
@@ -165,7 +165,7 @@ def _named(path: str) -> str:
 def _studies(paths: list[Path]) -> str:
     from vsacli.base.tables import ReportText
     from vsacli.results.pages import study_page
-    from vsacli.results.store.stored_study import StoredStudy
+    from vsacli.results.store.study_table import StoredStudy
     from vsacli.studies.sweeps import StudySummary
 
     with ExitStack() as stack:

@@ -26,7 +26,7 @@ from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs, Staged
-    from vsacli.results.store.sensitivity_file import SensitivityWriter
+    from vsacli.results.store.derived_files import SensitivityWriter
     from vsacli.robot.model import Robot
     from vsacli.studies.sensitivities import Sensitivity, SensitivityRun
 
@@ -136,7 +136,7 @@ def unheard(_: object) -> None:
 
 
 def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
-    from vsacli.results.store.sensitivity_file import Number, SensitivityWriter
+    from vsacli.results.store.derived_files import Number, SensitivityWriter
 
     numbers = [Number(str(each), each.value, each.unit) for each in run.parameters]
     provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]])}
@@ -145,11 +145,14 @@ def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
 
 def _draw(found: Sensitivity, robot: Robot, folder: str, stem: str, outputs: Outputs) -> None:
     """The ranking, and with tolerances the bands of the motor torques."""
-    from vsacli.results.plots import Bar, FigureFiles, Torque, band_figure, ranking_figure
+    from vsacli.results.charts.optimum import Torque, band_sheet
+    from vsacli.results.plots import Bar, FigureFiles, ranking_figure
 
     title = f"{found.robot}, {found.trajectory}"
     bars = [Bar(f"{each.words} of {each.path}", each.share, each.most[0]) for each in found.top if each.most]
-    figures = {"ranking": ranking_figure(bars, title)}
+    names = ["ranking"] if found.curves is None else ["ranking", "band"]
+    files = FigureFiles(names, folder, stem, "png", outputs)
+    files.save({"ranking": ranking_figure(bars, title)})
     if found.curves is not None:
         time, values, deviation = found.curves
         torques = [
@@ -157,5 +160,4 @@ def _draw(found: Sensitivity, robot: Robot, folder: str, stem: str, outputs: Out
             for index, joint in enumerate(robot.joints)
             for motor in range(1, joint.actuator.motor_count + 1)
         ]
-        figures["band"] = band_figure(time, torques, title)
-    FigureFiles(figures, folder, stem, "png", outputs).save(figures)
+        files.save({"band": band_sheet(time, torques, title)})

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -28,7 +28,6 @@ from vsacli.cli.command_parts import (
 )
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, FOLDER, HDF5_FILE
-from vsacli.cli.plot import draw_staged
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -42,6 +41,26 @@ if TYPE_CHECKING:
 
 PROGRESS_STEPS = 1000
 FEEDBACK = "feedback-linearization"
+
+
+class Options(NamedTuple):
+    """Options that say what is simulated, as the command line has them."""
+
+    controller: str
+    poles: str | None
+    stiffness_poles: str | None
+    integral: bool
+    initial_error: tuple[float, ...]
+    initial_stiffness_error: tuple[float, ...]
+    perturb: float
+    sensor_noise: tuple[float, ...] | None
+    encoder_bits: int | None
+    seed: int
+    measured: Any
+    tolerance: str
+    rtol: float
+    atol: float
+    budget: int | None
 
 
 @click.command(
@@ -157,13 +176,13 @@ def simulate(
     """
     path = Path(f"{run_stem(robot, trajectory)}-simulation.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk, changes)
-    simulation = _prepared(inputs, **choices)
+    simulation = _prepared(inputs, Options(**choices))
     gains: Gains | None = simulation.keywords["gains"]
     if gains is not None:  # the file of the poles is one of the inputs that the result records
         arm = replace(inputs.robot, sources=(*inputs.robot.sources, *gains.sources))
         inputs = inputs._replace(robot=arm)
     from vsacli.base.outputs import Outputs
-    from vsacli.results.store.simulation import SimulationWriter
+    from vsacli.results.store.derived_files import SimulationWriter
 
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
@@ -176,6 +195,8 @@ def simulate(
             writer.write(found.history)
             writer.finish(found.report.as_json())
         if figures is not None:
+            from vsacli.cli.plot import draw_staged
+
             draw_staged(file, figures, talk)
     code = _show(found.report, as_json)
     talk.wrote(outputs)
@@ -183,7 +204,8 @@ def simulate(
 
 
 def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFiles:
-    from vsacli.results.plots import FigureFiles, simulation_drawings
+    from vsacli.results.charts.figures import simulation_drawings
+    from vsacli.results.plots import FigureFiles
 
     def drawn(variable: Variable) -> bool:
         return robot.has(variable) and any(any(joint.has(variable)) for joint in robot.joints)
@@ -191,26 +213,8 @@ def _figures(robot: Robot, folder: str, stem: str, outputs: Outputs) -> FigureFi
     return FigureFiles(simulation_drawings(drawn), folder, stem, "png", outputs)
 
 
-def _prepared(
-    inputs: Inputs,
-    *,
-    controller: str,
-    poles: str | None,
-    stiffness_poles: str | None,
-    integral: bool,
-    initial_error: tuple[float, ...],
-    initial_stiffness_error: tuple[float, ...],
-    perturb: float,
-    sensor_noise: tuple[float, ...] | None,
-    encoder_bits: int | None,
-    seed: int,
-    measured: Any,
-    tolerance: str,
-    rtol: float,
-    atol: float,
-    budget: int | None,
-) -> partial[Simulation]:
-    """The simulation that the options describe."""
+def _prepared(inputs: Inputs, options: Options) -> partial[Simulation]:
+    """Return the simulation that the options describe."""
     from vsacli.control.simulation import (
         GoalTolerance,
         InitialError,
@@ -220,42 +224,44 @@ def _prepared(
         simulate,
     )
 
-    gains: Gains | None = None
-    if controller == FEEDBACK:
-        gains = _gains(inputs.robot, poles, stiffness_poles, integral)
-    elif poles is not None or stiffness_poles is not None or integral:
-        raise InputError.one(f"poles and integral action need --controller {FEEDBACK}")
-    check_measured(measured, gains)
+    gains = _gains(inputs.robot, options)
+    check_measured(options.measured, gains)
     return partial(
         simulate,
         *inputs,
         gains=gains,
-        model=perturbed(inputs.robot, perturb, seed),
-        initial_error=InitialError(initial_error, initial_stiffness_error),
-        measured=measured,
-        sensors=_sensors(sensor_noise, encoder_bits, seed),
-        goal_tolerance=GoalTolerance.from_text(tolerance),
-        tolerances=Tolerances(rtol, atol),
-        budget=budget,
+        model=perturbed(inputs.robot, options.perturb, options.seed),
+        initial_error=InitialError(options.initial_error, options.initial_stiffness_error),
+        measured=options.measured,
+        sensors=_sensors(options),
+        goal_tolerance=GoalTolerance.from_text(options.tolerance),
+        tolerances=Tolerances(options.rtol, options.atol),
+        budget=options.budget,
     )
 
 
-def _sensors(noise: tuple[float, ...] | None, bits: int | None, seed: int) -> Sensors | None:
+def _sensors(options: Options) -> Sensors | None:
     from vsacli.control.simulation import Sensors
 
-    if noise is None and bits is None:
+    if options.sensor_noise is None and options.encoder_bits is None:
         return None
-    position, torque, *more = (*(noise or ()), 0.0, 0.0)
+    position, torque, *more = (*(options.sensor_noise or ()), 0.0, 0.0)
     if len(more) > 2:
         raise InputError.one(
             "--sensor-noise: expected RAD or RAD,NM: one for positions, one for motor torques"
         )
-    return Sensors(position, torque, bits, seed)
+    return Sensors(position, torque, options.encoder_bits, options.seed)
 
 
-def _gains(robot: Robot, poles: str | None, stiffness_poles: str | None, integral: bool) -> Gains:
+def _gains(robot: Robot, options: Options) -> Gains | None:
+    """Return the gains of feedback linearization; None of another controller."""
     from vsacli.control.poles import DEFAULT, gains_from_text, load_gains
 
+    poles, stiffness_poles, integral = options.poles, options.stiffness_poles, options.integral
+    if options.controller != FEEDBACK:
+        if poles is not None or stiffness_poles is not None or integral:
+            raise InputError.one(f"poles and integral action need --controller {FEEDBACK}")
+        return None
     if poles is not None and poles.endswith((".yaml", ".yml")):
         if stiffness_poles is not None:
             raise InputError.one("--stiffness-poles: the poles file holds these too", poles)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from vsacli.base.streams import STANDARD
+from vsacli.base.storage import STANDARD
 from vsacli.cli.command_parts import example, json_option, overwrite_option
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.file_names import FILE, HDF5_FILE
 
 if TYPE_CHECKING:
-    from vsacli.results.store.stored_study import StoredStudy
+    from vsacli.results.store.study_table import StoredStudy
 
 _SHARD = re.compile(r"(\d{1,6})/(\d{1,6})")
 
@@ -109,7 +109,7 @@ def study(
 
 def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json: bool, talk: Talk) -> int:
     from vsacli.base.outputs import Outputs
-    from vsacli.results.store.stored_study import StoredStudy
+    from vsacli.results.store.study_table import StoredStudy
     from vsacli.studies.sweeps import merge
 
     if output is None:

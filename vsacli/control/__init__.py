@@ -7,10 +7,9 @@ from vsacli.base.lazy import lazy_exports
 if TYPE_CHECKING:
     from vsacli.control.gains import Gains, Integral
     from vsacli.control.linearization import FeedbackLinearization, feedback_linearization
-    from vsacli.control.simulation.goal_tolerance import GoalTolerance
     from vsacli.control.simulation.integrator import Tolerances
-    from vsacli.control.simulation.monte_carlo import simulate_perturbed
-    from vsacli.control.simulation.perturbation import perturbed
+    from vsacli.control.simulation.joint_tracking import GoalTolerance
+    from vsacli.control.simulation.perturbation import perturbed, simulate_perturbed
     from vsacli.control.simulation.sensors import Sensors
     from vsacli.control.simulation.simulate import InitialError, simulate
 

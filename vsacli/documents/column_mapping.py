@@ -11,19 +11,15 @@ from typing import NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
-from vsacli.documents.table_header import Header, split_heading
-
-TIME = "time"
-"""The column of the stamps."""
+from vsacli.documents.csv_file import Header, split_heading
+from vsacli.documents.time_column import TIME, UNIT_WORDS_OF_TIMES
 
 REST = "rest"
 """Of columns to ignore: all that have no use."""
 
 UNIT_WORDS = {
     **dict.fromkeys(("deg", "degree", "degrees"), "deg"),
-    **dict.fromkeys(("ms", "msec", "millis"), "ms"),
-    **dict.fromkeys(("us", "usec", "micros"), "us"),
-    **dict.fromkeys(("ns", "nsec", "nanosec", "nanoseconds"), "ns"),
+    **UNIT_WORDS_OF_TIMES,
     **{word: word for word in ("rev", "mm", "cm")},
     "ma": "mA",
 }

@@ -1,23 +1,151 @@
-"""Files that say what the columns of recordings stand for: `vsacli-columns/1`."""
+"""What a document says of columns with other people's headers: the keys `columns` and `ignore`.
+
+They stand in trajectory files, and in files for recordings alone, `vsacli-columns/1`.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from vsacli.base.errors import FieldProblem, InputError
-from vsacli.base.units import RATE
-from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping, MappedColumn
-from vsacli.documents.column_source import columns_field, ignore_field
-from vsacli.documents.expression import ExpressionError
-from vsacli.documents.fields import LARGEST, POSITIVE, check_fields, number
-from vsacli.documents.number import evaluate
+from vsacli.base.units import DIMENSIONLESS, RATE
+from vsacli.documents import tree
+from vsacli.documents.column_mapping import AS_NAMED, REST, ColumnMapping, MappedColumn
+from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.field_kinds import Check, OwnKind, Refer, Schema, Text
+from vsacli.documents.fields import LARGEST, NON_ZERO, POSITIVE, check_fields, number, text, value
+from vsacli.documents.nested import read_record
 from vsacli.documents.reading import read_document
+from vsacli.documents.time_column import TIME
+from vsacli.documents.tree import INVALID, Node, Scope
 
 FORMAT = "vsacli-columns/1"
+
+
+class ColumnName(OwnKind):
+    """A column by its name in the header, or by its number."""
+
+    words = "name in the header, or number from 1"
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return a text, or a whole number if it stands without quotes."""
+        if isinstance(node, tree.Scalar) and node.plain and node.text.isdecimal():
+            return int(node.text)
+        return Text().read(node, label, scope)
+
+    def fault(self, content: Any) -> str | None:
+        """See `Kind.fault`."""
+        return "columns are counted from 1" if content == 0 else None
+
+    def schema(self, _refer: Refer) -> Schema:
+        """See `OwnKind.schema`."""
+        return {"type": ["string", "integer"]}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnSource(MappedColumn):
+    """A column of a table, and what its numbers are."""
+
+    column: str | int = value(ColumnName(), "the column")
+    unit: str | None = text(
+        "unit of its numbers, e.g. deg or ns; by default that in brackets in the header, else that of what it"
+        " stands for",
+        default=None,
+    )
+    factor: float = number(
+        DIMENSIONLESS,
+        "what its numbers are multiplied by, e.g. -1 or 2*pi/4096",
+        check=NON_ZERO,
+        default=1.0,
+    )
+    nanoseconds: str | int | None = value(
+        ColumnName(), "of `time` in whole seconds: the column of the nanoseconds beside it", default=None
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self, *self._problems())
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        if self.unit is not None and {"[", "]"} & set(self.unit):
+            yield FieldProblem(("unit",), f"is written without brackets, not {self.unit!r}")
+        if self.nanoseconds is not None and (self.unit or self.factor != 1):
+            yield FieldProblem(("nanoseconds",), "stands beside whole seconds, which need no unit or factor")
+
+
+class Columns(OwnKind):
+    """A mapping from names that are known here to columns of a table."""
+
+    words = "mapping from names of columns here to columns of the file, each a name, a number or a mapping"
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return `ColumnSource` by name."""
+        if not isinstance(node, tree.Mapping) or not node.entries:
+            return scope.unexpected(node, "a mapping such as {time: stamp, elbow.q: position}", label)
+        found = {name: self._source(entry, f"{label}.{name}", scope) for name, entry in node.entries.items()}
+        if INVALID in found.values():
+            return INVALID
+        return {
+            name: dataclasses.replace(source, place=(scope.problems.file, node.key_lines[name]))
+            for name, source in found.items()
+        }
+
+    def _source(self, node: Node, label: str, scope: Scope) -> Any:
+        if isinstance(node, tree.Mapping):
+            return read_record(ColumnSource, node, label, scope)
+        column = ColumnName().read(node, label, scope)
+        if column == 0:
+            return scope.unexpected(node, "a column, counted from 1", label)
+        return column if column is INVALID else ColumnSource(column=column)
+
+    def problems(self, path: Any, _check: Check | None, content: Any) -> Iterator[FieldProblem]:
+        """See `Kind.problems`; each entry has checked itself."""
+        for name, source in content.items():
+            if source.nanoseconds is not None and name != TIME:
+                yield FieldProblem((*path, name), f"only {TIME} has nanoseconds beside it")
+
+    def schema(self, refer: Refer) -> Schema:
+        """See `OwnKind.schema`."""
+        one = {"anyOf": [{"type": ["string", "integer"]}, refer(ColumnSource, None)]}
+        return {"type": "object", "minProperties": 1, "additionalProperties": one}
+
+    def json_value(self, content: Any, of_record: Callable[[Any], Any]) -> Any:
+        """See `OwnKind.json_value`."""
+        return {name: of_record(source) for name, source in content.items()}
+
+
+class Ignored(OwnKind):
+    """Names of columns to leave out, or the word for all that have no use."""
+
+    words = f"`{REST}`, or a list of columns"
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the word, or a tuple of names."""
+        if isinstance(node, tree.Sequence):
+            return tree.all_valid([ColumnName().read(item, label, scope) for item in node.items])
+        if isinstance(node, tree.Scalar) and node.text == REST:
+            return REST
+        return scope.unexpected(node, f"{REST} or a list of columns", label)
+
+    def schema(self, _refer: Refer) -> Schema:
+        """See `OwnKind.schema`."""
+        columns = {"type": "array", "items": {"type": ["string", "integer"]}}
+        return {"anyOf": [{"const": REST}, columns]}
+
+
+def columns_field() -> Any:
+    """Declare a field that says what columns stand for."""
+    doc = "what columns with other names stand for, e.g. {time: __time, elbow.q: '/joint_states/position[2]'}"
+    return value(Columns(), doc, default=None)
+
+
+def ignore_field() -> Any:
+    """Declare a field that says which columns are left out."""
+    return value(Ignored(), f"columns to leave out; `{REST}`: all that have no use", default=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +164,7 @@ class ColumnsFile:
 
 
 def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
-    """What a file says of the columns of recordings; without one, columns are what their names say.
+    """Return what a file says of the columns of recordings; without one, columns are what their names say.
 
     Raises:
         InputError: with every problem of the file, each with its line.
@@ -48,7 +176,7 @@ def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
 
 
 def checked_rate(given: Any) -> float:
-    """Rows per second, as a number or as a text that a file could hold.
+    """Return rows per second, as a number or as a text that a file could hold.
 
     Raises:
         InputError: it is not positive, or no number at all.

@@ -4,19 +4,33 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Iterator
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple, TypeAlias
 
 from vsacli.base.units import DIMENSIONLESS
-from vsacli.documents.fields import REQUIRED, Record, declared
-from vsacli.documents.records import Field, Line, Values, on_one_line
+from vsacli.documents.field_kinds import REQUIRED, Choice, Field, Interval, Kind, declared, on_one_line
+from vsacli.documents.nested import Items, OneOf, Pair, Record
+
+Values: TypeAlias = Mapping[str, Any]
+"""Values to be written, by key: numbers, texts, lists of them, and such mappings for records."""
 
 COMMENT_COLUMN = 44
 WIDTH = 110
 
 
+class _Line(NamedTuple):
+    """A line: its text, a comment on it, and whether a reader sees it."""
+
+    text: str
+    comment: str = ""
+    active: bool = True
+
+    def inside(self, indent: str = "  ") -> _Line:
+        return self._replace(text=indent + self.text)
+
+
 def commented_document(format_name: str, cls: type, values: Values, head: Iterable[str] = ()) -> str:
-    """A document of the record class `cls`.
+    """Return a document of the record class `cls`.
 
     Args:
         format_name: what its key `format` says.
@@ -24,13 +38,13 @@ def commented_document(format_name: str, cls: type, values: Values, head: Iterab
         values: of every required field, and of the optional ones that shall be set.
         head: lines of comment before it.
     """
-    lines = [Line(f"format: {format_name}"), *_record(cls, values, "")]
+    lines = [_Line(f"format: {format_name}"), *_record(cls, values, "")]
     comments = [f"# {line}".rstrip() for line in head]
     return "\n".join([*comments, *(text for line in lines for text in _rendered(line))]) + "\n"
 
 
-def _rendered(line: Line) -> Iterator[str]:
-    """A line and its comment, beside it or, if it is long, before it, on as many lines as it takes."""
+def _rendered(line: _Line) -> Iterator[str]:
+    """Yield a line and its comment, next to it or, if it is long, before it, on as many lines as needed."""
     text = line.text if line.active else f"# {line.text}"
     comments = [f"# {part}" for part in textwrap.wrap(line.comment, WIDTH - COMMENT_COLUMN - 2)]
     if len(text) < COMMENT_COLUMN and comments:
@@ -42,34 +56,59 @@ def _rendered(line: Line) -> Iterator[str]:
         yield text
 
 
-def _record(cls: type, values: Values, variant: str) -> Iterator[Line]:
-    """All fields of a record; those left out stand inactive, with what they then are."""
+def _record(cls: type, values: Values, variant: str) -> Iterator[_Line]:
+    """Yield all fields of a record; those left out are inactive, with their defaults."""
     variant = str(values.get(getattr(cls, "unit_variant", ""), variant))
-
-    def of_record(inner: type, its_values: Values) -> Iterator[Line]:
-        return _record(inner, its_values, variant)
-
     for name, (field, default) in declared(cls).items():
         comment = _comment(field, variant)
         if name in values:
-            yield from field.kind.lines(name, values[name], comment, of_record)
+            yield from _field(field.kind, name, values[name], comment, variant)
         elif default is REQUIRED:
             raise KeyError(f"{cls.__name__} needs a value of {name}")
         elif isinstance(field.kind, Record):
-            example = {} if default is not None else _example(field.kind.cls, variant)
-            yield from (line.inactive() for line in field.kind.lines(name, example, comment, of_record))
+            example: Values = {} if default is not None else field.kind.records[""].example(variant)  # type: ignore[attr-defined]
+            lines = _field(field.kind, name, example, comment, variant)
+            yield from (line._replace(active=False) for line in lines)
         else:
-            yield Line(f"{name}: {_default(default)}".rstrip(), comment).inactive()
+            yield _Line(f"{name}: {_default(default)}".rstrip(), comment, active=False)
 
 
-def _example(cls: Any, variant: str) -> Values:
-    """Values of a record that is absent by default."""
-    values: Values = cls.example(variant)
-    return values
+def _field(kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
+    """Yield a field from a value as in a file; the nested ones farther to the right."""
+    match kind:
+        case Pair(item):
+            yield from _field(item, name, value, comment, variant)
+        case Record(cls):
+            yield _Line(f"{name}:", comment)
+            yield from (line.inside() for line in _record(cls, value, variant))
+        case OneOf(variants):
+            chosen = value["type"]
+            others = [word for word in variants if word != chosen]
+            yield _Line(f"{name}:", comment)
+            yield _Line(f"type: {chosen}", f"or {', '.join(others)}" if others else "").inside()
+            yield from (line.inside() for line in _record(variants[chosen], value, variant))
+        case Items() if kind.records or isinstance(value[0], list):
+            yield _Line(f"{name}:", comment)
+            yield from _entries(kind, value, variant)
+        case _:
+            yield _Line(f"{name}: {on_one_line(value)}", comment)
+
+
+def _entries(kind: Items, values: Any, variant: str) -> Iterator[_Line]:
+    """Yield lists a line; of records the first with all keys and comments, the others with what is set."""
+    if not kind.records:
+        yield from (_Line(f"- {on_one_line(entry)}").inside() for entry in values)
+        return
+    first, *others = values
+    entries = [list(_record(kind.records[""], first, variant))]
+    entries += [[_Line(f"{key}: {on_one_line(each)}") for key, each in other.items()] for other in others]
+    for head, *rest in entries:
+        yield head.inside("- ").inside()
+        yield from (line.inside().inside() for line in rest)
 
 
 def _default(default: Any) -> str:
-    """A default as it may be written, or nothing."""
+    """Return a default as it may be written, or nothing."""
     numbers = default if isinstance(default, tuple) else (default,)
     if all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):
         return on_one_line(default)
@@ -77,7 +116,13 @@ def _default(default: Any) -> str:
 
 
 def _comment(field: Field, variant: str) -> str:
-    """What a field is, with its unit."""
+    """Return what a field is, with its unit, and its forms where they cannot be guessed."""
     unit = field.quantity.unit(variant) if variant else str(field.quantity)
-    sentence = f"{field.doc}{field.kind.forms}"
-    return sentence if unit == str(DIMENSIONLESS) else f"{unit}; {sentence}"
+    match field.kind:
+        case Choice(options=options):
+            forms = f" ({' or '.join(options)})"
+        case Interval():
+            forms = " ([lower, upper] or one number)"
+        case _:
+            forms = ""
+    return f"{field.doc}{forms}" if unit == str(DIMENSIONLESS) else f"{unit}; {field.doc}{forms}"

@@ -1,10 +1,11 @@
-"""The text of a YAML file with other values in it; comments and layout stay as they are."""
+"""Edits of the text of a YAML file: other values, aliases written out, remarks; the rest stays as it is."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -14,13 +15,25 @@ from yaml import MappingNode, Node, ScalarNode
 from vsacli.base.errors import InputError
 from vsacli.base.texts import for_yaml
 
-__all__ = ["MappingNode", "Node", "ScalarNode", "edited", "moved_files", "node_at", "root_of", "texts_at"]
+__all__ = [
+    "MappingNode",
+    "Node",
+    "ScalarNode",
+    "edited",
+    "moved_files",
+    "node_at",
+    "root_of",
+    "texts_at",
+    "unaliased",
+    "with_errors",
+]
 
 _Words: TypeAlias = tuple[str, ...]
+_EARLIER_ERRORS = re.compile(r"(?:\s*#|;) \w+ \+- [^\s,;]+(?:, \w+ \+- [^\s,;]+)*$")
 
 
 def edited(text: str, values: Mapping[str, Any]) -> str:
-    """The text with other values at some paths, or put in where there is none.
+    """Return the text with other values at some paths, or put in where there is none.
 
     Args:
         text: a YAML document that can be read.
@@ -38,7 +51,7 @@ def edited(text: str, values: Mapping[str, Any]) -> str:
 
 
 def moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, str]]:
-    """Path and value of every file that a document in a folder names, as seen from another folder."""
+    """Yield path and value of every file that a document in a folder names, as seen from another folder."""
     if os.path.samefile(origin, folder):
         return
     for path, file in texts_at(text, "file"):
@@ -46,20 +59,28 @@ def moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, st
 
 
 def node_at(root: yaml.Node, path: str) -> yaml.Node | None:
-    """What stands at a path; None if it leads nowhere."""
-    node: yaml.Node | None = root
-    for word in path.split("."):
+    """Return what stands at a path; None if it leads nowhere."""
+    words = path.split(".")
+    nodes = list(_along(root, words))
+    return nodes[-1] if len(nodes) == len(words) else None
+
+
+def _along(node: yaml.Node | None, words: Iterable[str]) -> Iterator[yaml.Node]:
+    """Yield the nodes that a path leads to and through, as far as it goes."""
+    for word in words:
         node = None if node is None else dict(_entries(node)).get(word)
-    return node
+        if node is None:
+            return
+        yield node
 
 
 def texts_at(text: str, key: str) -> Iterator[tuple[str, str]]:
-    """Path and value of every text under a key, wherever in a YAML document."""
+    """Yield path and value of every text under a key, wherever in a YAML document."""
     yield from _texts_at(root_of(text), key, ())
 
 
 def root_of(text: str) -> yaml.Node:
-    """The nodes of a document that can be read."""
+    """Return the nodes of a document that can be read."""
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     assert root is not None, "a document that can be read"
     return root
@@ -73,7 +94,7 @@ def _texts_at(node: yaml.Node, key: str, place: _Words) -> Iterator[tuple[str, s
 
 
 def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
-    """The words of a path that lead on from a node, and where to."""
+    """Yield the words of a path that lead on from a node, and where to."""
     if isinstance(node, yaml.MappingNode):
         yield from ((key.value, entry) for key, entry in node.value)
     elif isinstance(node, yaml.SequenceNode):
@@ -81,7 +102,7 @@ def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
 
 
 def _edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
-    """From where to where the text becomes what."""
+    """Return the start and the end of a piece of the text, and what replaces it."""
     *way, key = words
     node = root
     for word in way:
@@ -133,3 +154,82 @@ def _written(value: Any) -> str:
         case list():
             return "[" + ", ".join(map(_written, value)) + "]"
     return json.dumps(value)
+
+
+def unaliased(text: str, paths: Iterable[str]) -> str:
+    """Return the text with aliases written out, of all that some paths lead through.
+
+    Args:
+        text: a YAML document that can be read.
+        paths: words joined by dots, entries of lists by index; those that lead nowhere do not count.
+    """
+    ways = [tuple(path.split(".")) for path in paths]
+    while True:
+        shared = _shared(text, ways)
+        if not shared:
+            return text
+        for start, end, node in sorted(shared, key=lambda alias: alias[0], reverse=True):
+            text = text[:start] + _flow(text, node) + text[end:]
+
+
+def _shared(text: str, ways: Iterable[tuple[str, ...]]) -> list[tuple[int, int, yaml.Node]]:
+    """Return aliases, from where to where, of nodes that some path leads to or through, and those nodes."""
+    root = root_of(text)
+    nodes = {node.start_mark.index: node for way in ways for node in _along(root, way)}
+    anchors: dict[str, yaml.Node] = {}
+    found = []
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            if event.anchor in anchors:
+                found.append((*_place(event), anchors[event.anchor]))
+        elif isinstance(event, yaml.NodeEvent) and event.anchor and _place(event)[0] in nodes:
+            anchors[event.anchor] = nodes[_place(event)[0]]
+    return found
+
+
+def _place(event: yaml.Event) -> tuple[int, int]:
+    """Return start and end in the text."""
+    assert event.start_mark is not None, "as of every event of a text"
+    assert event.end_mark is not None, "likewise"
+    return event.start_mark.index, event.end_mark.index
+
+
+def _flow(text: str, node: yaml.Node) -> str:
+    """Return a node on one line, its scalars as they stand."""
+    if isinstance(node, yaml.MappingNode):
+        return "{" + ", ".join(f"{key.value}: {_flow(text, value)}" for key, value in node.value) + "}"
+    if isinstance(node, yaml.SequenceNode):
+        return "[" + ", ".join(_flow(text, value) for value in node.value) + "]"
+    own = text[node.start_mark.index : node.end_mark.index]
+    return own.partition(" ")[2] if own.startswith("&") else own
+
+
+def with_errors(text: str, errors: Mapping[str, str]) -> str:
+    """Return the text with remarks such as `k +- 0.4` on the lines of the numbers at some paths.
+
+    Args:
+        text: a YAML document that can be read.
+        errors: by path, entries of lists by index; those of numbers that do not stand there do not count.
+    """
+    root = root_of(text)
+    by_line: dict[int, list[str]] = {}
+    for path, error in errors.items():
+        *_, key = path.split(".")
+        node = node_at(root, path)
+        if node is not None:
+            by_line.setdefault(node.start_mark.line, []).append(f"{key} +- {error}")
+    lines = text.split("\n")
+    ends = _content_ends(text)
+    for number, remarks in by_line.items():
+        line = _EARLIER_ERRORS.sub("", lines[number].rstrip())
+        mark_ = "; " if "#" in line[ends[number] :] else "  # "
+        lines[number] = line + mark_ + ", ".join(remarks)
+    return "\n".join(lines)
+
+
+def _content_ends(text: str) -> dict[int, int]:
+    """Return the column in which the last token of each line ends, behind which a comment may stand."""
+    ends: dict[int, int] = {}
+    for token in yaml.scan(text, Loader=yaml.SafeLoader):
+        ends[token.end_mark.line] = max(ends.get(token.end_mark.line, 0), token.end_mark.column)
+    return ends

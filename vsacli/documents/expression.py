@@ -1,17 +1,21 @@
-"""Expressions in documents: numbers, words and functions, + - * / and powers, parsed into steps.
+"""Expressions in documents: one grammar for formulas, for numbers such as `90 deg`, and for units.
 
 Whoever reads a document says which words there are. A text is never given to Python, and neither its length
-nor its nesting can exhaust anything.
+nor its nesting can exhaust anything. A number is a decimal, an expression with `pi`, or an angle in degrees.
+Units stand in headers of tables, e.g. `deg/s^2` or `N m/(rad s)`.
 """
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 from collections.abc import Callable, Collection, Hashable, Mapping
 from typing import Any, NamedTuple, NoReturn
 
 from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError
+from vsacli.base.units import ANY_SI_UNIT
 
 NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 """A decimal number without sign."""
@@ -22,6 +26,8 @@ MAX_NESTING = 200
 _TOKEN = re.compile(
     rf"(?P<space>[ \t]+)|(?P<number>{NUMBER})|(?P<name>[^\W\d]\w*)|(?P<symbol>\*\*|[-+*/^()])", re.ASCII
 )
+_UNIT_TOKEN = re.compile(r"(?P<space>\s+)|(?P<number>[0-9]+)|(?P<name>[A-Za-z]+)|(?P<symbol>[*/^()])")
+_EXPONENTS = ("1", "2", "3", "4")
 _POWER = 3
 _BINDING = {"+": 1, "-": 1, "*": 2, "/": 2, "^": _POWER, "**": _POWER}
 """How tightly operators bind; powers are taken from right to left."""
@@ -60,12 +66,15 @@ class Grammar(NamedTuple):
         functions: words that take one argument in parentheses.
         powers: whether `^`, which may be written `**`, is there.
         max_length: of the text.
+        of_units: whether words are units: a blank multiplies, numbers are exponents from 1 to 4, with or
+            without `^`, and a product behind a division is ambiguous.
     """
 
     names: Collection[str]
     functions: Collection[str]
     powers: bool
     max_length: int
+    of_units: bool = False
 
 
 class Step(NamedTuple):
@@ -126,7 +135,7 @@ def parse(text: str, grammar: Grammar) -> Expression:
     """
     if len(text) > grammar.max_length:
         raise ExpressionError(f"longer than {grammar.max_length} characters")
-    return _Parser(_tokens(text), grammar).parsed()
+    return _Parser(_tokens(text, _UNIT_TOKEN if grammar.of_units else _TOKEN), grammar).parsed()
 
 
 class _Token(NamedTuple):
@@ -135,10 +144,10 @@ class _Token(NamedTuple):
     place: int
 
 
-def _tokens(text: str) -> list[_Token]:
+def _tokens(text: str, token: re.Pattern[str]) -> list[_Token]:
     tokens, position = [], 0
     while position < len(text):
-        found = _TOKEN.match(text, position)
+        found = token.match(text, position)
         if not found:
             raise ExpressionError(f"unexpected character {text[position]!r}", position + 1)
         if found["number"] and re.match(r"0\d", found["number"]):
@@ -172,14 +181,22 @@ class _Parser:
         self._nesting += 1
         if self._nesting > MAX_NESTING:
             raise ExpressionError(f"nested deeper than {MAX_NESTING} levels", self._next.place)
-        left = self._operand()
-        while (tightness := _BINDING.get(self._next.text, 0)) >= binding:
-            if tightness == _POWER and not self._grammar.powers:
+        left, divided = self._operand(), False
+        while (tightness := _BINDING.get(symbol := self._operator(), 0)) >= binding:
+            ambiguous = self._grammar.of_units and divided and symbol != "/"
+            if ambiguous or (tightness == _POWER and not self._grammar.powers):
                 self._refuse("another operator")
-            symbol = self._take().text
+            if symbol == self._next.text:
+                self._take()
+            divided |= symbol == "/"
             left = self._step(symbol, left, self._expression(tightness + (tightness != _POWER)))
         self._nesting -= 1
         return left
+
+    def _operator(self) -> str:
+        """The operator that comes next; between units it may be left out."""
+        juxtaposed = self._grammar.of_units and (self._next.kind == "name" or self._next.text == "(")
+        return "*" if juxtaposed else self._next.text
 
     def _operand(self) -> int:
         """The step of a number, a name, a function, what is in parentheses, or one of these with signs."""
@@ -189,11 +206,24 @@ class _Parser:
         if signed:
             inner = self._expression(_POWER)
             return self._step("negative", inner) if negative else inner
+        if self._grammar.of_units:
+            return self._unit()
         if self._next.kind == "number":
             return self._step("number", float(self._take().text))
         if self._next.kind == "name":
             return self._word()
         return self._parentheses("a number, a word or (")
+
+    def _unit(self) -> int:
+        """The step of a unit or of what is in parentheses, with an exponent if one follows."""
+        unit = self._word() if self._next.kind == "name" else self._parentheses("a unit or (")
+        if self._next.text == "^":
+            self._take()
+        elif self._next.kind != "number":
+            return unit
+        if self._next.text not in _EXPONENTS:
+            self._refuse("an exponent from 1 to 4")
+        return self._step("^", unit, self._step("number", float(self._take().text)))
 
     def _word(self) -> int:
         _, word, place = self._take()
@@ -225,3 +255,180 @@ class _Parser:
     def _refuse(self, expected: str) -> NoReturn:
         _, text, place = self._next
         raise ExpressionError(f"expected {expected}, found {repr(text) if text else 'the end'}", place)
+
+
+MAX_LENGTH = 200
+ANGLES = ("rad", "rad/s", str(ANY_SI_UNIT))
+"""Units in which `90 deg` may be written."""
+
+BOOLEANS = frozenset({"y", "n", "yes", "no", "on", "off", "true", "false"})
+"""Words that YAML 1.1 takes for booleans, in lower case."""
+
+_NUMBERS = Grammar(names=("pi",), functions=(), powers=False, max_length=MAX_LENGTH)
+_DECIMAL = re.compile(rf"[+-]?(?!0\d){NUMBER}", re.ASCII)
+_DEGREES = re.compile(rf"(?P<sign>[+-]?)\s*(?P<value>{NUMBER}|\(.*\))\s*deg", re.ASCII)
+
+_REFUSED_FORMS = {
+    r"[+-]?\.?(nan|inf|infinity)": "only finite numbers can be used",
+    r"[+-]?\d+(:\d+)+(\.\d*)?": "base 60 is not read; write the number in decimal",
+    r"[+-]?0[xob]\w*": "write the number in decimal",
+    r"[+-]?\d+(_\d+)+(\.\d*)?": "write the number without underscores",
+    r"[+-]?\d+,\d+": "write a decimal point, not a comma",
+    r".*°": "unexpected character '°'; degrees are written as in `90 deg`",
+}
+"""What to advise for forms that are no expressions."""
+
+
+def evaluate(text: str, unit: str) -> float:
+    """The number a text stands for.
+
+    Args:
+        text: e.g. `1e-5`, `-(pi/2 + 0.1)`, `90 deg`.
+        unit: of the number; degrees, converted to radians, are admitted for ANGLES only.
+
+    Raises:
+        ExpressionError: anything else, or a value that is not finite.
+    """
+    if len(text) > MAX_LENGTH:
+        raise ExpressionError(f"longer than {MAX_LENGTH} characters")
+    text = text.strip()
+    if text.lower() in BOOLEANS:
+        raise ExpressionError("YAML takes this word for a boolean")
+    try:
+        value = _degrees(text, unit) if text.endswith("deg") else _expression(text)
+    except ExpressionError:
+        for form, advice in _REFUSED_FORMS.items():
+            if re.fullmatch(form, text, re.IGNORECASE):
+                raise ExpressionError(advice) from None
+        raise
+    if not math.isfinite(value):
+        raise ExpressionError("the value is too large for a floating-point number")
+    return value
+
+
+def _degrees(text: str, unit: str) -> float:
+    if unit not in ANGLES:
+        raise ExpressionError(f"degrees are for angles only, and the unit here is {unit}")
+    parts = _DEGREES.fullmatch(text)
+    if not parts:
+        raise ExpressionError(
+            "before `deg`, write one number, or an expression in parentheses as in `(90/2) deg`"
+        )
+    inner = parts["value"].removeprefix("(").removesuffix(")")
+    return math.radians(float(parts["sign"] + "1") * _expression(inner))
+
+
+def _expression(text: str) -> float:
+    if _DECIMAL.fullmatch(text):
+        return float(text)
+    try:
+        return float(parse(text, _NUMBERS).value({"pi": math.pi}, {}))
+    except ExpressionError as error:
+        remedy = "; write a number, or an expression with + - * /, parentheses and pi"
+        raise ExpressionError(error.reason, remedy=remedy) from None
+    except ZeroDivisionError:
+        raise ExpressionError("division by zero") from None
+
+
+BASES: dict[str, tuple[float, dict[str, int]]] = {
+    "rad": (1.0, {"rad": 1}),
+    "deg": (math.pi / 180, {"rad": 1}),
+    "rev": (2 * math.pi, {"rad": 1}),
+    "rpm": (2 * math.pi / 60, {"rad": 1, "s": -1}),
+    "m": (1.0, {"m": 1}),
+    "cm": (1e-2, {"m": 1}),
+    "mm": (1e-3, {"m": 1}),
+    "um": (1e-6, {"m": 1}),
+    "s": (1.0, {"s": 1}),
+    "ms": (1e-3, {"s": 1}),
+    "us": (1e-6, {"s": 1}),
+    "ns": (1e-9, {"s": 1}),
+    "min": (60.0, {"s": 1}),
+    "N": (1.0, {"N": 1}),
+    "mN": (1e-3, {"N": 1}),
+    "kN": (1e3, {"N": 1}),
+    "Nm": (1.0, {"N": 1, "m": 1}),
+    "mNm": (1e-3, {"N": 1, "m": 1}),
+    "Nmm": (1e-3, {"N": 1, "m": 1}),
+    "J": (1.0, {"N": 1, "m": 1}),
+    "W": (1.0, {"N": 1, "m": 1, "s": -1}),
+    "kg": (1.0, {"N": 1, "m": -1, "s": 2}),
+    "g": (1e-3, {"N": 1, "m": -1, "s": 2}),
+    "A": (1.0, {"A": 1}),
+    "mA": (1e-3, {"A": 1}),
+    "V": (1.0, {"V": 1}),
+    "mV": (1e-3, {"V": 1}),
+    "ohm": (1.0, {"V": 1, "A": -1}),
+    "mohm": (1e-3, {"V": 1, "A": -1}),
+}
+"""Size in SI and dimensions of each symbol; an angle counts as a dimension, so that N m is not N m/rad."""
+
+_SPELLINGS = str.maketrans(
+    {
+        "·": "*",
+        ".": "*",
+        "°": "deg",
+        "²": "^2",
+        "³": "^3",
+        "⁴": "^4",
+        "μ": "u",
+        "µ": "u",
+        "Ω": "ohm",
+        "\u2126": "ohm",
+    }
+)
+_UNITS = Grammar(BASES, (), powers=False, max_length=40, of_units=True)
+
+
+class _Unit:
+    """A unit: its size in SI, and its dimensions without zero exponents."""
+
+    def __init__(self, size: float, dimensions: Mapping[str, int]) -> None:
+        self.size = size
+        self.dimensions = {name: exponent for name, exponent in dimensions.items() if exponent}
+
+    def __mul__(self, other: _Unit) -> _Unit:
+        return self._times(other, 1)
+
+    def __truediv__(self, other: _Unit) -> _Unit:
+        return self._times(other, -1)
+
+    def __pow__(self, exponent: int) -> _Unit:
+        return _Unit(1.0, {})._times(self, exponent)
+
+    def _times(self, other: _Unit, power: int) -> _Unit:
+        names = {**self.dimensions, **other.dimensions}
+        dimensions = {
+            name: self.dimensions.get(name, 0) + power * other.dimensions.get(name, 0) for name in names
+        }
+        return _Unit(self.size * other.size**power, dimensions)
+
+
+def conversion_factor(text: str, expected: str) -> float:
+    """What a number in a unit is to be multiplied by to be one in another unit.
+
+    Args:
+        text: the unit found: symbols of `BASES` with `^`, `*`, `/` and parentheses, a blank for a product.
+        expected: the unit wanted, likewise.
+
+    Raises:
+        InputError: the unit is not understood, or is one of something else.
+    """
+    wanted = _parsed(expected)
+    try:
+        found = _parsed(text)
+    except ExpressionError:
+        unknown = f"the unit [{text[: _UNITS.max_length]}] is not understood"
+        understood = f"{', '.join(BASES)} with * / ^ and parentheses"
+        message = f"{unknown}; expected {expected} or the like, made of {understood}"
+        raise InputError.one(message) from None
+    if found.dimensions != wanted.dimensions:
+        raise InputError.one(f"the unit [{text}] is one of something else; expected {expected} or the like")
+    return found.size / wanted.size
+
+
+def _parsed(text: str) -> _Unit:
+    """Return the unit that a text stands for."""
+    expression = parse(text.translate(_SPELLINGS), _UNITS)
+    unit: _Unit = expression.value({name: _Unit(*BASES[name]) for name in expression.names}, {}, int)
+    return unit

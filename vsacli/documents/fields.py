@@ -1,7 +1,7 @@
 """Declaring the fields of a record once, for the file reader, the constructor checks and the documentation.
 
 Record classes take all they need from here: the functions that make attributes, the kinds of nested values,
-and conditions; `records` says what else a record class may have.
+and conditions; `field_kinds` says what else a record class may have.
 """
 
 from __future__ import annotations
@@ -11,11 +11,30 @@ import math
 from typing import Any
 
 from vsacli.base.units import Quantity
-from vsacli.documents.kinds.lists import Items, Pair
-from vsacli.documents.kinds.nested import OneOf, Record
-from vsacli.documents.kinds.single import IDENTIFIER, Boolean, Choice, Integer, Name, Number, TableFile, Text
-from vsacli.documents.kinds.vectors import Interval, NamedNumbers, PerJoint, Vector
-from vsacli.documents.records import LARGEST, REQUIRED, SMALLEST, Check, Field, Kind, check_fields, declared
+from vsacli.documents.field_kinds import (
+    IDENTIFIER,
+    LARGEST,
+    REQUIRED,
+    SMALLEST,
+    Boolean,
+    Check,
+    Choice,
+    Field,
+    Integer,
+    Interval,
+    Kind,
+    Name,
+    NamedNumbers,
+    Number,
+    OwnKind,
+    Share,
+    TableFile,
+    Text,
+    Vector,
+    check_fields,
+    declared,
+)
+from vsacli.documents.nested import Items, OneOf, OneOrMore, Pair, PerJoint, Record
 
 __all__ = [
     "FINITE",
@@ -38,9 +57,12 @@ __all__ = [
     "NamedNumbers",
     "Number",
     "OneOf",
+    "OneOrMore",
+    "OwnKind",
     "Pair",
     "PerJoint",
     "Record",
+    "Share",
     "TableFile",
     "Text",
     "Vector",

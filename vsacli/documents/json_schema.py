@@ -11,14 +11,44 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from vsacli.base.units import DIMENSIONLESS
-from vsacli.documents.records import REQUIRED, Field, Schema, declared
+from vsacli.base.texts import MOST_LETTERS
+from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, Quantity
+from vsacli.documents.expression import ANGLES, MAX_LENGTH
+from vsacli.documents.field_kinds import (
+    IDENTIFIER,
+    LARGEST,
+    REQUIRED,
+    Boolean,
+    Check,
+    Choice,
+    Field,
+    Integer,
+    Interval,
+    Kind,
+    Name,
+    NamedNumbers,
+    Number,
+    OwnKind,
+    Schema,
+    Share,
+    Text,
+    Vector,
+    declared,
+)
+from vsacli.documents.nested import Items, OneOf, OneOrMore, Pair, PerJoint, Record
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
+EXPRESSION = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*$"
+ANGLE = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*(deg)?[ \t]*$"
+"""How expressions look."""
+
+PRINTABLE = r"^[^\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
+"""How names look."""
+
 
 def json_schema(cls: type, format_name: str, title: str) -> Schema:
-    """The schema of documents that are read into the record class `cls` and begin with `format: ...`."""
+    """Return the schema of documents read into the record class `cls`; they begin with `format: ...`."""
     builder = _Builder()
     document = builder.record(cls, {"format": {"const": format_name}}, ("format",))
     return {"$schema": DIALECT, "title": title, **document, "$defs": builder.definitions}
@@ -31,7 +61,7 @@ class _Builder:
         self.definitions: dict[str, Schema] = {}
 
     def record(self, cls: type, beside: Mapping[str, Schema], required: tuple[str, ...] = ()) -> Schema:
-        """The schema of a mapping with the fields of a record class, and keys `beside` them."""
+        """Return the schema of a mapping with the fields of a record class, and keys `beside` them."""
         fields = declared(cls)
         return {
             "type": "object",
@@ -44,16 +74,43 @@ class _Builder:
         }
 
     def _field(self, field: Field, default: Any) -> Schema:
-        schema = field.kind.schema(field.check, self._reference)
+        described = field.doc if field.quantity == DIMENSIONLESS else f"{field.doc}, {field.quantity}"
         shown = _json_value(default)
+        schema = self._value(field.kind, field.check)
+        return {"description": described, **schema, **({} if shown is None else {"default": shown})}
+
+    def _value(self, kind: Kind, check: Check | None) -> Schema:
+        """Return the schema of values of a kind whose numbers meet a condition."""
+        match kind:
+            case OwnKind():
+                return kind.schema(self._reference)
+            case Record(cls):
+                return self._reference(cls)
+            case OneOf(variants):
+                return self._selected(variants)
+            case OneOrMore(item=item):
+                return {"anyOf": [self._value(item, check), _list(self._value(item, check))]}
+            case Items(item=item):
+                return _list(self._value(item, check))
+            case Pair(item):
+                one = self._value(item, check)
+                return {"if": {"type": "array"}, "then": _list(one, 2), "else": one}
+        return _single(kind, check) or _of_numbers(kind, check)
+
+    def _selected(self, variants: Mapping[str, type]) -> Schema:
+        """Return the schema of a mapping whose `type` decides what else it has."""
         return {
-            "description": _described(field),
-            **schema,
-            **({} if shown is None else {"default": shown}),
+            "type": "object",
+            "properties": {"type": {"enum": list(variants)}},
+            "required": ["type"],
+            "allOf": [
+                {"if": {"properties": {"type": {"const": word}}}, "then": self._reference(variant, word)}
+                for word, variant in variants.items()
+            ],
         }
 
     def _reference(self, cls: type, word: str | None = None) -> Schema:
-        """A reference to the definition of a record, of the variant `word` if it is one of several."""
+        """Return a reference to the definition of a record, of the variant `word` if it is one of several."""
         name = cls.__name__ if word is None else f"{cls.__name__}.{word}"
         if name not in self.definitions:
             self.definitions[name] = {}  # so that a record may hold records of its own class
@@ -63,12 +120,70 @@ class _Builder:
         return {"$ref": f"#/$defs/{name}"}
 
 
-def _described(field: Field) -> str:
-    return field.doc if field.quantity == DIMENSIONLESS else f"{field.doc}, {field.quantity}"
+def _list(item: Schema, length: int | None = None) -> Schema:
+    """Return the schema of lists of a length, or of any but zero."""
+    if length is None:
+        return {"type": "array", "minItems": 1, "items": item}
+    return {"type": "array", "items": item, "minItems": length, "maxItems": length}
+
+
+def _single(kind: Kind, check: Check | None) -> Schema:
+    """Return the schema of a single value; nothing if the kind has several numbers."""
+    match kind:
+        case Share():
+            per_cent = {"type": "string", "pattern": EXPRESSION[:-1] + "%$"}
+            return {"anyOf": [*_number(kind.unit, check)["anyOf"], per_cent]}
+        case Number():
+            return _number(kind.unit, check)
+        case Integer():
+            keywords = {} if check is None else check.keywords
+            return {"anyOf": [{"type": "integer", **keywords}, _expression(EXPRESSION)]}
+        case Boolean():
+            return {"type": "boolean"}
+        case Name():
+            lengths = {"minLength": 1, "maxLength": MOST_LETTERS}
+            return {"type": ["string", "number"], **lengths, "pattern": PRINTABLE}
+        case Text(identifier=True):
+            return {"type": "string", "pattern": f"^{IDENTIFIER.pattern}$"}
+        case Text():
+            return {"type": ["string", "number"]}  # YAML may take a text for a number
+        case Choice():
+            return {"enum": list(kind.options)}
+    return {}
+
+
+def _of_numbers(kind: Kind, check: Check | None) -> Schema:
+    """Return the schema of several numbers, or of the path of a file that has them."""
+    match kind:
+        case Vector():
+            return _list(_number(kind.item.unit, check), kind.length)
+        case Interval():
+            bound = _number(kind.item.unit, None)
+            return {"anyOf": [*bound["anyOf"], _list(bound, 2)]}
+        case NamedNumbers():
+            return {"type": "object", "additionalProperties": _number(ANY_SI_UNIT, check)}
+        case PerJoint():
+            numbers = _number(kind.unit, check)["anyOf"]
+            entry = {"anyOf": [*numbers, {"type": "null"}]}
+            names = {"pattern": f"^{IDENTIFIER.pattern}$"}
+            by_name = {"type": "object", "propertyNames": names, "additionalProperties": entry}
+            return {"anyOf": [*numbers, _list(entry), by_name]}
+    return {"type": "string"}
+
+
+def _number(unit: Quantity, check: Check | None) -> Schema:
+    """Return the schema of a number within the bounds, or of an expression."""
+    keywords = {"minimum": -LARGEST, "maximum": LARGEST, **({} if check is None else check.keywords)}
+    pattern = ANGLE if {unit.revolute, unit.prismatic} & set(ANGLES) else EXPRESSION
+    return {"anyOf": [{"type": "number", **keywords}, _expression(pattern)]}
+
+
+def _expression(pattern: str) -> Schema:
+    return {"type": "string", "pattern": pattern, "maxLength": MAX_LENGTH}
 
 
 def _json_value(default: Any) -> Any:
-    """A default that a document could hold, or None."""
+    """Return a default that a document could hold, or None."""
     match default:
         case bool() | str() if default != "":
             return default

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple, TypeVar
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.documents import tree
-from vsacli.documents.kinds.lists import Pair
-from vsacli.documents.kinds.nested import scope_inside
-from vsacli.documents.records import Kind, declared, on_one_line
+from vsacli.documents.field_kinds import Kind, declared, on_one_line
+from vsacli.documents.nested import Pair, scope_inside
+from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import Scope
 
@@ -158,8 +158,8 @@ class _Replacement(NamedTuple):
             raise InputError.one(f"there is nothing at {_joined(place)}; replace it as a whole")
         if isinstance(kind, Pair) and words[0] not in SIDES:
             return self._in_pair(kind, content, words, place)
-        if kind.each is not None:
-            return self._in_list(kind, kind.each, content, words, place)
+        if kind.item is not None:
+            return self._in_list(kind, kind.item, content, words, place)
         if words == ["type"] and "" not in kind.records:
             reason = f"decides which keys stand beside it; replace {_joined(place)} as a whole"
             raise InputError.one(f"{_joined(place)}.type: {reason}")
@@ -191,7 +191,7 @@ class _Replacement(NamedTuple):
     def _in_list(self, kind: Kind, each: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """The entry of a list that a word names, or all of them."""
         word, *rest = words
-        names = kind.names(content, self.scope.members)
+        names = entry_names(kind, content, self.scope.members)
         indices = _indices(names)
         if word != ALL and word not in indices:
             raise _nowhere(word, indices, place)

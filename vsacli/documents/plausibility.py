@@ -18,11 +18,10 @@ import numpy as np
 
 from vsacli.base.errors import InputError, Problem
 from vsacli.documents import tree
-from vsacli.documents.expression import ExpressionError
-from vsacli.documents.number import ANGLES, evaluate
-from vsacli.documents.record_numbers import Entry, NumberPath
+from vsacli.documents.expression import ANGLES, ExpressionError, evaluate
+from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.documents.source import Problems, Source
-from vsacli.documents.yaml_tree import parse_yaml
+from vsacli.documents.tree import parse_yaml
 
 _Subject = TypeVar("_Subject")
 _EXPRESSION_OF_ANGLE = re.compile("deg|pi")

@@ -10,13 +10,12 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
-from vsacli.base.unit_expressions import conversion_factor
 from vsacli.documents import tree
+from vsacli.documents.csv_file import Header, cells_of, filled_lines, header_of, split_heading
+from vsacli.documents.expression import conversion_factor
 from vsacli.documents.fields import REQUIRED, Kind, Number, declared
-from vsacli.documents.kinds.nested import read_record
+from vsacli.documents.nested import read_record
 from vsacli.documents.source import Problems, Source, read_source
-from vsacli.documents.table_header import Header, cells_of, header_of, split_heading
-from vsacli.documents.table_rows import filled_lines
 from vsacli.documents.tree import INVALID, Scope
 
 MAX_BYTES = 50_000_000

@@ -13,16 +13,27 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.errors import InputError
-from vsacli.base.streams import place_of
-from vsacli.documents.clocks import EXPECTED, NANOSECONDS, Clock, elapsed, read_clock
-from vsacli.documents.column_mapping import AS_NAMED, TIME, ChosenColumns, ColumnMapping
-from vsacli.documents.other_formats import recognising_other_formats, refuse_other_formats
-from vsacli.documents.source import MAX_DOCUMENT_BYTES, Source, check_input_file, decode_utf8
-from vsacli.documents.table_header import MAX_BYTES, Header, header_of, is_number, split_heading
-from vsacli.documents.table_rows import CHUNK, NOTHING, Rows, filled_lines, read_integers, read_numbers
-
-LARGEST_EXACT = 2.0**53
-"""Whole numbers beyond are not told apart in floating point; ns since 1970 are 200 times as large."""
+from vsacli.base.storage import place_of
+from vsacli.documents.column_mapping import AS_NAMED, ChosenColumns, ColumnMapping
+from vsacli.documents.csv_file import (
+    CHUNK,
+    MAX_BYTES,
+    Header,
+    Rows,
+    filled_lines,
+    header_of,
+    read_numbers,
+    split_heading,
+)
+from vsacli.documents.source import (
+    MAX_DOCUMENT_BYTES,
+    Source,
+    check_input_file,
+    decode_utf8,
+    recognising_other_formats,
+    refuse_other_formats,
+)
+from vsacli.documents.time_column import TIME, read_clocks, read_stamps, shows_a_clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,19 +184,27 @@ def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
 def _values(
     name: str, header: Header, chosen: ChosenColumns, empty_cells: bool
 ) -> tuple[tuple[str, ...], FloatArray, int | str | None]:
-    """Headings and numbers of the columns, and the first stamp if that was taken off the times."""
+    """Return headings and numbers of the columns, and the first stamp if that was taken off the times."""
     if not chosen.places:
         return chosen.headings, np.empty((0, 0)), None
-    if chosen.time is not None and _shows_a_clock(name, header, chosen.time):
-        return _with_clocks(name, header, chosen, empty_cells)
-    values, first = read_numbers(Rows(name, header, chosen.places, empty_cells)), None
-    if chosen.time is not None:
-        column = chosen.places.index(chosen.time)
-        stamps = values[:, column]
-        if chosen.nanoseconds is not None or np.abs(stamps).max() > LARGEST_EXACT:
-            first, values[:, column] = _elapsed(name, header, chosen, stamps)
-            _check_unit(first, chosen.headings[column], name, header.line)
-    return chosen.headings, _scaled(values, chosen), first
+    rows = Rows(name, header, chosen.places, empty_cells)
+    if chosen.time is None:
+        return chosen.headings, _scaled(read_numbers(rows), chosen), None
+    headings, column = chosen.headings, chosen.places.index(chosen.time)
+    times = rows._replace(used=(chosen.time,))
+    if shows_a_clock(times._replace(empty_cells=True)):
+        others = [place for place in chosen.places if place != chosen.time]
+        numbers = read_numbers(rows._replace(used=others)) if others else np.empty((0, 0))
+        first, stamps = read_clocks(times)
+        values = np.insert(numbers, column, stamps, axis=1) if others else stamps[:, None]
+        heading = f"{split_heading(headings[column])[0]} [ns]"
+        headings = (*headings[:column], heading, *headings[column + 1 :])
+        return headings, _scaled(values, chosen), first
+    values = read_numbers(rows)
+    since, values[:, column] = read_stamps(rows, chosen.time, chosen.nanoseconds, values[:, column])
+    if since is not None:
+        _check_unit(since, headings[column], name, header.line)
+    return headings, _scaled(values, chosen), since
 
 
 def _scaled(values: FloatArray, chosen: ChosenColumns) -> FloatArray:
@@ -195,45 +214,6 @@ def _scaled(values: FloatArray, chosen: ChosenColumns) -> FloatArray:
     return values
 
 
-def _shows_a_clock(name: str, header: Header, place: int) -> bool:
-    """Whether a column of times begins with a text that is one.
-
-    Raises:
-        InputError: it begins with a text that is none.
-    """
-    first = next(iter(Rows(name, header, (place,), empty_cells=True).cells()), None)
-    if first is None or is_number(first.cell.replace(",", ".")) or first.cell.lower() in NOTHING:
-        return False
-    if read_clock(first.cell) is None:
-        message = (
-            f"column {header.columns[place] or place + 1!r}: expected {EXPECTED}, found {first.cell[:40]!r}"
-        )
-        raise InputError.one(message, name, first.line)
-    return True
-
-
-def _with_clocks(
-    name: str, header: Header, chosen: ChosenColumns, empty_cells: bool
-) -> tuple[tuple[str, ...], FloatArray, str]:
-    """The same as `_values` where times are written as a clock shows them; they become nanoseconds."""
-    assert chosen.time is not None, "see _values"
-    column = chosen.places.index(chosen.time)
-    others = [place for place in chosen.places if place != chosen.time]
-    numbers = read_numbers(Rows(name, header, others, empty_cells)) if others else None
-    cells = list(Rows(name, header, (chosen.time,), empty_cells).cells())
-    clocks: list[Clock] = []
-    for line, cell in cells:
-        clock = read_clock(cell)
-        if clock is None or clock.dated != (clocks or [clock])[0].dated:
-            raise InputError.one(f"expected a time as in the rows above, found {cell[:40]!r}", name, line)
-        clocks.append(clock)
-    times = elapsed(clocks).astype(float)
-    values = times[:, None] if numbers is None else np.insert(numbers, column, times, axis=1)
-    headings = list(chosen.headings)
-    headings[column] = f"{split_heading(headings[column])[0]} [ns]"
-    return tuple(headings), _scaled(values, chosen), cells[0].cell
-
-
 def _check_unit(first: int, heading: str, name: str, line: int) -> None:
     if split_heading(heading)[1] is None:
         say = f"columns: {{{TIME}: {{column: ..., unit: ns}}}}, or {TIME} [ns] in the header"
@@ -241,20 +221,3 @@ def _check_unit(first: int, heading: str, name: str, line: int) -> None:
             f"the times begin with {first}, which are no seconds since any instant; say their unit: {say}"
         )
         raise InputError.one(message, name, line)
-
-
-def _elapsed(name: str, header: Header, chosen: ChosenColumns, stamps: FloatArray) -> tuple[int, FloatArray]:
-    """The first stamp, and by how much each is later, without a digit lost."""
-    assert chosen.time is not None, "see _values"
-    places = sorted({chosen.time, chosen.time if chosen.nanoseconds is None else chosen.nanoseconds})
-    whole = read_integers(Rows(name, header, places, empty_cells=False))
-    if whole is None:
-        if chosen.nanoseconds is not None:
-            raise InputError.one(
-                "whole seconds and nanoseconds are expected in the columns of the time", name
-            )
-        return int(stamps[0]), stamps - stamps[0]
-    exact = whole[:, places.index(chosen.time)]
-    if chosen.nanoseconds is not None:
-        exact = exact * NANOSECONDS + whole[:, places.index(chosen.nanoseconds)]
-    return int(exact[0]), (exact - exact[0]).astype(float)

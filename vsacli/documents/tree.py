@@ -1,19 +1,35 @@
-"""The tree of a document: texts, lists and mappings, each with its line; what their meaning depends on."""
+"""The tree of a YAML document: texts, lists and mappings, each with its line; what their meaning depends on.
+
+This is the only place that knows how YAML is read, and it is read without YAML's surprises. The tree is built
+from parser events without recursion, and every scalar stays a text, so nothing is resolved by the rules of
+YAML 1.1 (`on`, `1:30`, `010`) and nothing is constructed. Plain anchors and aliases work.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from collections.abc import Mapping as AbstractMapping
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, NamedTuple, NoReturn, TypeAlias
+
+import yaml
 
 from vsacli.base.units import Quantity
 from vsacli.documents.source import Problems
 
 MAX_SHOWN = 40
+MAX_LEVELS = 20
+MAX_NODES = 100_000
+"""Keys and values after each alias was replaced by what it stands for."""
+
+_LOADER: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_PLAIN = re.compile("[\t\n\r -~]*")
+_UNPRINTABLE = "[^\t\n\r -~\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"  # slow to compile
+_CORE_TAG = "tag:yaml.org,2002:"
 
 
 def quoted(text: str) -> str:
-    """A text from a document in quotes, for messages; cut short if it is long."""
+    """Return a text from a document in quotes, for messages; cut short if it is long."""
     return repr(text) if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]!r}..."
 
 
@@ -59,7 +75,7 @@ Node: TypeAlias = Scalar | Sequence | Mapping
 
 
 def plain(node: Node) -> Any:
-    """A node as plain data: texts as written, but null, true and false without quotes as these."""
+    """Return a node as plain data: texts as written, but null, true and false without quotes as these."""
     match node:
         case Mapping(entries=entries):
             return {key: plain(entry) for key, entry in entries.items()}
@@ -93,11 +109,11 @@ class Scope(NamedTuple):
     survey: list[tuple[Quantity, Node]] | None = None
 
     def unit(self, quantity: Quantity) -> str:
-        """Unit of a quantity here; an unknown variant is a problem of its own and must not make others."""
+        """Return the unit of a quantity here; an unknown variant is one problem, and makes no others."""
         return quantity.unit(self.variant or "revolute")
 
     def of_member(self, name: str) -> Scope:
-        """The scope of the value of one joint; the same if none is called so."""
+        """Return the scope of the value of one joint; the same if none is called so."""
         return self._replace(variant=self.members.get(name, self.variant))
 
     def unexpected(self, node: Node, expected: str, label: str, reason: str = "") -> Any:
@@ -107,6 +123,192 @@ class Scope(NamedTuple):
 
 
 def all_valid(values: Iterable[Any]) -> Any:
-    """The values as a tuple, or INVALID if one is; each is read, so each problem is noted."""
+    """Return the values as a tuple, or INVALID if one is; each is read, so each problem is noted."""
     everything = tuple(values)
     return INVALID if INVALID in everything else everything
+
+
+def parse_yaml(text: str, problems: Problems) -> Node:
+    """Parse a document.
+
+    Args:
+        text: the YAML text.
+        problems: receives what can be read past: tags, merge keys, duplicate keys, unknown aliases.
+
+    Raises:
+        InputError: what cannot be read past (broken syntax, beyond the limits, no document), with everything
+            found before it.
+    """
+    unprintable = None if _PLAIN.fullmatch(text) else re.search(_UNPRINTABLE, text)
+    if unprintable:
+        line = text.count("\n", 0, unprintable.start()) + 1
+        problems.fail(
+            line, f"the character U+{ord(unprintable[0]):04X} is not allowed in YAML; is this a text file?"
+        )
+    builder = _Builder(problems)
+    try:
+        for event in yaml.parse(text, Loader=_LOADER):
+            builder.take(event)
+    except yaml.MarkedYAMLError as error:
+        _fail_with_syntax(error, text, problems)
+    if builder.root is None:
+        problems.fail(1, "the file holds no values, only comments")
+    return builder.root
+
+
+def _fail_with_syntax(error: yaml.MarkedYAMLError, text: str, problems: Problems) -> NoReturn:
+    mark, start = error.problem_mark, error.context_mark
+    lines = text.rstrip().splitlines() or [""]
+    index = min(mark.line if mark else 0, len(lines) - 1)
+    column = f" at column {mark.column + 1}" if mark and mark.line == index else ""
+    message = f"not valid YAML{column}: {error.problem}"
+    if error.context:
+        message += f", {error.context}"
+        message += f" that begins on line {start.line + 1}" if start and start.line != index else ""
+    if re.match(r" *\t", lines[index]):
+        message += "; YAML is indented with spaces, not tabs"
+    problems.fail(index + 1, message)
+
+
+class _OpenSequence:
+    """A list whose end has not come yet."""
+
+    def __init__(self, line: int, first_node: int, anchor: str | None) -> None:
+        self.line, self.first_node, self.anchor = line, first_node, anchor
+        self.height = 1
+        self._items: list[Node] = []
+
+    def child_line(self, line: int) -> int:
+        return line
+
+    def add(self, node: Node) -> None:
+        self._items.append(node)
+
+    def close(self) -> Node:
+        return Sequence(self.line, tuple(self._items))
+
+
+class _OpenMapping:
+    """A mapping whose end has not come yet: keys and values arrive in turn."""
+
+    def __init__(self, line: int, first_node: int, anchor: str | None, problems: Problems) -> None:
+        self.line, self.first_node, self.anchor = line, first_node, anchor
+        self.height = 1
+        self._problems = problems
+        self._key: Node | None = None
+        self._entries: dict[str, Node] = {}
+        self._key_lines: dict[str, int] = {}
+
+    def child_line(self, line: int) -> int:
+        """A list or mapping behind a key is found at the key."""
+        return self._key.line if self._key else line
+
+    def add(self, node: Node) -> None:
+        if self._key is None:
+            self._key = node
+            return
+        key, self._key = self._key, None
+        problem = self._key_problem(key)
+        if problem:
+            self._problems.add(key.line, problem)
+        elif isinstance(key, Scalar):
+            self._entries[key.text] = node
+            self._key_lines[key.text] = key.line
+
+    def _key_problem(self, key: Node) -> str | None:
+        if not isinstance(key, Scalar):
+            return f"a key must be a word, found {key}"
+        if key.plain and key.text == "<<":
+            return "merge keys (<<) are not allowed; write the entries out, or alias the whole value"
+        if key.text in self._key_lines:
+            return f"duplicate key {key}; it stands on line {self._key_lines[key.text]} already"
+        return None
+
+    def close(self) -> Node:
+        return Mapping(self.line, self._entries, self._key_lines)
+
+
+_Open: TypeAlias = _OpenSequence | _OpenMapping
+
+
+class _Anchored(NamedTuple):
+    node: Node
+    size: int
+    height: int
+
+
+class _Builder:
+    """Takes events one by one and leaves the document in `root`."""
+
+    def __init__(self, problems: Problems) -> None:
+        self.root: Node | None = None
+        self._problems = problems
+        self._open: list[_Open] = []
+        self._anchors: dict[str, _Anchored] = {}
+        self._nodes = 0
+
+    def take(self, event: yaml.Event) -> None:
+        line = event.start_mark.line + 1 if event.start_mark else 0
+        match event:
+            case yaml.DocumentStartEvent() if self.root is not None:
+                self._problems.fail(line, "a second document begins here; a file holds exactly one")
+            case yaml.ScalarEvent():
+                self._refuse_tag(event, line)
+                node = Scalar(line, event.value, plain=not event.style)
+                self._place(_Anchored(node, 1, 0), line, event.anchor)
+            case yaml.AliasEvent():
+                self._place(self._resolve(str(event.anchor), line), line)
+            case yaml.CollectionStartEvent():
+                self._refuse_tag(event, line)
+                self._begin(event, line)
+            case yaml.CollectionEndEvent():
+                self._end()
+
+    def _refuse_tag(self, event: yaml.ScalarEvent | yaml.CollectionStartEvent, line: int) -> None:
+        if event.tag is not None:
+            tag = event.tag.replace(_CORE_TAG, "!!", 1)
+            self._problems.add(line, f"the tag {tag!r} is not allowed; write the plain value without a tag")
+
+    def _resolve(self, name: str, line: int) -> _Anchored:
+        if name not in self._anchors:
+            self._problems.add(line, f"the alias *{name} has no complete anchor &{name} before it")
+            return _Anchored(Scalar(line, "", plain=True), 1, 0)
+        return self._anchors[name]
+
+    def _begin(self, event: yaml.CollectionStartEvent, line: int) -> None:
+        line = self._open[-1].child_line(line) if self._open else line
+        self._check_limits(line, nodes=1, levels=1)
+        first_node = self._nodes
+        self._nodes += 1
+        if isinstance(event, yaml.MappingStartEvent):
+            self._open.append(_OpenMapping(line, first_node, event.anchor, self._problems))
+        else:
+            self._open.append(_OpenSequence(line, first_node, event.anchor))
+
+    def _end(self) -> None:
+        closed = self._open.pop()
+        anchored = _Anchored(closed.close(), self._nodes - closed.first_node, closed.height)
+        self._attach(anchored, closed.anchor)
+
+    def _place(self, child: _Anchored, line: int, anchor: str | None = None) -> None:
+        self._check_limits(line, child.size, child.height)
+        self._nodes += child.size
+        self._attach(child, anchor)
+
+    def _attach(self, child: _Anchored, anchor: str | None) -> None:
+        if anchor is not None:
+            self._anchors[anchor] = child
+        if self._open:
+            parent = self._open[-1]
+            parent.height = max(parent.height, child.height + 1)
+            parent.add(child.node)
+        else:
+            self.root = child.node
+
+    def _check_limits(self, line: int, nodes: int, levels: int) -> None:
+        if len(self._open) + levels > MAX_LEVELS:
+            self._problems.fail(line, f"nested more than {MAX_LEVELS} levels deep")
+        if self._nodes + nodes > MAX_NODES:
+            self._problems.fail(
+                line, f"more than {MAX_NODES:,} keys and values, counting what aliases stand for"
+            )

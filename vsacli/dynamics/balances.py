@@ -1,25 +1,185 @@
-"""Balances at each step of a run: of springs (14), of the motors' shafts, and power that motors pass on."""
+"""Balances that every result must satisfy: torques on each shaft, power passed, energy of the links."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import reduce
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.friction import REST, Friction
+from vsacli.actuators.motor import ELECTRICAL, JointMotor
+from vsacli.actuators.reach import OfJoint
 from vsacli.base import units
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.variables import VARIABLES, Block, Variable
 from vsacli.compute.control_flow import call
-from vsacli.compute.vector import Scalar
+from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
 from vsacli.dynamics.dampers import motor_torques
+from vsacli.dynamics.elastic_torques import link_constants
 from vsacli.dynamics.inverse import InverseDynamics, behind_link, rows_of_joints
-from vsacli.dynamics.shaft_balances import SHAFT_VARIABLES, shaft_error
 from vsacli.robot.joint import Joint
+from vsacli.robot.kinematics import base_gravity, rotation_matrix
+from vsacli.robot.model import Robot
+
+SHAFT_VARIABLES = (
+    *("q", "dq", "tau_e", "stiffness", "damping", "theta", "dtheta", "ddtheta", "dphi", "tau_damper"),
+    *("tau_motor", "motor_power", "current", "voltage", "copper_loss", "dissipated_power"),
+)
+"""The variables of a joint that are balanced, where it has them."""
+
+POSITION_ROUNDING = 8 * np.finfo(float).eps
+"""Share of q and theta by which their difference phi may be off: a few roundings."""
+
+Residual = tuple[FloatArray, FloatArray]
+"""What a balance misses, and the size of its terms, which bounds what rounding can miss."""
+
+
+def shaft_error(joint: Joint, of_joint: OfJoint, tau_spring: FloatArray, regular: BoolArray) -> FloatArray:
+    """The largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
+
+    Args:
+        joint: the joint.
+        of_joint: its variables by name, `SHAFT_VARIABLES` among them.
+        tau_spring: torque of the springs against each motor by their laws, (motors, samples).
+        regular: where there must be numbers; the error is zero elsewhere.
+    """
+    errors = [
+        np.where(regular, np.abs(missing) / np.maximum(size, np.finfo(float).tiny), 0.0)
+        for missing, size in _residuals(joint, of_joint, tau_spring)
+    ]
+    return reduce(np.maximum, errors)
+
+
+def _residuals(joint: Joint, of_joint: OfJoint, tau_spring: FloatArray) -> Iterator[Residual]:
+    for index, motor in enumerate(joint.actuator.motors):
+        own = {name: of_joint[name][index] for name in ("tau_motor", "dtheta", "motor_power")}
+        yield _torque_residual(joint, index, of_joint, tau_spring[index])
+        yield _residual(own["motor_power"], own["tau_motor"] * own["dtheta"])
+        if motor.torque_constant is not None:
+            electrical = {name: of_joint[name][index] for name in ELECTRICAL if name in of_joint}
+            yield from _winding_residuals(motor, **own, **electrical)
+    if joint.damper is not None:
+        yield _residual(
+            of_joint["tau_damper"],
+            *(of_joint["damping"] * velocity for velocity in _damper_velocities(joint, of_joint).values()),
+        )
+    if of_joint.get("dissipated_power") is not None:
+        lost = (*link_losses(joint, of_joint), *shaft_losses(joint, of_joint))
+        yield _residual(of_joint["dissipated_power"], *lost)
+
+
+def _residual(given: FloatArray, *terms: FloatArray) -> Residual:
+    size = reduce(np.add, [np.abs(term) for term in terms], np.abs(given))
+    return given - reduce(np.add, terms, np.zeros_like(given)), size
+
+
+def _torque_residual(joint: Joint, index: int, of_joint: OfJoint, tau_spring: FloatArray) -> Residual:
+    """The balance of a shaft. What rounding of positions changes in the springs' torque is no residual."""
+    motor, dtheta = joint.actuator.motors[index], of_joint["dtheta"][index]
+    terms = [*_momentum_rates(joint, index, of_joint["ddtheta"]), tau_spring]
+    terms += [motor.damping * dtheta, *_friction_torques(motor.friction, dtheta)]
+    damped = _damper_velocities(joint, of_joint).get(index)
+    if damped is not None:
+        terms.append(of_joint["damping"] * damped)
+    missing, size = _residual(of_joint["tau_motor"][index], *terms)
+    if joint.actuator.sprung:
+        positions = np.abs(of_joint["q"]) + np.abs(of_joint["theta"][index])
+        rounding = POSITION_ROUNDING * of_joint["stiffness"] * positions
+        missing = np.maximum(np.abs(missing) - rounding, 0.0)
+    return missing, size
+
+
+def _momentum_rates(joint: Joint, index: int, ddtheta: FloatArray) -> list[FloatArray]:
+    """Row `index` of B theta'', term by term: the rate of what the kinetic energy has as momentum."""
+    own = joint.actuator.motors[index].inertia * ddtheta[index]
+    coupling = joint.actuator.coupled_rotors
+    return [own, coupling * ddtheta[1 - index]] if coupling else [own]
+
+
+def _winding_residuals(
+    motor: JointMotor,
+    tau_motor: FloatArray,
+    dtheta: FloatArray,
+    motor_power: FloatArray,
+    current: FloatArray,
+    voltage: FloatArray | None = None,
+    copper_loss: FloatArray | None = None,
+) -> Iterator[Residual]:
+    """The current makes the torque, heat is R i^2, and u i is that heat and the power of the shaft."""
+    assert motor.torque_constant is not None, "windings without a torque constant have no current"
+    yield _residual(tau_motor, motor.torque_constant * current)
+    if motor.resistance is None or voltage is None or copper_loss is None:
+        return
+    heat = motor.resistance * current**2
+    yield _residual(copper_loss, heat)
+    yield _residual(voltage * current, heat, motor_power)
+    yield _residual(voltage, motor.resistance * current, motor.torque_constant * dtheta)
+
+
+def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[FloatArray]:
+    """Dry friction as the mean of both directions, half their difference, and the offset."""
+    if friction is None:
+        return []
+    backward, forward = friction.coulomb
+    if friction.width > 0:
+        shape = np.tanh(velocity / friction.width)
+    else:
+        shape = np.where(velocity > REST, 1.0, np.where(velocity < -REST, -1.0, 0.0 * velocity))
+    mean, half = (forward + backward) / 2, (forward - backward) / 2
+    return [mean * shape, half * np.abs(shape), friction.offset + 0.0 * velocity]
+
+
+def _damper_velocities(joint: Joint, of_joint: OfJoint) -> dict[int | None, FloatArray]:
+    """Velocity of each damper of a joint, by the motor that feels it; None is one between the links."""
+    if joint.damper is None:
+        return {}
+    if joint.damper_at("link"):
+        return {None: of_joint["dq"]}
+    behind = joint.actuator.has(VARIABLES["phi"])
+    return {motor: of_joint["dphi"][motor] for motor, there in enumerate(behind) if there}
+
+
+def link_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+    """Power that is lost between the two links of a joint, term by term."""
+    dq = of_joint["dq"]
+    lost = [joint.damping * dq * dq, *(torque * dq for torque in _friction_torques(joint.friction, dq))]
+    if joint.damper_at("link"):
+        lost.append(of_joint["damping"] * dq * dq)
+    return lost
+
+
+def shaft_losses(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+    """Power that is lost between the motors and the link of a joint, term by term."""
+    lost = []
+    for motor, dtheta in zip(joint.actuator.motors, of_joint["dtheta"], strict=False):
+        lost.append(motor.damping * dtheta * dtheta)
+        lost.extend(torque * dtheta for torque in _friction_torques(motor.friction, dtheta))
+    if joint.damper_at("transmission"):
+        velocities = _damper_velocities(joint, of_joint).values()
+        lost.extend(of_joint["damping"] * velocity * velocity for velocity in velocities)
+    return lost
+
+
+def shaft_energy(joint: Joint, of_joint: OfJoint) -> FloatArray:
+    """Kinetic energy of the rotors of a joint, and the energy in its springs, (samples,), J."""
+    energy: FloatArray = of_joint["elastic_energy"]
+    motors, dtheta = joint.actuator.motors, of_joint["dtheta"]
+    for motor, velocity in zip(motors, dtheta, strict=False):
+        energy = energy + motor.inertia / 2 * velocity * velocity
+    coupling = joint.actuator.coupled_rotors
+    return energy + coupling * dtheta[0] * dtheta[1] if coupling else energy
+
+
+def shaft_powers(joint: Joint, of_joint: OfJoint) -> list[FloatArray]:
+    """What changes `shaft_energy`, term by term: the motors, what the link takes, and losses; W."""
+    motors = len(joint.actuator.motors)
+    taken = [of_joint["tau_e"] * of_joint["dq"], *shaft_losses(joint, of_joint)]
+    return [*of_joint["motor_power"][:motors], *(-power for power in taken)]
+
 
 BALANCES = {
     variable.name: variable
@@ -145,3 +305,88 @@ def passed_power(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArra
         against, its_rate = motor_torques(joint, of_joint)
         torque, rate = torque + against, rate + its_rate
     return torque * dtheta, rate * dtheta + torque * ddtheta
+
+
+class _Moving(NamedTuple):
+    """A link frame, all in its own components.
+
+    Attributes:
+        origin: from that of frame 0.
+        velocity: of the origin.
+        omega: angular velocity.
+        gravity: acceleration.
+        rotations: from frame 0 on.
+    """
+
+    origin: Vector
+    velocity: Vector
+    omega: Vector
+    gravity: Vector
+    rotations: tuple[Rotation, ...]
+
+
+def link_energy(robot: Robot, block: Block) -> FloatArray:
+    """Kinetic and potential energy of all links, (samples,), J."""
+    energy = np.zeros(len(block.time))
+    for joint, moving in zip(robot.joints, _link_motions(robot, block), strict=True):
+        link = link_constants(joint)
+        velocity = moving.velocity + cross(moving.omega, link.com)
+        turning = moving.omega.dot(link.inertia.times(moving.omega))
+        height = moving.gravity.dot(moving.origin + link.com)
+        energy = energy + turning / 2 + link.mass * (velocity.dot(velocity) / 2 - height)
+    return energy
+
+
+def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArray]:
+    """What changes `link_energy`, term by term: joints, losses between links, and the wrench; W.
+
+    Args:
+        robot: the robot.
+        block: its variables.
+        frame: along whose axes the wrench is given; None if there is none.
+    """
+    powers = []
+    for index, joint in enumerate(robot.joints):
+        of_joint = block.of_joint(index)
+        powers.append(of_joint["tau_e"] * of_joint["dq"])
+        powers.extend(-lost for lost in link_losses(joint, of_joint))
+    return powers if frame is None else [*powers, _wrench_power(robot, block, frame)]
+
+
+def _link_motions(robot: Robot, block: Block) -> Iterator[_Moving]:
+    moving = _Moving(ZERO, ZERO, ZERO, base_gravity(robot), ())
+    for joint, q, dq in zip(robot.joints, block.q.T, block.dq.T, strict=True):
+        link = link_constants(joint)
+        angle, offset = (
+            (joint.dh.theta + q, joint.dh.d) if joint.is_revolute else (joint.dh.theta, joint.dh.d + q)
+        )
+        rotation = Rotation(np.cos(angle), np.sin(angle), link.cos_alpha, link.sin_alpha)
+        axis = rotation.undo(Vector(0, 0, 1))
+        step = Vector(link.a, 0, 0) + axis * offset
+        omega = rotation.undo(moving.omega) + (axis * dq if joint.is_revolute else ZERO)
+        slide = ZERO if joint.is_revolute else axis * dq
+        moving = _Moving(
+            origin=rotation.undo(moving.origin) + step,
+            velocity=rotation.undo(moving.velocity) + cross(omega, step) + slide,
+            omega=omega,
+            gravity=rotation.undo(moving.gravity),
+            rotations=(*moving.rotations, rotation),
+        )
+        yield moving
+
+
+def _wrench_power(robot: Robot, block: Block, frame: str) -> FloatArray:
+    """Power of the wrench on the end effector."""
+    *_, last = _link_motions(robot, block)
+    force, moment = Vector(*block.wrench.T[:3]), Vector(*block.wrench.T[3:])
+    velocity = last.velocity + cross(last.omega, Vector(*robot.tool.xyz))
+    if frame == "end_effector":
+        into_link = rotation_matrix(robot.tool)
+        force, moment = into_link.times(force), into_link.times(moment)
+    else:
+        into_frame_0 = rotation_matrix(robot.base).transposed()
+        force, moment = into_frame_0.times(force), into_frame_0.times(moment)
+        for rotation in last.rotations:
+            force, moment = rotation.undo(force), rotation.undo(moment)
+    power: FloatArray = force.dot(velocity) + moment.dot(last.omega)
+    return power

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.reach import OfJoint
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES

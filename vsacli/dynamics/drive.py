@@ -10,9 +10,9 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
-from vsacli.actuators.limit_check import OfJoint
+from vsacli.actuators.motor import Windings
+from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command, Transmission
-from vsacli.actuators.windings import Windings
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, finite, has, not_finite_flags
 from vsacli.base.signals import DAMPING

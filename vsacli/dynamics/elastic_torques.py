@@ -27,7 +27,7 @@ from vsacli.compute.vector import (
 )
 from vsacli.dynamics.chain import Chain, JointState, LinkConstants, TipLoad, TorqueDerivatives
 from vsacli.dynamics.dampers import damper_torque
-from vsacli.dynamics.joint_friction import joint_friction
+from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.dynamics.recursion import recursion
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, rotation_matrix

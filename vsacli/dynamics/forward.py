@@ -16,8 +16,8 @@ from vsacli.base.signals import DAMPING
 from vsacli.base.wrench import Wrench, check_wrench
 from vsacli.compute.vector import add
 from vsacli.dynamics.dampers import Dampers
+from vsacli.dynamics.dry_friction import Response, response_with_friction
 from vsacli.dynamics.rigid_body import chain_of
-from vsacli.dynamics.stiction import Response, response_with_friction
 from vsacli.robot.model import Robot, check_robot
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.actuators.limit_check import LimitCheck, OfJoint
+from vsacli.actuators.reach import LimitCheck, OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import AnyArray, FloatArray, by_joint, over_time
 from vsacli.base.errors import InputError, check_type

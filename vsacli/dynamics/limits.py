@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.actuators.limit_check import LimitCheck, OfJoint
+from vsacli.actuators.reach import LimitCheck, OfJoint
 from vsacli.base.arrays import BoolArray, FlagArray
 from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING

@@ -19,7 +19,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
 from vsacli.compute.tracing import Symbol, Tape, TracedArray
-from vsacli.compute.tracing.python_code import StateFunction
+from vsacli.compute.tracing.python_functions import StateFunction
 from vsacli.compute.vector import ZERO, Scalar, Vector
 from vsacli.dynamics.chain import TipLoad, TorqueDerivatives
 from vsacli.dynamics.elastic_torques import joint_state, link_constants, tip_load

@@ -13,13 +13,19 @@ from typing import Any
 
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
-from vsacli.base.streams import place_of
+from vsacli.base.storage import place_of
 from vsacli.control import poles
 from vsacli.documents import columns_file, tree
 from vsacli.documents.json_schema import json_schema
-from vsacli.documents.other_formats import recognising_other_formats
-from vsacli.documents.source import HDF5_SIGNATURE, Problems, check_input_file, is_table, read_source
-from vsacli.documents.yaml_tree import parse_yaml
+from vsacli.documents.source import (
+    HDF5_SIGNATURE,
+    Problems,
+    check_input_file,
+    is_table,
+    read_source,
+    recognising_other_formats,
+)
+from vsacli.documents.tree import parse_yaml
 from vsacli.robot import file as robot_file
 from vsacli.studies.sweeps import study_file
 from vsacli.trajectory import file as trajectory_file
@@ -102,12 +108,12 @@ def _beginning(path: str | os.PathLike[str]) -> bytes:
 
 
 def _stored_kind(path: str | os.PathLike[str]) -> FileKind:
-    from vsacli.results.store import schema, simulation, study_table
+    from vsacli.results.store import schema, study_table
     from vsacli.results.store.reader import stored_format
 
     kinds = {
         schema.FORMAT: FileKind.RESULT,
-        simulation.FORMAT: FileKind.SIMULATION,
+        schema.SIMULATION: FileKind.SIMULATION,
         study_table.FORMAT: FileKind.STUDY_TABLE,
     }
     found = stored_format(Path(path))

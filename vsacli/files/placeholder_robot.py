@@ -18,10 +18,10 @@ from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
 from vsacli.base.signals import COMMANDED
 from vsacli.documents import tree
+from vsacli.documents.csv_file import read_header
 from vsacli.documents.fields import IDENTIFIER, LARGEST
 from vsacli.documents.reading import survey_document
 from vsacli.documents.source import is_table
-from vsacli.documents.table_header import read_header
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
 from vsacli.robot.model import Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT

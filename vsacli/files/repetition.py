@@ -1,4 +1,4 @@
-"""A result computed once more from what it holds, and compared with what it says."""
+"""A result computed once more from what it holds: compared with what it says, or at another rate."""
 
 from __future__ import annotations
 
@@ -14,17 +14,20 @@ import numpy as np
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
-from vsacli.base.storage import reporting_temporary_errors, temporary_folder
-from vsacli.base.streams import reading_copies
+from vsacli.base.outputs import Staged
+from vsacli.base.storage import reading_copies, reporting_temporary_errors, temporary_folder
 from vsacli.base.variables import Block
 from vsacli.compute.engine import Tell, unheard
+from vsacli.results.exports.selection import check_rate, stride_of
 from vsacli.results.store import study_table
 from vsacli.results.store.inputs import StoredInput
 from vsacli.results.store.reader import StoredResult, stored_format
-from vsacli.results.store.stored_study import StoredStudy
+from vsacli.results.store.study_table import StoredStudy
+from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
 from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.times import MAX_STEPS, RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -187,3 +190,67 @@ def _places(paths: Sequence[str]) -> list[Path]:
     whole = [os.path.normpath(os.path.join(deep, path)) for path in named]
     common = os.path.commonpath([os.path.dirname(path) for path in whole])
     return [Path(os.path.relpath(path, common)) for path in whole]
+
+
+ROUNDING = 1e-9
+"""Share of a period by which the last one may be too short."""
+
+
+@contextmanager
+def at_rate(result: StoredResult, rate: float) -> Iterator[StoredResult]:
+    """The result itself if every n-th of its steps makes the rate, or nothing does; else computed again.
+
+    Args:
+        result: an open result of `vsacli invdyn`.
+        rate: samples per second, Hz.
+
+    Raises:
+        InputError: the rate is not positive or gives too many samples, the stored times are damaged, or the
+            inputs that the result holds cannot be used.
+    """
+    check_rate(rate)
+    samples = float(result.time[-1] - result.time[0]) * rate
+    if samples > MAX_STEPS:
+        message = f"the rate {rate:.9g} Hz gives {samples:.4g} samples; at most {MAX_STEPS:.0e} are possible"
+        raise InputError.one(message, result.path)
+    again = None if _takes_every_nth(result, rate) else _function_of_time(result)
+    if again is None:
+        yield result
+        return
+    robot, trajectory = again[0], _sampled(again[1], rate)
+    options: dict[str, Any] = result.provenance()["options"]
+    run = Run(robot, trajectory, **options)
+    with temporary_folder() as place:
+        staged = Staged.unnamed(place / "result.h5")
+        with ResultWriter(staged, robot, trajectory) as writer:
+            for block in run:
+                writer.write(block)
+            writer.finish(run.report().as_json())
+        with StoredResult.open(staged.temporary) as resampled:
+            yield resampled
+
+
+def _takes_every_nth(result: StoredResult, rate: float) -> bool:
+    try:
+        stride_of(result, rate)
+    except InputError:
+        return False
+    return True
+
+
+def _function_of_time(result: StoredResult) -> tuple[Robot, Trajectory] | None:
+    """Robot and trajectory of a result, if its steps are not all that is known of the motion."""
+    if result.kind != StoredResult.kind:
+        return None
+    try:
+        robot, trajectory = rebuilt(result)
+    except InputError:
+        return None  # the export says what is wrong with the rate
+    return (robot, trajectory) if trajectory.known_between and not trajectory.estimates else None
+
+
+def _sampled(trajectory: Trajectory, rate: float) -> Trajectory:
+    """The trajectory at whole periods of a rate; if its end is none, up to the last one before."""
+    periods = int(trajectory.duration * rate + ROUNDING)
+    time = trajectory.start + np.arange(periods + 1) / rate
+    return trajectory.sampled(RecordedTimes(np.minimum(time, trajectory.times.span[1])))

@@ -1,4 +1,4 @@
-"""Commented files to begin with: a robot of plausible numbers, a trajectory that starts without a step."""
+"""Commented files to begin with: a robot of plausible values, a trajectory that its robot can execute."""
 
 from __future__ import annotations
 
@@ -8,13 +8,60 @@ from typing import Any
 
 from vsacli.actuators.kinds import example
 from vsacli.base.errors import InputError
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN
+from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.documents.commented import WIDTH, commented_document
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
 from vsacli.robot import file as robot_file
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.loads import Passage
+from vsacli.studies.search.scans import smallest_slow_down
 from vsacli.trajectory import file as trajectory_file
+from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.trajectory import Trajectory
+
+
+def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str]:
+    """The duration of a trajectory file that the robot can execute, and a remark if it is not the usual one.
+
+    Args:
+        robot: the robot.
+        text: of the file, with the usual duration.
+        usual: duration, s.
+
+    Raises:
+        StorageError: there is no room for a temporary file.
+    """
+    acceptance, trajectory = Acceptance(robot, NEAR_SINGULAR_MARGIN), _read(text, robot)
+    if not acceptance.refused_joints(trajectory).any():
+        return usual, ""
+    reasons = "; ".join(acceptance.reasons(Passage.of(trajectory, 0, trajectory.samples)))
+    try:
+        duration = usual * smallest_slow_down(acceptance, trajectory)
+    except ImpossibleError as error:
+        return usual, f"This robot cannot execute it, nor more slowly: {error}."
+    rounded = _rounded_up(duration)
+    if not acceptance.refused_joints(trajectory.stretched(rounded / usual)).any():
+        duration = rounded
+    return duration, f"It does not take {usual:g} s, since then {reasons}."
+
+
+def _read(text: str, robot: Robot) -> Trajectory:
+    with temporary_folder() as folder:
+        path = folder / "starter.yaml"
+        with reporting_temporary_errors():
+            path.write_text(text, encoding="utf-8")
+        return load_trajectory(path, robot)
+
+
+def _rounded_up(duration: float) -> float:
+    """To two digits."""
+    unit = 10.0 ** (math.floor(math.log10(duration)) - 1)
+    return float(f"{math.ceil(duration / unit) * unit:.6g}")
+
 
 Values = dict[str, Any]
 
@@ -126,7 +173,6 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
         values["damping"] = {"type": "constant", "value": damping}
     if robot is None:
         return _trajectory_document(values)
-    from vsacli.files.starter import possible_duration
 
     duration, remark = possible_duration(robot, _trajectory_document(values), DURATION)
     return _trajectory_document({**values, "duration": duration}, remark)

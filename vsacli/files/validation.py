@@ -14,8 +14,8 @@ from vsacli.documents.reading import read_document
 from vsacli.documents.table import read_table
 from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.placeholder_robot import placeholder_robot
-from vsacli.results.store.simulation import open_stored
-from vsacli.results.store.stored_study import StoredStudy
+from vsacli.results.store.reader import open_stored
+from vsacli.results.store.study_table import StoredStudy
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
 from vsacli.robot.urdf.reader import read_urdf

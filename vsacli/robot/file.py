@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import os
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
 from vsacli.base.errors import InputError, check_path
-from vsacli.documents.changes import Changes, changed
 from vsacli.documents.fields import choice, declared
-from vsacli.documents.reading import read_document
+from vsacli.documents.reading import Changes, changed, read_document
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
 
@@ -83,3 +83,15 @@ def read_robot(path: str | os.PathLike[str]) -> ReadRobot:
         InputError: with every problem of the file, each with its line.
     """
     return ReadRobot(*read_document(path, RobotFile, FORMAT))
+
+
+def text_to_change(robot: Robot) -> tuple[str, Path]:
+    """Return the text of the file that a robot was read from, and the folder in which it stands.
+
+    Raises:
+        InputError: the robot was not read from a file, or its text was too large to keep.
+    """
+    source = next(iter(robot.sources), None)
+    if source is None or source.text is None:
+        raise InputError.one(f"{robot.name}: was not read from a file that could be changed")
+    return source.text, Path(source.path).parent

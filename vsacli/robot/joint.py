@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -258,3 +258,12 @@ class Joint:
         of_link = (warning for warning in self.link.warnings() if warning not in told)
         yield from (f"link of joint {self.name}: {warning}" for warning in of_link)
         yield from (f"spring of joint {self.name}: {warning}" for warning in self.actuator.warnings)
+
+
+def existing(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:
+    """Return which columns of a variable exist, for each joint by its kind of actuator.
+
+    A kind that is not known may have them all.
+    """
+    every = [True] * (2 if "motor" in variable.dims else 1)
+    return [ACTUATORS[kind].has(variable) if kind in ACTUATORS else every for kind in kinds]

@@ -124,7 +124,7 @@ class Robot:
     @property
     def facts(self) -> Facts:
         """What is known of it to tell numbers that are hardly what was meant."""
-        from vsacli.documents.record_numbers import numbers
+        from vsacli.documents.record_values import numbers
         from vsacli.robot.plausibility.facts import Facts
 
         return Facts(self.joints, self.base, self.gravity, tuple(numbers(self)), self.placeholder)

@@ -12,7 +12,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
 from vsacli.compute.duals import seeds
 from vsacli.compute.vector import Scalar
-from vsacli.documents.record_numbers import Entry, Number, NumberPath, numbers
+from vsacli.documents.record_values import Entry, Number, NumberPath, numbers
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 

@@ -8,8 +8,7 @@ if TYPE_CHECKING:
     from vsacli.studies.identification import Identification, identify
     from vsacli.studies.identification.excitation import Excitation, excitation_text, plan_excitation
     from vsacli.studies.measured import Comparison, compare
-    from vsacli.studies.optimisation import Optimum, optimize
-    from vsacli.studies.remedies import suggest
+    from vsacli.studies.search import Optimum, optimize, suggest
     from vsacli.studies.sensitivities import Sensitivity, sensitivity
     from vsacli.studies.sizing import Sizing, size_drives
     from vsacli.studies.sweeps import StudySummary, run_study

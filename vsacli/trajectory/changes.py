@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
-from vsacli.documents.changes import KEPT, ChangeError, Changes, check_path_of_change
 from vsacli.documents.fields import declared
+from vsacli.documents.reading import KEPT, ChangeError, Changes, check_path_of_change
 from vsacli.robot.file import RobotFile
 from vsacli.trajectory.file import OF_ANY_ROBOT
 

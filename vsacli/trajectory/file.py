@@ -15,14 +15,13 @@ from vsacli.base import units
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.documents.changes import ChangeError, Changes, changed
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, check_fields, number, value
-from vsacli.documents.reading import read_document
-from vsacli.documents.record_numbers import numbers
+from vsacli.documents.reading import ChangeError, Changes, changed, read_document
+from vsacli.documents.record_values import numbers
 from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
-from vsacli.trajectory.declared import Declaration, Formula, Recorded, Use, declared_as
+from vsacli.trajectory.curves.types import Declaration, Formula, Recorded, Use, declared_as
 from vsacli.trajectory.devices import with_devices
 from vsacli.trajectory.plausibility import Facts, implausible
 from vsacli.trajectory.profile import Profile, WrenchProfile

@@ -9,14 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
-from vsacli.actuators.laws import LAWS
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import Problem
 from vsacli.base.signals import POSITION
 from vsacli.base.units import Quantity
 from vsacli.documents.plausibility import Measured, Rule, Slip, Written, findings
-from vsacli.documents.record_numbers import Entry, Number
+from vsacli.documents.record_values import Entry, Number
 from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -43,9 +42,6 @@ LONG = 100.0
 
 COMMON_FORCE, COMMON_MOMENT = 100.0, 10.0
 """N, N m; up to these, wrenches may be large beside the robot, as of fingers that grip."""
-
-WITH_LINEAR_PART = ("cubic", "polynomial")
-"""Laws with a constant for the stiffness at rest; with others it is small at rest and grows fast."""
 
 LOWEST_SHARE = 0.2
 """A smaller share of the lowest stiffness at rest is no soft wish but another unit."""
@@ -199,7 +195,9 @@ def _above_lowest(facts: Facts, *, linear: bool) -> Iterator[Measured]:
     """Over the lowest, at joints whose springs all have a linear part, or at the others."""
     for measured, joint, found in _commanded(facts):
         laws = getattr(joint.actuator, "spring", ())
-        each_linear = bool(laws) and all(LAWS.name_of(type(law)) in WITH_LINEAR_PART for law in laws)
+        each_linear = bool(laws) and all(
+            law.polynomial is not None for law in laws
+        )  # which has a stiffness at rest
         if each_linear == linear:
             yield measured._replace(size=ratio(measured.size, found.lower))
 

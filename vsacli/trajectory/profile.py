@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 from vsacli.base.arrays import FloatArray
@@ -116,7 +116,3 @@ class WrenchProfile:
         if self.profile.components != len(WRENCH_AXES):
             expected = f"{len(WRENCH_AXES)} ({', '.join(WRENCH_AXES)})"
             raise InputError.one(f"the wrench has {self.profile.components} components, not {expected}")
-
-    def stretched(self, factor: float) -> WrenchProfile:
-        """The same profile, slower by a factor, from the same first time on."""
-        return replace(self, profile=self.profile.stretched(factor))

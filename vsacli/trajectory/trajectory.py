@@ -73,7 +73,7 @@ class Trajectory:
             for key, signal in COMMANDED.items()
             if key in commanded or signal.device is None
         }
-        profiles = [profile for _, profile in self._profiles()]
+        profiles = [profile for _, profile in self.profiles()]
         told = (*warnings, *(each for profile in profiles for each in profile.warnings))
         self.located_warnings = tuple(
             each if isinstance(each, Problem) else Problem("", 0, each) for each in told
@@ -94,7 +94,8 @@ class Trajectory:
 
         return f"<p>{escape(repr(self))}</p>"
 
-    def _profiles(self) -> Iterator[tuple[Signal, Profile]]:
+    def profiles(self) -> Iterator[tuple[Signal, Profile]]:
+        """Yield each signal with its profile: position, commanded signals, wrench."""
         yield POSITION, self.position
         yield from ((COMMANDED[key], profile) for key, profile in self.commanded.items())
         if self.wrench is not None:
@@ -105,7 +106,7 @@ class Trajectory:
             if self.joints != profile.components:
                 raise InputError.one(f"the position has {self.joints} joints, the {key} {profile.components}")
         rounding = np.spacing(max(map(abs, self.times.span)))
-        for signal, profile in self._profiles():
+        for signal, profile in self.profiles():
             start, end = profile.breakpoints[[0, -1]]
             if start != 0 or abs(end - self.duration) > 2 * rounding:
                 raise InputError.one(
@@ -249,7 +250,7 @@ class Trajectory:
     @property
     def estimates(self) -> dict[Signal, SampledProfile]:
         """The signals of which any number at the steps comes from a fit of recorded samples."""
-        found = ((signal, profile.estimate) for signal, profile in self._profiles())
+        found = ((signal, profile.estimate) for signal, profile in self.profiles())
         return {signal: estimate for signal, estimate in found if estimate is not None}
 
     @property
@@ -264,11 +265,20 @@ class Trajectory:
 
     def stretched(self, factor: float) -> Trajectory:
         """All profiles slower by a factor; steps at a uniform rate keep their rate."""
+        return self.changed(lambda _, profile: profile.stretched(factor), self.times.stretched(factor))
+
+    def changed(self, change: Callable[[Signal, Profile], Profile], times: Times) -> Trajectory:
+        """Return the trajectory with each profile changed, and with other steps.
+
+        Raises:
+            InputError: profiles and steps no longer span the same time.
+        """
+        wrench = self.wrench
         return Trajectory(
-            self.times.stretched(factor),
-            self.position.stretched(factor),
-            {key: profile.stretched(factor) for key, profile in self.commanded.items()},
-            wrench=None if self.wrench is None else self.wrench.stretched(factor),
+            times,
+            change(POSITION, self.position),
+            {key: change(COMMANDED[key], profile) for key, profile in self.commanded.items()},
+            wrench=wrench and replace(wrench, profile=change(WRENCH, wrench.profile)),
             name=self.name,
             sources=self.sources,
         )
@@ -291,12 +301,12 @@ class Trajectory:
     @property
     def known_between(self) -> bool:
         """Whether `at` continues the steps; it does not where derivatives are given at the samples."""
-        return all(profile.known_between for _, profile in self._profiles())
+        return all(profile.known_between for _, profile in self.profiles())
 
     @property
     def breakpoints(self) -> FloatArray:
         """Ascending times between which all its functions are analytic; the first and last are its span."""
-        times = np.sort(np.concatenate([profile.breakpoints for _, profile in self._profiles()]))
+        times = np.sort(np.concatenate([profile.breakpoints for _, profile in self.profiles()]))
         distinct: FloatArray = times[np.append(True, np.diff(times) > 0)]  # np.unique would import numpy.ma
         return self.start + distinct
 

@@ -9,7 +9,7 @@ import pytest
 from samples.measured_pages import WICKED, wicked_page, without_words
 from samples.pages import Page
 
-from vsacli.results.measured_curves import MeasuredCurve
+from vsacli.results.charts.measured import MeasuredCurve
 from vsacli.results.pages import measured_page
 
 SINGLE = 2**-23

@@ -144,13 +144,12 @@ def test_the_mouse_over_a_plot_moves_the_cursor(page: Browser) -> None:
 def test_dragging_over_a_plot_zooms_all_of_them(page: Browser) -> None:
     from selenium.webdriver.common.action_chains import ActionChains
 
-    whole = page.run(WINDOWS)
     plot = page.find(".plot")
     ActionChains(page.driver).move_to_element(plot).click_and_hold().move_by_offset(
         100, 0
     ).release().perform()
     zoomed = page.settled(WINDOWS)
-    assert len(zoomed) == len(whole) > 1
+    assert len(zoomed) > 1
     assert zoomed == [zoomed[0]] * len(zoomed)
     start, end = zoomed[0]
     assert 1.5 < start < end < 4

@@ -22,11 +22,10 @@ from samples.wicked import TEXTS, clean
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES
 from vsacli.cli.main import run
-from vsacli.results.corridors import BOUNDS
-from vsacli.results.envelopes import FULL_DETAIL
-from vsacli.results.pages.sections import sections_of
-from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.stored_limits import ACHIEVED
+from vsacli.results.charts.reduction import FULL_DETAIL
+from vsacli.results.charts.stored import BOUNDS
+from vsacli.results.pages.result_page import sections_of
+from vsacli.results.store.reader import ACHIEVED, StoredResult
 from vsacli.robot.file import load_robot
 from vsacli.robot.kinematics import forward_kinematics
 
@@ -211,7 +210,7 @@ def test_without_the_library_a_sentence_says_what_to_install(
     def missing(name: str) -> None:
         raise PackageNotFoundError(name)
 
-    monkeypatch.setattr("vsacli.results.pages.library.distribution", missing)
+    monkeypatch.setattr("vsacli.results.pages.document.distribution", missing)
     done = vsacli("plot", feasible_result, "--format", "html", "-o", str(tmp_path / "pages"))
     assert done.code == 2
     assert done.err == ("pages need the package bokeh, which is not installed; pip install bokeh gets it\n")

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.laws.pair import Pair, PairSolution
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, SpringState
 from vsacli.base.lazy import LazyRegistry
 from vsacli.base.units import (
     CUBIC_STIFFNESS,
@@ -25,13 +23,11 @@ from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, number
 
 if TYPE_CHECKING:
     from vsacli.actuators.laws.cubic import Cubic
-    from vsacli.actuators.laws.exponential import Exponential
     from vsacli.actuators.laws.four_bar import FourBar
     from vsacli.actuators.laws.polynomial import Polynomial
-    from vsacli.actuators.laws.quadratic import Quadratic
     from vsacli.actuators.laws.sinh import Sinh
     from vsacli.actuators.laws.table import MeasuredSpring as Table
-    from vsacli.actuators.laws.tendon import Tendon
+    from vsacli.actuators.laws.tendons import Exponential, Quadratic, Tendon
     from vsacli.actuators.pairs import make_pair
 
 LAWS = LazyRegistry(
@@ -39,8 +35,8 @@ LAWS = LazyRegistry(
         "cubic": "vsacli.actuators.laws.cubic:Cubic",
         "polynomial": "vsacli.actuators.laws.polynomial:Polynomial",
         "sinh": "vsacli.actuators.laws.sinh:Sinh",
-        "exponential": "vsacli.actuators.laws.exponential:Exponential",
-        "quadratic": "vsacli.actuators.laws.quadratic:Quadratic",
+        "exponential": "vsacli.actuators.laws.tendons:Exponential",
+        "quadratic": "vsacli.actuators.laws.tendons:Quadratic",
         "four_bar": "vsacli.actuators.laws.four_bar:FourBar",
         "table": "vsacli.actuators.laws.table:MeasuredSpring",
     }
@@ -50,7 +46,7 @@ LAWS = LazyRegistry(
 _EXPORTS = LazyRegistry(
     {
         **{name.title().replace("_", ""): home for name, home in LAWS.homes.items()},
-        "Tendon": "vsacli.actuators.laws.tendon:Tendon",
+        "Tendon": "vsacli.actuators.laws.tendons:Tendon",
         "make_pair": "vsacli.actuators.pairs:make_pair",  # pairs know laws; no law knows them
     }
 )

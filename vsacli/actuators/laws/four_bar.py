@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from vsacli.actuators.laws.inversion import FirstGuess, inverse, with_sign_of
-from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.law import SpringLaw, SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import POSITIVE, Check, number

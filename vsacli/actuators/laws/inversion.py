@@ -1,14 +1,28 @@
-"""Inverse of a spring law that has no closed one: Halley's method in a shrinking bracket."""
+"""Inverse of a spring law without a closed one: Halley's method in a shrinking bracket, a cubic guess."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from vsacli.actuators.laws.hermite import hermite, in_single
-from vsacli.actuators.laws.law import SpringLaw, state_of
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.law import SpringLaw, SpringState, state_of
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
+
+
+def hermite(
+    x: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray, end: FloatArray
+) -> FloatArray:
+    """The cubic over x from 0 to 1 with values and slopes at both ends; arrays of one shape."""
+    rise = high - low
+    return low + x * (start + x * (3 * rise - 2 * start - end + x * (start + end - 2 * rise)))
+
+
+def in_single(values: FloatArray) -> FloatArray:
+    """Values with the digits of single precision, which do for a guess; beyond its range as they are."""
+    with np.errstate(all="ignore"):
+        rounded = values.astype(np.float32).astype(float)
+    return np.where(np.isfinite(rounded) & ((rounded == 0) == (values == 0)), rounded, values)
+
 
 MAX_HALLEY_STEPS = 200
 """More than bisection alone needs for all digits of a double."""

@@ -1,18 +1,129 @@
-"""What every spring law offers: torque over deflection, three derivatives, energy, and the inverse."""
+"""Spring laws: torque over deflection, three derivatives, energy, the inverse; pairs and rows of springs.
+
+A `SpringState` is a spring at a deflection. A `Pair` says what solving (14) means for two springs on
+one link, whatever the laws are. Springs of several joints that obey one law are evaluated at a time.
+"""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from vsacli.actuators.laws.pair import Pair
-from vsacli.actuators.laws.state import SpringState
-from vsacli.base.arrays import FloatArray
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.units import POSITION
 from vsacli.compute.control_flow import subroutine
 from vsacli.documents.fields import POSITIVE_OR_INFINITE, check_fields, number
 from vsacli.documents.source import Source
+
+
+class SpringState(NamedTuple):
+    """Torque, stiffness, slope and curvature of springs, (62)-(64), (66); arrays of one shape.
+
+    Attributes:
+        tau: torque, N m (N).
+        sigma: stiffness, the first derivative of the torque over the deflection.
+        zeta: slope of the stiffness, the second derivative.
+        eta: curvature of the stiffness, the third derivative.
+    """
+
+    tau: FloatArray
+    sigma: FloatArray
+    zeta: FloatArray
+    eta: FloatArray
+
+    def take(self, members: IndexArray) -> SpringState:
+        """The state of some of the springs, which are on the last axis."""
+        return SpringState(*(values[..., members] for values in self))
+
+    def after(self, step: FloatArray) -> SpringState:
+        """The state after a short step of the deflection, by Taylor's formula with the derivatives known."""
+        return SpringState(
+            self.tau + step * self.sigma + self.linearization_error(step),
+            self.sigma + step * (self.zeta + step / 2 * self.eta),
+            self.zeta + step * self.eta,
+            self.eta,
+        )
+
+    def linearization_error(self, step: FloatArray) -> FloatArray:
+        """Torque after a short step less what its tangent gives, to the third order of the step."""
+        return step * step / 2 * (self.zeta + step / 3 * self.eta)
+
+
+class PairSolution(NamedTuple):
+    """Reachable stiffness on the branch, and the deflections for the demanded one; arrays (samples,).
+
+    Attributes:
+        lower: smallest reachable stiffness, N m/rad (N/m); NaN where the torque cannot be carried at all.
+        upper: largest reachable stiffness; +inf where nothing bounds it.
+        lower_critical: whether `lower` is a critical point, where A is singular (else the end of a domain).
+        upper_critical: the same for `upper`.
+        slack_below: whether a side that only pulls goes slack below `lower`.
+        phi_1: deflection of side 1 for the stiffness clipped into [lower, upper], rad (m).
+        phi_2: deflection of side 2.
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    lower_critical: BoolArray
+    upper_critical: BoolArray
+    slack_below: BoolArray
+    phi_1: FloatArray
+    phi_2: FloatArray
+
+    @classmethod
+    def unbounded(
+        cls, lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray, *, lower_critical: bool
+    ) -> PairSolution:
+        """A solution without upper end; the lower end is a critical point, or where a tendon goes slack."""
+        return cls(
+            lower=lower,
+            upper=np.full_like(lower, np.inf),
+            lower_critical=np.full_like(lower, lower_critical, dtype=bool),
+            upper_critical=np.zeros_like(lower, dtype=bool),
+            slack_below=np.full_like(lower, not lower_critical, dtype=bool),
+            phi_1=phi_1,
+            phi_2=phi_2,
+        )
+
+    @property
+    def deflections(self) -> FloatArray:
+        """phi_1 and phi_2, (2, samples)."""
+        return np.stack((self.phi_1, self.phi_2))
+
+    def exchanged(self) -> PairSolution:
+        """The same with the two sides exchanged."""
+        return self._replace(phi_1=self.phi_2, phi_2=self.phi_1)
+
+
+class Pair(ABC):
+    """Two springs on the branch of the largest preload: phi_1 up, phi_2 down.
+
+    Along a given tau_e the joint stiffness G is a function of the preload; its critical points are the
+    singularities of the decoupling matrix, its monotone pieces the branches of solutions. The branch used is
+    the piece that reaches the largest preload; it needs no memory of the previous step.
+    """
+
+    @abstractmethod
+    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+        """Solve (14) for each sample.
+
+        Args:
+            tau_e: elastic torque, (samples,), N m (N).
+            stiffness: demanded joint stiffness, (samples,), N m/rad (N/m).
+        """
+
+
+def tendon_solution(lower: FloatArray, phi_1: FloatArray, phi_2: FloatArray) -> PairSolution:
+    """Solution of two tendons, which is singular nowhere.
+
+    Deflections that rounding has made those of a tendon that pushes are zero.
+    """
+    return PairSolution.unbounded(lower, np.maximum(phi_1, 0), np.minimum(phi_2, 0), lower_critical=False)
 
 
 def alike(number: float, other: float) -> bool:
@@ -132,3 +243,45 @@ class SpringLaw(ABC):
 def state_of(law: SpringLaw, phi: FloatArray) -> SpringState:
     """State of a spring, which code that must be short has once."""
     return SpringState(*subroutine(law.state, (phi,)))
+
+
+class SpringRows:
+    """Equally many springs at each joint; deflections and their functions are (..., joints, springs)."""
+
+    def __init__(self, laws: Sequence[Sequence[SpringLaw]]) -> None:
+        self._alike = list(_alike([law for of_joint in laws for law in of_joint]))
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Torque of each spring."""
+        return self._each(phi, lambda law, part: (law.torque(part),))[0]
+
+    def energy(self, phi: FloatArray) -> FloatArray:
+        """Energy of each spring."""
+        return self._each(phi, lambda law, part: (law.energy(part),))[0]
+
+    def state(self, phi: FloatArray) -> SpringState:
+        """State of each spring."""
+        return SpringState(*self._each(phi, lambda law, part: law.state(part)))
+
+    def _each(
+        self, phi: FloatArray, values: Callable[[SpringLaw, FloatArray], Sequence[FloatArray]]
+    ) -> Sequence[FloatArray]:
+        """What each spring's law makes of its deflection."""
+        if len(self._alike) == 1:
+            return values(self._alike[0][0], phi)
+        flat = phi.reshape(*phi.shape[:-2], -1)
+        parts = [(members, values(law, flat[..., members])) for law, members in self._alike]
+        merged = [np.empty_like(flat) for _ in parts[0][1]]
+        for members, of_law in parts:
+            for whole, part in zip(merged, of_law, strict=True):
+                whole[..., members] = part
+        return [whole.reshape(*phi.shape) for whole in merged]
+
+
+def _alike(laws: list[SpringLaw]) -> Iterator[tuple[SpringLaw, list[int]]]:
+    """Each distinct law, with the springs that obey it."""
+    distinct: list[SpringLaw] = []
+    for law in laws:
+        if law not in distinct:
+            distinct.append(law)
+            yield law, [index for index, other in enumerate(laws) if other == law]

@@ -10,8 +10,7 @@ from functools import cached_property, reduce
 import numpy as np
 
 from vsacli.actuators.laws.inversion import inverse, with_sign_of
-from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.law import SpringLaw, SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, number

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw, alike
-from vsacli.actuators.laws.pair import Pair, PairSolution
+from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, alike
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import POSITIVE, number

@@ -1,25 +1,64 @@
-"""A spring given by its measured torque-deflection curve."""
+"""A spring given by its measured torque-deflection curve: smooth, with the shape of a hardening spring."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vsacli.actuators.laws.inversion import FirstGuess, inverse
-from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.laws.spline_curve import SplineCurve
-from vsacli.actuators.laws.state import SpringState
-from vsacli.actuators.laws.table_curve import fit_curve
-from vsacli.actuators.laws.tendon import Mirrored
+from vsacli.actuators.laws.law import SpringLaw, SpringState
+from vsacli.actuators.laws.spline_curve import SplineCurve, spline_curve, spline_knots, times_deflection
+from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.compute.control_flow import subroutine
 from vsacli.documents.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+
+DEGREE = 3
+MAX_PIECES = 24
+"""Knot spans of g; a spring has no finer features than a few dozen measured points can show."""
+
+REST_STIFFNESS_SHARE = 1e-3
+"""Share of its mean stiffness that a spring which pushes and pulls has at rest, since sigma > 0 is needed."""
+
+LEAST_SHAPE_SIZE = float(np.finfo(float).tiny)
+"""Stands for the size of a shape that lies between two measured deflections and is zero at both."""
+
+
+def fit_curve(deflection: FloatArray, torque: FloatArray) -> SplineCurve:
+    """Fit torques (samples,) measured at ascending deflections (samples,), which begin at or below zero."""
+    from scipy.optimize import nnls
+
+    pieces = int(np.clip(len(deflection) // 2, 1, MAX_PIECES))
+    knots = spline_knots(float(deflection[0]), float(deflection[-1]), pieces, DEGREE)
+    shapes = [_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
+    columns = np.column_stack([deflection, *(shape(deflection, 1, 1)[0] for shape in shapes)])
+    sizes = np.maximum(np.abs(columns).max(axis=0), LEAST_SHAPE_SIZE)
+    least = REST_STIFFNESS_SHARE * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
+    excess, *weights = nnls(columns / sizes, torque - least * deflection)[0] / sizes
+    return _curve(knots, np.array(weights), least + excess)
+
+
+def _curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> SplineCurve:
+    """The energy of a spring with the slope phi g(phi)."""
+
+    def energy(spline: PPoly) -> PPoly:
+        stiffness = times_deflection(spline).antiderivative()
+        stiffness.c[-1] += stiffness_at_rest
+        return stiffness.antiderivative(2)
+
+    return spline_curve(knots, weights, DEGREE, energy)
+
 
 MIN_ROWS = 6
 GUESS_NODES = 25

@@ -10,28 +10,24 @@ from typing import TYPE_CHECKING
 from vsacli.base.lazy import LazyRegistry, lazy_exports
 
 if TYPE_CHECKING:
-    from vsacli.actuators.laws.pair import PairSolution
-    from vsacli.actuators.mechanisms.mechanism import Mechanism
+    from vsacli.actuators.laws.law import PairSolution
+    from vsacli.actuators.mechanisms.mechanism import Mechanism, Partials
     from vsacli.actuators.mechanisms.potentials.potential import BranchStart, Potential, PotentialRange
     from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
-    from vsacli.actuators.mechanisms.preloaded_cams.maccepa import Maccepa
-    from vsacli.actuators.mechanisms.ratios.awas import Awas
-    from vsacli.actuators.mechanisms.ratios.lever import Lever
-    from vsacli.actuators.mechanisms.ratios.measured_scale import MeasuredScale
-    from vsacli.actuators.mechanisms.ratios.scales import PolynomialScale, Power
-    from vsacli.actuators.mechanisms.ratios.sine import Sine
+    from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import Maccepa
+    from vsacli.actuators.mechanisms.ratios.ratio import Awas, Lever, Sine
+    from vsacli.actuators.mechanisms.ratios.scales import MeasuredScale, PolynomialScale, Power
     from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
     from vsacli.actuators.mechanisms.shifted_cams import ShiftedCams
-    from vsacli.actuators.mechanisms.state import Partials
     from vsacli.base.units import DIMENSIONLESS, LEAD, LENGTH, LINEAR_STIFFNESS, POSITION, STIFFNESS, TORQUE
     from vsacli.documents.fields import NON_ZERO, POSITIVE, interval, number
 
 MECHANISMS = LazyRegistry(
     {
-        "awas": "vsacli.actuators.mechanisms.ratios.awas:Awas",
-        "lever": "vsacli.actuators.mechanisms.ratios.lever:Lever",
+        "awas": "vsacli.actuators.mechanisms.ratios.ratio:Awas",
+        "lever": "vsacli.actuators.mechanisms.ratios.ratio:Lever",
         "variable_ratio": "vsacli.actuators.mechanisms.ratios.variable_ratio:VariableRatio",
-        "maccepa": "vsacli.actuators.mechanisms.preloaded_cams.maccepa:Maccepa",
+        "maccepa": "vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam:Maccepa",
         "potential": "vsacli.actuators.mechanisms.potentials.potential:Potential",
         "cam": "vsacli.actuators.mechanisms.preloaded_cams.cam:Cam",
         "shifted_cams": "vsacli.actuators.mechanisms.shifted_cams:ShiftedCams",

@@ -1,20 +1,166 @@
-"""What every mechanism of a serial actuator offers: its potential with derivatives, and the inverse."""
+"""Mechanisms of serial actuators: a potential with derivatives, its inverse, and the springs in motion."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.mechanisms.state import DeflectionState, MechanismState, Partials
+from vsacli.actuators.elasticity import ElasticState
+from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.spring_elements import LeverSpring, SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.documents.fields import check_fields
 from vsacli.documents.source import Source
+
+
+class Partials(NamedTuple):
+    """The potential U(phi, s) and its partial derivatives at deflections and settings, arrays of one shape.
+
+    Subscripts of the torque T = U_phi: p for phi, s for the setting theta_2.
+
+    Attributes:
+        energy: U.
+        setting_torque: U_s, what the springs exert against motor 2.
+        setting_stiffness: U_ss.
+        T, T_p, T_s, T_pp, T_ps, T_ss, T_ppp, T_pps, T_pss: the torque and its derivatives.
+    """
+
+    energy: FloatArray
+    setting_torque: FloatArray
+    setting_stiffness: FloatArray
+    T: FloatArray
+    T_p: FloatArray
+    T_s: FloatArray
+    T_pp: FloatArray
+    T_ps: FloatArray
+    T_ss: FloatArray
+    T_ppp: FloatArray
+    T_pps: FloatArray
+    T_pss: FloatArray
+
+
+class DecouplingRows(NamedTuple):
+    """The matrix A = d(tau_e, sigma)/d(theta_1, theta_2); arrays of one shape."""
+
+    torque_1: FloatArray
+    torque_2: FloatArray
+    stiffness_1: FloatArray
+    stiffness_2: FloatArray
+
+    @property
+    def determinant(self) -> FloatArray:
+        """Zero where A is singular."""
+        return self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
+
+    def solve(self, torque_row: FloatArray, stiffness_row: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """A^-1 times a right-hand side; NaN where A is singular."""
+        determinant = self.determinant
+        divisor = np.where(determinant == 0, np.nan, determinant)
+        return (
+            (self.stiffness_2 * torque_row - self.torque_2 * stiffness_row) / divisor,
+            (self.torque_1 * stiffness_row - self.stiffness_1 * torque_row) / divisor,
+        )
+
+
+class MechanismState(ElasticState):
+    """The springs of a serial actuator at coordinates, for the inverse and for the forward dynamics."""
+
+    @property
+    @abstractmethod
+    def energy(self) -> FloatArray:
+        """Elastic energy U."""
+
+    @property
+    @abstractmethod
+    def rows(self) -> DecouplingRows:
+        """The matrix A."""
+
+    @abstractmethod
+    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
+        """Rates of the coordinates that give torque and stiffness these rates, (68); NaN if A is singular."""
+
+    @abstractmethod
+    def spring_rates(self, rates: FloatArray) -> FloatArray:
+        """Rates of the torques against the motors, (..., 2), from those of the coordinates."""
+
+    def determinant(self) -> FloatArray:
+        """Det A."""
+        return self.rows.determinant
+
+
+class DeflectionState(MechanismState):
+    """Springs whose potential depends on phi and s alone."""
+
+    def __init__(self, partials: Partials) -> None:
+        self._partials = partials
+
+    @property
+    def energy(self) -> FloatArray:
+        """U."""
+        return self._partials.energy
+
+    @property
+    def tau_e(self) -> FloatArray:
+        """T."""
+        return self._partials.T
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """T_p."""
+        return self._partials.T_p
+
+    @property
+    def tau_spring(self) -> FloatArray:
+        """T against motor 1, which carries the load; U_s against motor 2."""
+        return np.stack((self._partials.T, self._partials.setting_torque), axis=-1)
+
+    @property
+    def rows(self) -> DecouplingRows:
+        """Derivatives of T and T_p over phi and s."""
+        p = self._partials
+        return DecouplingRows(p.T_p, p.T_s, p.T_pp, p.T_ps)
+
+    def torque_rate(self, rates: FloatArray) -> FloatArray:
+        """T_p phi' + T_s s'."""
+        p = self._partials
+        return p.T_p * rates[..., 0] + p.T_s * rates[..., 1]
+
+    def stiffness_rate(self, rates: FloatArray) -> FloatArray:
+        """T_pp phi' + T_ps s'."""
+        p = self._partials
+        return p.T_pp * rates[..., 0] + p.T_ps * rates[..., 1]
+
+    def stiffness_curvature(self, rates: FloatArray) -> FloatArray:
+        """T_ppp phi'^2 + 2 T_pps phi' s' + T_pss s'^2."""
+        p, dphi, ds = self._partials, rates[..., 0], rates[..., 1]
+        return p.T_ppp * dphi * dphi + 2 * p.T_pps * dphi * ds + p.T_pss * ds * ds
+
+    def spring_rates(self, rates: FloatArray) -> FloatArray:
+        """Rates of T and U_s."""
+        p = self._partials
+        of_setting = p.T_s * rates[..., 0] + p.setting_stiffness * rates[..., 1]
+        return np.stack((self.torque_rate(rates), of_setting), axis=-1)
+
+    def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> FloatArray:
+        """A^-1 (tau_e', sigma')."""
+        return np.stack((*self.rows.solve(dtau_e, dstiffness), dq), axis=-1)
+
+    def motor_accelerations(
+        self, rates: FloatArray, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
+    ) -> FloatArray:
+        """A^-1 (tau_e'', sigma'') less what is quadratic in the rates; theta_1'' = phi'' + q''."""
+        p, dphi, ds = self._partials, rates[..., 0], rates[..., 1]
+        squared, mixed, of_setting = dphi * dphi, 2 * dphi * ds, ds * ds
+        ddphi, dds = self.rows.solve(
+            ddtau_e - (p.T_pp * squared + p.T_ps * mixed + p.T_ss * of_setting),
+            ddstiffness - (p.T_ppp * squared + p.T_pps * mixed + p.T_pss * of_setting),
+        )
+        return np.stack((ddphi + ddq, dds), axis=-1)
+
 
 Range: TypeAlias = tuple[float, float]
 

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from vsacli.actuators.laws import LAWS, SpringLaw
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.mechanisms.mechanism import Mechanism, Range
-from vsacli.actuators.mechanisms.state import Partials
+from vsacli.actuators.laws.law import PairSolution
+from vsacli.actuators.mechanisms.mechanism import Mechanism, Partials, Range
 from vsacli.actuators.pairs.preloaded import PRELOADS, PreloadedPair
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from vsacli.actuators.laws.law import SpringLaw
-from vsacli.actuators.laws.pair import Pair
+from vsacli.actuators.laws.law import Pair, SpringLaw
 
 __all__ = ["make_pair"]
 

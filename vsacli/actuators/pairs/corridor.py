@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.law import SpringState
 from vsacli.actuators.pairs.balance import Balance, PairState, under
-from vsacli.actuators.pairs.fold_map import FoldMap
-from vsacli.actuators.pairs.folds import outermost_fold
+from vsacli.actuators.pairs.folds import FoldMap, outermost_fold
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, where_needed
 

@@ -1,20 +1,338 @@
 """The outermost fold of a pair of springs: the critical point of the joint stiffness at the largest preload.
 
-From the map of it over the elastic torque, which is made once for the pair, one Newton step does for nearly
-every sample.
+A map of it over the elastic torque is made once: few nodes, between which Hermite's cubics guess it.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.inversion import hermite, in_single
+from vsacli.actuators.laws.law import SpringLaw, SpringState
+from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.actuators.pairs.balance import Balance, PairState
-from vsacli.actuators.pairs.critical_points import bracketed_in_box, is_short, newton_step
-from vsacli.actuators.pairs.fold_map import FoldMap
-from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.compute.control_flow import Values, repeat, where_needed
+from vsacli.actuators.pairs.critical_points import (
+    SHORT_RTOL,
+    along_critical_curve,
+    bracketed_in_box,
+    critical_curves,
+    is_short,
+    newton_step,
+)
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
 from vsacli.compute.rounding import OfRounding
+
+CUSP_SLOPE_RATIO = 30.0
+"""By how much the slope at the end of a stretch exceeds the mean if that end is a cusp.
+
+It does a billion times or more, or some thousand times where rounding hides how the curve begins."""
+
+NONE = -1
+"""Stands for the number of a curve where there is no fold."""
+
+
+class FoldPoints(NamedTuple):
+    """Critical points of the outermost curves; arrays (points,).
+
+    Attributes:
+        tau_e: elastic torque.
+        phi: deflections, (2, points).
+        slope: their derivatives along the curve, (2, points).
+        rho: relative hardening there, (2, points).
+        last: index of the last point in the same stretch of a curve.
+        cusp: 1 at the ends of a stretch where the curve turns around, else 0.
+    """
+
+    tau_e: FloatArray
+    phi: FloatArray
+    slope: FloatArray
+    rho: FloatArray
+    last: IndexArray
+    cusp: FloatArray
+
+
+class _Cells(NamedTuple):
+    """Between neighbouring critical points of the curve that is the outermost there.
+
+    Attributes:
+        edges: torques between the cells, (cells + 1,), ascending.
+        corners: tau_e, phi_1 and phi_2 at either end, (3, 2, cells).
+        curve: number of the curve, (cells,), or `NONE`.
+    """
+
+    edges: FloatArray
+    corners: FloatArray
+    curve: IndexArray
+
+
+def outermost_folds(balance: Balance) -> FoldPoints:
+    """The points of a pair over all elastic torques, so dense that each feature of the springs has some."""
+    return _row(balance, _cut(balance, _cells(balance.first, balance.second)))
+
+
+def _cells(first: SpringLaw, second: SpringLaw) -> _Cells:
+    """Those of negative torques, from the pair turned around, and of positive ones."""
+    above = _positive_cells(first, second)
+    below = _positive_cells(Mirrored(law=second), Mirrored(law=first))
+    turned = np.where(below.curve == NONE, NONE, below.curve + above.curve.max() + 1)
+    return _Cells(
+        np.concatenate((-below.edges[:0:-1], above.edges)),
+        np.concatenate((-below.corners[(0, 2, 1), ::-1, ::-1], above.corners), axis=-1),
+        np.concatenate((turned[::-1], above.curve)),
+    )
+
+
+def _positive_cells(first: SpringLaw, second: SpringLaw) -> _Cells:
+    """Those of positive tau_e."""
+    curves = list(critical_curves(first, second))
+    knots = np.unique(np.concatenate([[0.0], *(curve.tau_e for curve in curves)]))
+    middle = np.append((knots[:-1] + knots[1:]) / 2, np.inf)
+    corners = np.full((3, 2, middle.size), np.nan)
+    outermost, number = np.full(middle.size, -np.inf), np.full(middle.size, NONE)
+    for each, curve in enumerate(curves):
+        tau_e = curve.tau_e
+        preload = np.interp(middle, tau_e, curve.preload, left=-np.inf, right=-np.inf)
+        further = preload > outermost
+        outermost[further], number[further] = preload[further], each
+        cell = np.clip(np.searchsorted(tau_e, middle[further]) - 1, 0, len(tau_e) - 2)
+        for values, nodes in zip(corners, (tau_e, curve.phi_1, curve.phi_2), strict=True):
+            values[:, further] = nodes[cell], nodes[cell + 1]
+    changes = np.flatnonzero(_differ(corners[0, :, 1:], corners[0, :, :-1])) + 1
+    cells = np.append(0, changes)
+    return _Cells(np.append(knots[cells], np.inf), corners[:, :, cells], number[cells])
+
+
+def _differ(cells: FloatArray, others: FloatArray) -> BoolArray:
+    differ: BoolArray = ~np.all((cells == others) | (np.isnan(cells) & np.isnan(others)), axis=0)
+    return differ
+
+
+def _cut(balance: Balance, cells: _Cells) -> _Cells:
+    """The same with corners on the edges, also where another curve takes over between two points of one."""
+    corners = cells.corners.copy()
+    low, high = np.sort(cells.corners, axis=1).swapaxes(0, 1)
+    for side, edges in enumerate((cells.edges[:-1], cells.edges[1:])):
+        beyond = np.flatnonzero((cells.curve != NONE) & (corners[0, side] != edges))
+        box = (low[1, beyond], high[1, beyond], low[2, beyond], high[2, beyond])
+        corners[:, side, beyond] = edges[beyond], *bracketed_in_box(balance, edges[beyond], *box)
+    return cells._replace(corners=corners)
+
+
+def _row(balance: Balance, cells: _Cells) -> FoldPoints:
+    """The corners in a row, one where there is no fold, and one at infinity."""
+    ends = np.append(np.flatnonzero(np.diff(cells.curve)) + 1, cells.curve.size)
+    rows: list[FloatArray] = []
+    last: list[int] = []
+    for start, end in zip(np.append(0, ends), ends, strict=False):
+        row = cells.corners[:, 0, start:end]
+        if cells.curve[start] == NONE:
+            row = np.array([[cells.edges[start]], [np.nan], [np.nan]])
+        else:
+            row = np.column_stack((row, cells.corners[:, 1, end - 1]))
+        rows.append(row)
+        last += [len(last) + row.shape[1] - 1] * row.shape[1]
+    rows.append(np.array([[np.inf], [np.nan], [np.nan]]))
+    tau_e, *phi = np.concatenate(rows, axis=1)
+    state = balance.state(*phi)
+    slope = np.stack(along_critical_curve(state, state.rho)[:2])
+    numbers = np.array([*last, len(last)])
+    cusp = _cusps(tau_e, np.stack(phi), slope, numbers)
+    return FoldPoints(tau_e, np.stack(phi), slope, np.stack(state.rho), numbers, cusp)
+
+
+def _cusps(tau_e: FloatArray, phi: FloatArray, slope: FloatArray, last: IndexArray) -> FloatArray:
+    """1 where a stretch begins or ends with a slope that is vertical beside its mean, else 0."""
+    ends = np.unique(last)
+    begins = np.append(0, ends[:-1] + 1)
+    chord = (phi[:, ends] - phi[:, begins]) / (tau_e[ends] - tau_e[begins])
+    cusp = np.zeros(tau_e.size)
+    for nodes in (begins, ends):
+        flat = np.abs(slope[:, nodes]) <= CUSP_SLOPE_RATIO * np.abs(chord)
+        cusp[nodes] = np.where(flat.all(axis=0), 0.0, 1.0)
+    return cusp
+
+
+MONOTONE_SLOPE_RATIO = 3.0
+"""Most by which the slopes at the ends of a cubic exceed the mean so that it is monotone for sure."""
+
+GUESS_RTOL = 0.9 * SHORT_RTOL
+"""Relative distance to a fold that cubics between the nodes may have, so that one step is enough.
+
+It is seen to at `TESTED` points of a cubic, between which it may be a little more."""
+
+TESTED = np.linspace(0, 1, 10)[1:-1]
+"""Shares of the critical points between two nodes at which the cubic is compared with them."""
+
+SAME_SLOPE_RTOL = 1e-6
+"""Relative change of the slopes where a curve ends and the next goes on, of which one node is enough."""
+
+MIDDLE_ROOT = 0.5
+"""Root of the share, counted from a cusp, at which the cubic meets the curve."""
+
+
+class FoldMap(NamedTuple):
+    """Nodes of the outermost fold, of which two of the same torque are where it jumps; arrays (nodes,).
+
+    Between two nodes the fold moves from one corner of a box to the other; there is none if either of them
+    has no deflections.
+
+    Attributes:
+        tau_e: elastic torques, ascending from minus infinity to infinity.
+        phi_1: deflections of side 1, NaN beyond the ends and at the beginning of a gap.
+        phi_2: deflections of side 2, likewise.
+        slope_1: derivatives of phi_1 over tau_e, with the digits of single precision; at a cusp over the root
+            of the share of the cell, divided by its width.
+        slope_2: the same of phi_2.
+        cusp: 1 where the curve turns around, so that the fold moves there as the root of tau_e, else 0.
+    """
+
+    tau_e: FloatArray
+    phi_1: FloatArray
+    phi_2: FloatArray
+    slope_1: FloatArray
+    slope_2: FloatArray
+    cusp: FloatArray
+
+    def guess(self, tau_e: FloatArray) -> tuple[BoolArray, Values, Values]:
+        """Whether there is a fold, phi_1 and phi_2 near it, and those at the nodes before and after."""
+        cell = np.searchsorted(self.tau_e[1:-1], tau_e, side="right")
+        low, low_1, low_2, *of_low = look_up(self, cell)
+        high, high_1, high_2, *of_high = look_up(self, cell + 1)
+        width = high - low
+        cubic = _Cubic.of((tau_e - low) / width, width, (of_low[-1], of_high[-1]))
+        near = cubic(low_1, high_1, of_low[0], of_high[0]), cubic(low_2, high_2, of_low[1], of_high[1])
+        return ~np.isnan(low_1 + high_1), near, (low_1, high_1, low_2, high_2)
+
+
+class _Cubic(NamedTuple):
+    """Where in a cell to evaluate Hermite's cubics.
+
+    Attributes:
+        x: share of the cell, or its root, counted from the cusp, if an end is one.
+        start: derivative of the share over x at the beginning of the cell, times its width.
+        end: the same at its end; at a cusp itself it is the width, with which slopes there are kept.
+    """
+
+    x: FloatArray
+    start: FloatArray
+    end: FloatArray
+
+    @classmethod
+    def of(cls, share: FloatArray, width: FloatArray, cusps: Values) -> _Cubic:
+        """The place of a share of a cell; one end at most is a cusp."""
+        first, last = cusps
+        root = np.sqrt(np.where(last > 0, 1 - share, share))
+        x = np.where(first > 0, root, np.where(last > 0, 1 - root, share))
+        return cls(x, width * (1 + last), width * (1 + first))
+
+    def __call__(self, low: FloatArray, high: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
+        """The cubic from values and slopes at both ends."""
+        return hermite(self.x, low, high, first * self.start, last * self.end)
+
+
+def map_folds(first: SpringLaw, second: SpringLaw) -> FoldMap:
+    """The outermost folds of a pair over all elastic torques."""
+    balance = Balance(first, second)
+    with np.errstate(all="ignore"):  # vertical at a cusp, unknown without stiffness, and far away
+        points = outermost_folds(balance)
+        return _map(points, _kept(points))
+
+
+def _kept(points: FoldPoints) -> IndexArray:
+    """As few of the points as there can be with cubics between them that are close to the others."""
+    farthest = _farthest(points).tolist()
+    kept = [0]
+    while kept[-1] + 1 < len(farthest):
+        kept.append(max(farthest[kept[-1]], kept[-1] + 1))
+    return np.array(kept)
+
+
+def _farthest(points: FoldPoints) -> IndexArray:
+    """How far from each point a cubic may go, found for all of them at once by steps that are halved."""
+    start = np.arange(points.tau_e.size)
+    reached = np.minimum(start + 1, points.last)
+    step = 1 << int((points.last - start).max()).bit_length()
+    while step := step // 2:
+        further = reached + step
+        possible = np.flatnonzero(further <= points.last)
+        good = possible[_is_close(points, start[possible], further[possible])]
+        reached[good] = further[good]
+    going = np.flatnonzero(points.last > start)
+    to_end = going[_is_close(points, going, points.last[going])]  # from further away if that is a cusp
+    reached[to_end] = points.last[to_end]
+    return reached
+
+
+def _is_close(points: FoldPoints, start: IndexArray, end: IndexArray) -> BoolArray:
+    """Whether cubics from points to others are close to the critical points between them."""
+    between = start + np.rint(TESTED[:, None] * (end - start)).astype(int)
+    cubic = _cubic(points, start, end, between)
+    error, hardened, size = (np.zeros(between.shape) for _ in range(3))
+    for side, (phi, rho) in enumerate(zip(points.phi, points.rho, strict=True)):
+        slopes = _slopes(points, side, start, end)
+        missed = np.abs(cubic(phi[start], phi[end], *slopes) - phi[between])
+        error, hardened = error + missed, hardened + np.abs(rho[between]) * missed
+        size = size + np.abs(phi[between])
+    close = np.all((error <= GUESS_RTOL * size) & (hardened <= GUESS_RTOL), axis=0)
+    usable: BoolArray = close & (points.cusp[start] * points.cusp[end] == 0)
+    return usable
+
+
+def _slopes(points: FoldPoints, side: int, start: IndexArray, end: IndexArray) -> Values:
+    """Slopes of one deflection in cells from points to others.
+
+    At a cusp it is that of the cubic through a point near the middle.
+    """
+    tau_e, phi = points.tau_e, points.phi[side]
+    first_cusp, last_cusp = points.cusp[start] > 0, points.cusp[end] > 0
+    chord = (phi[end] - phi[start]) / (tau_e[end] - tau_e[start])
+    first, last = (_limited(points.slope[side, each], chord) for each in (start, end))
+    share = np.where(first_cusp, MIDDLE_ROOT**2, 1 - MIDDLE_ROOT**2)
+    middle = np.searchsorted(tau_e, tau_e[start] + share * (tau_e[end] - tau_e[start]))
+    middle = np.clip(middle, start + 1, np.maximum(end - 1, start + 1))
+    cubic = _cubic(points, start, end, middle)
+    missed = phi[middle] - cubic(
+        phi[start], phi[end], np.where(first_cusp, 0.0, first), np.where(last_cusp, 0.0, last)
+    )
+    x = cubic.x
+    at_start, at_end = missed / (cubic.start * x * (1 - x) ** 2), -missed / (cubic.end * x**2 * (1 - x))
+    known = end > start + 1
+    return (
+        np.where(first_cusp, np.where(known, at_start, chord), first),
+        np.where(last_cusp, np.where(known, at_end, chord), last),
+    )
+
+
+def _cubic(points: FoldPoints, start: IndexArray, end: IndexArray, at: IndexArray) -> _Cubic:
+    """Where in cells from points to others further points are."""
+    width = points.tau_e[end] - points.tau_e[start]
+    share = (points.tau_e[at] - points.tau_e[start]) / width
+    return _Cubic.of(share, width, (points.cusp[start], points.cusp[end]))
+
+
+def _limited(slope: FloatArray, chord: FloatArray) -> FloatArray:
+    """A slope with which a cubic of that chord is monotone."""
+    ratio = np.nan_to_num(slope / chord, nan=1.0, posinf=MONOTONE_SLOPE_RATIO, neginf=0.0)
+    return chord * np.clip(ratio, 0, MONOTONE_SLOPE_RATIO)
+
+
+def _map(points: FoldPoints, kept: IndexArray) -> FoldMap:
+    """The map with nodes at some of the points."""
+    joined = np.flatnonzero(points.last[kept[1:]] == points.last[kept[:-1]])
+    before, after = np.full((2, 2, kept.size), np.nan)
+    for side in range(2):
+        cells = kept[joined], kept[joined + 1]
+        after[side, joined], before[side, joined + 1] = _slopes(points, side, *cells)
+    slope = np.where(np.isnan(before) | (np.abs(after) < np.abs(before)), after, before)
+    rounded = in_single(slope)
+    nodes = np.stack((points.tau_e[kept], *points.phi[:, kept], *rounded, points.cusp[kept]))
+    bend = np.abs(after[:, 1:] - before[:, :-1]).sum(axis=0) / np.abs(after[:, 1:]).sum(axis=0)
+    same = (nodes[:3, 1:] == nodes[:3, :-1]).all(axis=0) & (bend <= SAME_SLOPE_RTOL)
+    return FoldMap(*np.delete(nodes, np.flatnonzero(same), axis=1))
+
 
 MAX_NEWTON_STEPS = 12
 """Newton steps to a fold to which the map does not lead; three or four do."""

@@ -8,9 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.law import PairSolution, SpringLaw, SpringState
 from vsacli.actuators.pairs import make_pair
 from vsacli.actuators.reach import reach
 from vsacli.base.arrays import BoolArray, FloatArray

@@ -8,13 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw, state_of
-from vsacli.actuators.laws.pair import Pair, PairSolution
-from vsacli.actuators.pairs.balance import Balance
+from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, state_of
+from vsacli.actuators.pairs.balance import Balance, first_guess, third_order_step
 from vsacli.actuators.pairs.bracketing import bracketed_root
 from vsacli.actuators.pairs.corridor import Corridor, corridor
-from vsacli.actuators.pairs.equal_torque import first_guess, third_order_step
-from vsacli.actuators.pairs.fold_map import FoldMap, map_folds
+from vsacli.actuators.pairs.folds import FoldMap, map_folds
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat, where_needed
 from vsacli.compute.rounding import OfRounding

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vsacli.base.errors import VsacliError
-from vsacli.base.staging import is_folder, owner_of, remove, size_of, staging_name, sweep
+from vsacli.base.storage import is_folder, owner_of, remove, size_of, staging_name, sweep
 
 LIBRARY = "program.so"
 CHECKSUM = "program.sha256"

@@ -14,8 +14,7 @@ from vsacli.compute.subnormals import subnormals_as_zero
 
 if TYPE_CHECKING:
     from vsacli.compute.tracing import Program
-    from vsacli.compute.tracing.python_code import RowFunction, RowSpace
-    from vsacli.compute.tracing.row_calls import CallingRowFunction
+    from vsacli.compute.tracing.row_functions import CallingRowFunction, RowFunction, RowSpace
 
 SAMPLES_PER_PASS = 12288
 """Samples that NumPy takes at a time: fewer waste time in the interpreter, more leave the caches."""
@@ -133,8 +132,7 @@ class TracedEngine:
 def _row_function(kernel: Kernel) -> RowFunction | CallingRowFunction | None:
     """The program of a kernel on rows; None if it has loops or tables."""
     from vsacli.compute.tracing import is_of_calls
-    from vsacli.compute.tracing.python_code import RowFunction
-    from vsacli.compute.tracing.row_calls import CallingRowFunction
+    from vsacli.compute.tracing.row_functions import CallingRowFunction, RowFunction
 
     try:
         program = kernel_program(kernel)

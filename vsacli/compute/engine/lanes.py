@@ -2,92 +2,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from importlib.resources import files
 from typing import Any
 
 from vsacli.compute.tracing import Kind, Program, Symbol, is_of_calls
-from vsacli.compute.tracing.c_code import Dialect, Writer, digits, table_declarations
+from vsacli.compute.tracing.c_code import Dialect, Tables, Writer, digits, table_declarations
 from vsacli.compute.tracing.c_functions import VALUES, CallingCode
-from vsacli.compute.tracing.c_tables import Place, Tables
 
-_OPERATORS = {"and": " & ", "or": " | "}
-_CHOOSE = {
-    Kind.REAL: "choose",
-    Kind.TRUTH: "choose_integer",
-    Kind.BITS: "choose_integer",
-    Kind.INDEX: "choose_integer",
+_INTEGERS = [kind for kind in Kind if kind is not Kind.REAL]
+_CHOOSE: dict[Kind, str] = {
+    Kind.REAL: "choose({0}, {1}, {2})",
+    **dict.fromkeys(_INTEGERS, "choose_integer({0}, {1}, {2})"),
 }
 
 
-class VectorDialect(Dialect):
-    """Vector types of GCC and Clang, as in lanes.c: comparisons give masks, all bits set or none."""
+def _function(kind: Kind, name: str) -> str:
+    """Return what lanes.c calls a function."""
+    return name if name == "search" else f"each_{name}_integer" if kind is Kind.INDEX else f"each_{name}"
 
-    def __init__(self) -> None:
-        super().__init__({kind: "reals" if kind is Kind.REAL else "integers" for kind in Kind})
 
-    def real(self, number: float) -> str:
-        """As of `Dialect`."""
-        return f"spread({digits(number)})"
-
-    def array_type(self, _values: tuple[float, ...], _searched: bool) -> str:
-        """As of `Dialect`; what is gathered from it is of this type."""
-        return "double"
-
-    def entry(self, number: float, _array_type: str) -> str:
-        """As of `Dialect`."""
-        return digits(number)
-
-    def take(self, place: Place, index: str) -> str:
-        """As of `Dialect`."""
-        return f"each_take({place.pointer}, {index})"
-
-    def integer(self, number: int) -> str:
-        """As of `Dialect`."""
-        return f"spread_integer({number})"
-
-    def truth(self, value: bool) -> str:
-        """As of `Dialect`."""
-        return self.integer(-int(value))
-
-    def logical(self, operator: str, operands: Sequence[str]) -> str:
-        """As of `Dialect`."""
-        return f"~{operands[0]}" if operator == "not" else _OPERATORS[operator].join(operands)
-
-    def where(self, kind: Kind, truth: str, a: str, b: str) -> str:
-        """As of `Dialect`."""
-        return f"{_CHOOSE[kind]}({truth}, {a}, {b})"
-
-    def masked(self, truth: str, mask: str) -> str:
-        """As of `Dialect`."""
-        return f"{truth} & {mask}"
-
-    def function(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
-        """As of `Dialect`."""
-        if name == "search":
-            return f"search({', '.join(operands)})"
-        chosen = f"{name}_integer" if kind is Kind.INDEX else name
-        return f"each_{chosen}({', '.join(operands)})"
-
-    def any(self, truth: str) -> str:
-        """As of `Dialect`."""
-        return f"any({truth})"
-
-    def from_slot(self, kind: Kind, slot: str) -> str:
-        """As of `Dialect`; other values are kept bit for bit."""
-        return slot if kind is Kind.REAL else f"(integers){slot}"
-
-    def to_slot(self, kind: Kind, value: str) -> str:
-        """As of `Dialect`."""
-        return value if kind is Kind.REAL else f"(reals){value}"
-
-    def from_table(self, entry: str) -> str:
-        """As of `Dialect`."""
-        return f"spread({entry})"
-
-    def replaced(self, kind: Kind, truth: str, new: str, old: str) -> str:
-        """As of `Dialect`."""
-        return self.where(kind, truth, new, old)
+VECTORS = Dialect(
+    types={Kind.REAL: "reals", **dict.fromkeys(_INTEGERS, "integers")},
+    real=lambda number: f"spread({digits(number)})",
+    literal=digits,
+    array_type=lambda _values, _searched: "double",
+    take=lambda place, index: f"each_take({place.pointer}, {index})",
+    function=_function,
+    templates={
+        "integer": "spread_integer({0})",
+        "true": "spread_integer(-1)",
+        "false": "spread_integer(0)",
+        "and": "{0} & {1}",
+        "or": "{0} | {1}",
+        "not": "~{0}",
+        "bits": "{0} & {1}",
+        "any": "any({0})",
+        "spread": "spread({0})",
+    },
+    where=_CHOOSE,
+    replaced=_CHOOSE,
+)
+"""Vector types of GCC and Clang, as in lanes.c: comparisons give masks, all bits set or none."""
 
 
 def batch_source(program: Program) -> str:
@@ -120,7 +76,7 @@ def _calling_group(program: Program) -> Iterator[str]:
     """The same for a program of calls: loops copy between the rows and the workspace."""
     tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
-    code = CallingCode("part", program, Writer(VECTORS, tables), VECTORS)
+    code = CallingCode("part", program, Writer(VECTORS, tables))
     yield from code.declarations("static __attribute__((noinline))")
     yield "static void group(const double *const *in, double *const *out, int64_t at)"
     yield "{"
@@ -148,6 +104,3 @@ def _stores(type_: str, name: str, entries: list[tuple[int, Any]], value: str) -
     yield f"static const struct {{ int row; {type_} from; }} {name}[] = {{{pairs}}};"
     yield f"for (int n = 0; n < {len(entries)}; n++)"
     yield f"store(out[{name}[n].row] + at, {value.format(f'{name}[n].from')});"
-
-
-VECTORS = VectorDialect()

@@ -1,9 +1,6 @@
 """Tracing: run on symbols, the text that NumPy runs leaves a program, which becomes Python or C."""
 
-from vsacli.compute.tracing import (  # noqa: F401  (register loops, branches and calls of symbols)
-    traced_calls,
-    traced_control_flow,
-)
+from vsacli.compute.tracing import traced_control_flow  # noqa: F401  (registers the control flow of symbols)
 from vsacli.compute.tracing.array import TracedArray, cells_of, trace, trace_by_size
 from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol, is_of_calls
 from vsacli.compute.tracing.tape import MOST_RECORDED, Tape, TooLongError

@@ -1,26 +1,29 @@
-"""Programs as statements of C, in a dialect for single samples or one for vectors of them."""
+"""Programs as statements of C.
+
+A `Writer` writes the operations of a program one after the other. A `Dialect` says how types, constants and
+choices are written: plain C99 for a single sample (`vsacli.control.codegen.scalar`), or vectors with one
+sample a lane (`vsacli.compute.engine.lanes`). `Tables` places the constant tables of programs in as few
+arrays as hold them all.
+"""
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
-from vsacli.compute.tracing.c_subroutines import Subroutines
-from vsacli.compute.tracing.c_tables import Place, Tables
 from vsacli.compute.tracing.program import (
     BITWISE,
     LOGICAL,
-    Branch,
     Kind,
-    Loop,
     Operand,
     Program,
     Symbol,
     Table,
     kind_of,
     kinds_of_operands,
+    table_uses,
 )
 
 INFIX = {
@@ -46,89 +49,142 @@ C_NAMES = {
 }
 """Functions that have another name than in NumPy."""
 
+REAL_TYPES = ("double", "float")
+"""Types of C for real numbers."""
+
 Names = Mapping[int, str]
 """What inputs of a program are called, by index."""
 
 
-class Dialect(ABC):
-    """How values and operations are written.
+class ConstantArray(NamedTuple):
+    """An array of constants.
+
+    Attributes:
+        name: as in C.
+        type: of its entries, as in C.
+        values: its entries.
+    """
+
+    name: str
+    type: str
+    values: tuple[float, ...]
+
+
+class Place(NamedTuple):
+    """Where a table is."""
+
+    array: ConstantArray
+    offset: int
+
+    @property
+    def pointer(self) -> str:
+        """Its first entry, as an expression of C."""
+        return f"{self.array.name} + {self.offset}" if self.offset else self.array.name
+
+
+ArrayType = Callable[[tuple[float, ...], bool], str]
+"""Type in C of an array with some values, and whether they are searched."""
+
+
+class Tables:
+    """All tables of some programs.
+
+    Args:
+        programs: whose tables they are.
+        array_type: of the entries of each array.
+
+    Attributes:
+        arrays: in which they lie, the longest first.
+    """
+
+    def __init__(self, programs: Iterable[Program], array_type: ArrayType) -> None:
+        uses = list(table_uses(*programs))
+        distinct = dict.fromkeys(table for table, _ in uses)
+        contents: list[tuple[float, ...]] = []
+        self._places = {
+            table: _part(contents, table.values)
+            for table in sorted(distinct, key=lambda table: -len(table.values))
+        }
+        searched = {self._places[table][0] for table, operation in uses if operation == "searchsorted"}
+        self.arrays = [
+            ConstantArray(f"table_{number}", array_type(values, number in searched), values)
+            for number, values in enumerate(contents)
+        ]
+
+    def place(self, table: Table) -> Place:
+        """Where a table is."""
+        number, offset = self._places[table]
+        return Place(self.arrays[number], offset)
+
+
+def _part(contents: list[tuple[float, ...]], values: tuple[float, ...]) -> tuple[int, int]:
+    """Number of the array in which values follow each other, bit for bit, or of a new one, and where."""
+    wanted = array("d", values)
+    for number, others in enumerate(contents):
+        whole, at = array("d", others).tobytes(), -1
+        while (at := whole.find(wanted.tobytes(), at + 1)) >= 0:
+            if at % wanted.itemsize == 0:
+                return number, at // wanted.itemsize
+    contents.append(values)
+    return len(contents) - 1, 0
+
+
+class Dialect(NamedTuple):
+    """How values and operations are written in C, as `Writer` asks for them.
 
     Attributes:
         types: C type of each kind of value.
+        real: writes a real constant.
+        literal: writes a real constant in an array.
+        array_type: chooses the type of the entries of an array.
+        take: writes the entry of a table at an index.
+        function: names the function for values of a kind: one of math.h; `maximum`, `minimum`, which let NaN
+            pass; or `search` in a table, which is given as a pointer and a number of entries.
+        templates: `integer` (a constant field of bits or index), `true`, `false`; `and`, `or`, `not` of truth
+            values; `bits` (a mask where a truth value holds, else 0); `any` (whether a truth value holds for
+            any sample, as a condition of C); `spread` (a real value from an array of constants).
+        where: template, for each kind, of one of two values by a truth value.
+        replaced: template of a new value where a truth value holds, else the old one, in a block of C that
+            is entered where it holds for any sample.
     """
 
-    def __init__(self, types: Mapping[Kind, str]) -> None:
-        self.types = types
-
-    @abstractmethod
-    def real(self, number: float) -> str:
-        """A constant."""
-
-    @abstractmethod
-    def array_type(self, values: tuple[float, ...], searched: bool) -> str:
-        """Type of the constants in an array, and whether a search goes through them."""
-
-    @abstractmethod
-    def entry(self, number: float, array_type: str) -> str:
-        """A constant in an array of a type."""
-
-    @abstractmethod
-    def take(self, place: Place, index: str) -> str:
-        """The entry of a table at an index."""
-
-    @abstractmethod
-    def integer(self, number: int) -> str:
-        """A constant field of bits or index."""
-
-    @abstractmethod
-    def truth(self, value: bool) -> str:
-        """A constant truth value."""
-
-    @abstractmethod
-    def logical(self, operator: str, operands: Sequence[str]) -> str:
-        """`and`, `or`, `not` of truth values."""
-
-    @abstractmethod
-    def where(self, kind: Kind, truth: str, a: str, b: str) -> str:
-        """One of two values of a kind."""
-
-    @abstractmethod
-    def masked(self, truth: str, mask: str) -> str:
-        """The mask where true, else 0."""
-
-    @abstractmethod
-    def function(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
-        """A call that gives a value of a kind.
-
-        The name is one of math.h; or `maximum`, `minimum`, which NaN passes through; or `search` in a table,
-        which are a pointer and a number of entries.
-        """
-
-    @abstractmethod
-    def any(self, truth: str) -> str:
-        """Whether a truth value holds for any sample, as a condition of C."""
-
-    @abstractmethod
-    def replaced(self, kind: Kind, truth: str, new: str, old: str) -> str:
-        """The new value, for samples for which a truth value holds, in a place where it does for one."""
-
-    @abstractmethod
-    def from_slot(self, kind: Kind, slot: str) -> str:
-        """The value of a kind that lies in a place for real ones."""
-
-    @abstractmethod
-    def to_slot(self, kind: Kind, value: str) -> str:
-        """A value of a kind as it lies in a place for real ones."""
-
-    @abstractmethod
-    def from_table(self, entry: str) -> str:
-        """A real value from a table of constants."""
+    types: Mapping[Kind, str]
+    real: Callable[[float], str]
+    literal: Callable[[float], str]
+    array_type: ArrayType
+    take: Callable[[Place, str], str]
+    function: Callable[[Kind, str], str]
+    templates: Mapping[str, str]
+    where: Mapping[Kind, str]
+    replaced: Mapping[Kind, str]
 
     def constant(self, value: float | int | bool, kind: Kind) -> str:
-        """A constant of a kind."""
+        """Return a constant of a kind."""
         if kind is Kind.TRUTH:
-            return self.truth(bool(value))
-        return self.real(float(value)) if kind is Kind.REAL else self.integer(int(value))
+            return self.templates["true" if value else "false"]
+        if kind is Kind.REAL:  # a tolerance must stay one: single precision takes a larger
+            return self.real(value if isinstance(value, float) else float(value))
+        return self.write("integer", int(value))
+
+    def entry(self, number: float, array_type: str) -> str:
+        """Return a constant in an array of a type."""
+        return self.literal(number) if array_type in REAL_TYPES else str(int(number))
+
+    def write(self, template: str, *operands: Any) -> str:
+        """Return one of `templates` with these operands."""
+        return self.templates[template].format(*operands)
+
+    def call(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
+        """Return a call of a function that gives a value of a kind."""
+        return f"{self.function(kind, name)}({', '.join(operands)})"
+
+    def from_slot(self, kind: Kind, slot: str) -> str:
+        """Return the value of a kind that lies in a place for real ones."""
+        return slot if kind is Kind.REAL else f"({self.types[kind]}){slot}"
+
+    def to_slot(self, kind: Kind, value: str) -> str:
+        """Return a value of a kind as it lies in a place for real ones, which holds all flags and indices."""
+        return value if kind is Kind.REAL else f"({self.types[Kind.REAL]}){value}"
 
 
 def digits(number: float) -> str:
@@ -146,33 +202,37 @@ class Writer:
     Args:
         dialect: how to write.
         tables: where their constants are.
-        subroutines: which there are.
+        subroutines: names the function of a subroutine.
     """
 
-    def __init__(self, dialect: Dialect, tables: Tables, subroutines: Subroutines | None = None) -> None:
-        self._dialect = dialect
+    def __init__(
+        self, dialect: Dialect, tables: Tables, subroutines: Callable[[Program], str] | None = None
+    ) -> None:
+        self.dialect = dialect
         self._tables = tables
-        self._subroutines = subroutines or Subroutines()
+        self._name_of = subroutines
 
     def statements(self, operations: Iterable[Symbol], names: Names, prefix: str = "v") -> Iterator[str]:
         """Declarations of the values of operations, in their order; names of values begin with the prefix."""
         for symbol in operations:
             if symbol.operation == "subroutine":
                 yield from self._subroutine(symbol, names, prefix)
-            elif symbol.operation in {"loop", "branch"}:
-                yield from self._nested(symbol, names, prefix)
+            elif symbol.operation == "loop":
+                yield from self._loop(symbol, names, prefix)
+            elif symbol.operation == "branch":
+                yield from self._branch(symbol, names, prefix)
             elif symbol.operation != "item":
                 text = self._expression(symbol, names, prefix)
-                yield f"const {self._dialect.types[symbol.kind]} {_name(symbol, names, prefix)} = {text};"
+                yield f"const {self.dialect.types[symbol.kind]} {_name(symbol, names, prefix)} = {text};"
 
     def value(self, operand: Operand, kind: Kind, names: Names, prefix: str = "v") -> str:
         """A value, or a constant of that kind."""
         if isinstance(operand, Symbol):
             return _name(operand, names, prefix)
-        return self._dialect.constant(operand, kind)
+        return self.dialect.constant(operand, kind)
 
     def _expression(self, symbol: Symbol, names: Names, prefix: str) -> str:
-        operation, dialect = symbol.operation, self._dialect
+        operation, dialect = symbol.operation, self.dialect
         if isinstance(table := symbol.operands[0], Table):
             return self._from_table(table, symbol, names, prefix)
         texts = [
@@ -186,20 +246,12 @@ class Writer:
         if operation == "isnan":
             return f"{texts[0]} != {texts[0]}"
         if operation == "where":
-            return dialect.where(symbol.kind, *texts)
+            return dialect.where[symbol.kind].format(*texts)
         if operation == "bits":
-            return dialect.masked(*texts)
+            return dialect.write("bits", *texts)
         if operation in LOGICAL:
-            return dialect.logical(LOGICAL[operation], texts)
-        return dialect.function(symbol.kind, C_NAMES.get(operation, operation), texts)
-
-    def function(self, body: Program) -> Iterator[str]:
-        """The function of a subroutine: its arguments, and where it puts its results."""
-        real = self._dialect.types[Kind.REAL]
-        names = {symbol.index: f"x{number}" for number, symbol in enumerate(body.inputs)}
-        arguments = [f"{real} {name}" for name in names.values()]
-        head = f"static void {self._subroutines.name(body)}({', '.join([*arguments, f'{real} *y'])})"
-        yield from self.definition(head, body, names, "y")
+            return dialect.write(LOGICAL[operation], *texts)
+        return dialect.call(symbol.kind, C_NAMES.get(operation, operation), texts)
 
     def definition(self, head: str, program: Program, names: Names, results: str) -> Iterator[str]:
         """A function that puts what a program computes into an array of real numbers."""
@@ -212,51 +264,45 @@ class Writer:
 
     def _subroutine(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
         """An array of the results, and what fills it."""
+        assert self._name_of is not None
         (body,), *operands = symbol.operands
         own = _name(symbol, names, prefix)
         arguments = [self.value(operand, Kind.REAL, names, prefix) for operand in operands]
-        yield f"{self._dialect.types[Kind.REAL]} {own}[{len(body.outputs)}];"
-        yield f"{self._subroutines.name(body)}({', '.join([*arguments, own])});"
+        yield f"{self.dialect.types[Kind.REAL]} {own}[{len(body.outputs)}];"
+        yield f"{self._name_of(body)}({', '.join([*arguments, own])});"
 
     def _from_table(self, table: Table, symbol: Symbol, names: Names, prefix: str) -> str:
         place, taken = self._tables.place(table), symbol.operation == "take"
         operand = self.value(symbol.operands[1], Kind.INDEX if taken else Kind.REAL, names, prefix)
         if taken:
-            return self._dialect.take(place, operand)
+            return self.dialect.take(place, operand)
         searched = (place.pointer, str(len(table.values)), operand)
-        return self._dialect.function(Kind.INDEX, C_NAMES[symbol.operation], searched)
+        return self.dialect.call(Kind.INDEX, C_NAMES[symbol.operation], searched)
 
-    def _nested(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
-        """A loop or branch: variables of its results, and the block that computes them."""
-        nested, *operands = symbol.operands
-        own = _name(symbol, names, prefix)
-        if isinstance(nested, Loop):
-            yield from self._loop(nested, own, operands, names, prefix)
-        else:
-            yield from self._branch(nested, own, operands, names, prefix)
-
-    def _loop(self, loop: Loop, own: str, operands: list[Any], names: Names, prefix: str) -> Iterator[str]:
-        body, dialect = loop.body, self._dialect
+    def _loop(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
+        """Variables of the state, and the loop that changes them."""
+        loop, *operands = symbol.operands
+        own, body, dialect = _name(symbol, names, prefix), loop.body, self.dialect
         state = [f"{own}_{number}" for number in loop.numbers]
         kinds = [symbol.kind for symbol in body.inputs]
         given = [
             self.value(operand, kind, names, prefix) for operand, kind in zip(operands, kinds, strict=True)
         ]
-        going = f"{own}_going"
-        yield f"{dialect.types[Kind.TRUTH]} {going} = {dialect.truth(True)};"
+        going, step = f"{own}_going", f"{own}_step"
+        yield f"{dialect.types[Kind.TRUTH]} {going} = {dialect.constant(True, Kind.TRUTH)};"
         yield from self._variables(state, given, kinds)
-        yield f"for (int {own}_step = 0; {own}_step < {loop.limit} && {dialect.any(going)}; {own}_step++) {{"
+        yield f"for (int {step} = 0; {step} < {loop.limit} && {dialect.write('any', going)}; {step}++) {{"
         inner = _renamed(body, [*state, *given[len(state) :]])
         yield from self._body(body, own, inner, state, going)
         done = self.value(body.outputs[-1], Kind.TRUTH, inner, f"{own}_v")
-        ongoing = dialect.logical("not", [done])
-        yield f"{going} = {dialect.logical('and', [going, f'({ongoing})'])};"
+        ongoing = dialect.write("not", done)
+        yield f"{going} = {dialect.write('and', going, f'({ongoing})')};"
         yield "}"
 
-    def _branch(
-        self, branch: Branch, own: str, operands: list[Any], names: Names, prefix: str
-    ) -> Iterator[str]:
-        body, dialect = branch.body, self._dialect
+    def _branch(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
+        """Variables of the results, and the block that changes them."""
+        branch, *operands = symbol.operands
+        own, body, dialect = _name(symbol, names, prefix), branch.body, self.dialect
         count = len(body.outputs)
         truth, otherwise, arguments = operands[0], operands[1 : 1 + count], operands[1 + count :]
         results = [f"{own}_{number}" for number in branch.numbers]
@@ -266,7 +312,7 @@ class Writer:
         ]
         yield from self._variables(results, given, kinds)
         where = self.value(truth, Kind.TRUTH, names, prefix)
-        yield f"if ({dialect.any(where)}) {{"
+        yield f"if ({dialect.write('any', where)}) {{"
         texts = [
             self.value(operand, symbol.kind, names, prefix)
             for operand, symbol in zip(arguments, body.inputs, strict=True)
@@ -276,7 +322,7 @@ class Writer:
 
     def _variables(self, names: list[str], values: list[str], kinds: list[Kind]) -> Iterator[str]:
         for name, value, kind in zip(names, values, kinds, strict=False):
-            yield f"{self._dialect.types[kind]} {name} = {value};"
+            yield f"{self.dialect.types[kind]} {name} = {value};"
 
     def _body(self, body: Program, own: str, names: Names, results: list[str], where: str) -> Iterator[str]:
         """Statements of a body, and its outputs put into variables all at once."""
@@ -285,9 +331,9 @@ class Writer:
         kinds = [kind_of(output) for output in body.outputs]
         for result, output, kind in zip(results, body.outputs, kinds, strict=False):
             value = self.value(output, kind, names, prefix)
-            yield f"const {self._dialect.types[kind]} {result}_new = {value};"
+            yield f"const {self.dialect.types[kind]} {result}_new = {value};"
         for result, kind in zip(results, kinds, strict=False):
-            yield f"{result} = {self._dialect.replaced(kind, where, f'{result}_new', result)};"
+            yield f"{result} = {self.dialect.replaced[kind].format(where, f'{result}_new', result)};"
 
 
 def table_declarations(tables: Tables, dialect: Dialect) -> Iterator[str]:

@@ -1,19 +1,82 @@
-"""C for programs that are nothing but calls: a function for each body, on values that lie in a workspace.
+"""Functions of C that keep code short: of subroutines, and of programs that are nothing but calls.
 
-A body may have hundreds of operations and be called hundreds of times, in each call on values in other places
-and with other constants. So a function is given the workspace, the constants of the call, and the places in
-the workspace of what it reads and writes.
+A subroutine is computed in a few places, in loops also: its function takes its arguments by value. The body
+of a call may have hundreds of operations and be called hundreds of times, each time on values in other
+places and with other constants. So its function is given the workspace in which all values lie, the constants
+of the call, and the places in the workspace of what it reads and writes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from array import array
+from collections.abc import Hashable, Iterable, Iterator
 from itertools import count
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from vsacli.compute.tracing.c_code import Dialect, Writer
-from vsacli.compute.tracing.program import Kind, Program, Symbol
-from vsacli.compute.tracing.workspace import Workspace, values_of
+from vsacli.compute.tracing.c_code import Writer
+from vsacli.compute.tracing.calls import Workspace, values_of
+from vsacli.compute.tracing.program import NESTED, Kind, Program, Subroutine, Symbol, Table
+
+
+class Subroutines:
+    """All subroutines of some programs; those that do the same are one.
+
+    Attributes:
+        bodies: by the name of the function, after those that it needs.
+    """
+
+    def __init__(self, programs: Iterable[Program] = ()) -> None:
+        self._names: dict[Hashable, str] = {}
+        self.bodies: dict[str, Program] = {}
+        for program in programs:
+            for body in _bodies(program):
+                name = self._names.setdefault(_key(body), f"subroutine_{len(self._names)}")
+                self.bodies.setdefault(name, body)
+
+    def name(self, body: Program) -> str:
+        """Return the name of the function that does what a body does."""
+        return self._names[_key(body)]
+
+    def functions(self, writer: Writer) -> Iterator[Iterator[str]]:
+        """Yield the text of each function: its arguments by value, and where it puts its results."""
+        real = writer.dialect.types[Kind.REAL]
+        for name, body in self.bodies.items():
+            names = {symbol.index: f"x{number}" for number, symbol in enumerate(body.inputs)}
+            arguments = [f"{real} {each}" for each in names.values()]
+            head = f"static void {name}({', '.join([*arguments, f'{real} *y'])})"
+            yield writer.definition(head, body, names, "y")
+
+
+def _bodies(program: Program) -> Iterator[Program]:
+    """Those of subroutines, the inner ones first."""
+    for symbol in program.operations:
+        if symbol.operation in NESTED:
+            nested = symbol.operands[0]
+            yield from _bodies(nested.body)
+            if isinstance(nested, Subroutine):
+                yield nested.body
+
+
+def _key(program: Program) -> Hashable:
+    """What is the same of programs that do the same in the same order."""
+    operations = tuple(
+        (symbol.index, symbol.operation, symbol.kind, *map(_operand_key, symbol.operands))
+        for symbol in program.operations
+    )
+    return tuple(map(_operand_key, program.inputs)), operations, tuple(map(_operand_key, program.outputs))
+
+
+def _operand_key(operand: Any) -> Hashable:
+    """A value by its number, a constant by its digits; NaN, too, equals itself."""
+    if isinstance(operand, Symbol):
+        return operand.index, operand.kind
+    if isinstance(operand, Table):
+        return array("d", operand.values).tobytes()
+    if isinstance(operand, tuple):  # what holds a program
+        body, *rest = operand
+        return type(operand), _key(body), repr(rest)
+    return repr(operand)
+
 
 VALUES, CONSTANTS, PLACES = "values", "constants", "places"
 """What a function calls the workspace, its constants, and the places of its arguments and results."""
@@ -34,18 +97,17 @@ class CallingCode:
         name: what the names of functions and tables begin with.
         program: one of nothing but calls and their items.
         writer: writes the bodies.
-        dialect: how.
 
     Attributes:
         slots: how many values the workspace holds.
         slot: place in the workspace of inputs and outputs, by index: of inputs in their order, from 0 on.
     """
 
-    def __init__(self, name: str, program: Program, writer: Writer, dialect: Dialect) -> None:
+    def __init__(self, name: str, program: Program, writer: Writer) -> None:
         self._name = name
         self._writer = writer
-        self._dialect = dialect
-        self._number = dialect.array_type((), True)
+        self._dialect = writer.dialect
+        self._number = self._dialect.array_type((), True)
         self._functions: dict[int, _Function] = {}
         self._constants: list[float] = []
         self._places: list[int] = []
@@ -111,7 +173,7 @@ class CallingCode:
         sources, values, constants = {}, 0, 0
         for symbol, constant in zip(function.body.inputs, function.constant, strict=True):
             if constant:
-                sources[symbol.index] = self._dialect.from_table(f"{CONSTANTS}[{constants}]")
+                sources[symbol.index] = self._dialect.write("spread", f"{CONSTANTS}[{constants}]")
                 constants += 1
             else:
                 sources[symbol.index] = self.value(symbol, f"{PLACES}[{values}]")

@@ -7,7 +7,7 @@ operations, too: they hold the program of their body, and operations called "ite
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -259,3 +259,22 @@ def _common_kind(operands: Sequence[Any]) -> Kind:
     if len(kinds) > 1:
         raise NotImplementedError(f"values of different kinds cannot be joined: {kinds}")
     return kinds.pop()
+
+
+def table_uses(*programs: Program) -> Iterator[tuple[Table, str]]:
+    """Yield tables with the operations on them, in nested programs as well, each of which is read once."""
+    seen: set[int] = set()
+    for program in programs:
+        yield from _uses(program, seen)
+
+
+def _uses(program: Program, seen: set[int]) -> Iterator[tuple[Table, str]]:
+    if id(program) in seen:
+        return
+    seen.add(id(program))
+    for symbol in program.operations:
+        for operand in symbol.operands:
+            if isinstance(operand, Table):
+                yield operand, symbol.operation
+            elif isinstance(operand, Loop | Branch | Call | Subroutine):
+                yield from _uses(operand.body, seen)

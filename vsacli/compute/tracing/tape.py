@@ -7,9 +7,7 @@ from collections.abc import Hashable, Sequence
 from typing import Any
 
 from vsacli.compute.rounding import OfRounding
-from vsacli.compute.tracing.constant_folding import folded
-from vsacli.compute.tracing.dead_code import without_dead_code
-from vsacli.compute.tracing.outlining import with_outlined_runs
+from vsacli.compute.tracing.calls import with_outlined_runs, with_shared_bodies
 from vsacli.compute.tracing.program import (
     COMMUTATIVE,
     NESTED,
@@ -25,7 +23,7 @@ from vsacli.compute.tracing.program import (
     kind_of,
     result_kind,
 )
-from vsacli.compute.tracing.shared_bodies import with_shared_bodies
+from vsacli.compute.tracing.simplification import folded, without_dead_code
 
 MOST_RECORDED = 50_000
 """Operations of what becomes one function, a few of which no output needs: gcc takes a minute and 0.6 GB."""

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from vsacli.compute.tracing import Program, Symbol
-from vsacli.compute.tracing.c_tables import Tables
+from vsacli.compute.tracing.c_code import Tables
 from vsacli.compute.tracing.program import FUNCTIONS, Branch, Call, Loop, Subroutine, Table
-from vsacli.control.codegen.scalar import BYTES, Scalar
+from vsacli.control.codegen.scalar import BYTES, scalar_dialect
 
 BYTES_OF_PLACE = 4
 """Of an int."""
@@ -43,7 +43,7 @@ def worst_cost(program: Program) -> Cost:
 def table_bytes(programs: Iterable[Program], precision: str) -> int:
     """Memory of all constant tables, those of which calls are given rows among them."""
     programs = list(programs)
-    tables = Tables(programs, Scalar(precision).array_type)
+    tables = Tables(programs, scalar_dialect(precision).array_type)
     of_calls = sum(_bytes_of_calls(program, precision) for program in programs)
     return of_calls + sum(BYTES[array.type] * len(array.values) for array in tables.arrays)
 

@@ -18,9 +18,8 @@ from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.parameters import Maker, check_parameters, with_parameters
-from vsacli.control.codegen.precision_check import check_single_precision
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.self_test import Reference
+from vsacli.control.codegen.self_test import Reference, check_single_precision
 from vsacli.control.codegen.texts import (
     DIGEST,
     binding_text,

@@ -10,18 +10,23 @@ import numpy as np
 
 from vsacli.compute.rounding import single
 from vsacli.compute.tracing import Kind, Program, Symbol, is_of_calls
-from vsacli.compute.tracing.c_code import Dialect, Names, Writer, digits, table_declarations
-from vsacli.compute.tracing.c_functions import VALUES, CallingCode
-from vsacli.compute.tracing.c_subroutines import Subroutines
-from vsacli.compute.tracing.c_tables import Place, Tables
+from vsacli.compute.tracing.c_code import (
+    REAL_TYPES,
+    Dialect,
+    Names,
+    Place,
+    Tables,
+    Writer,
+    digits,
+    table_declarations,
+)
+from vsacli.compute.tracing.c_functions import VALUES, CallingCode, Subroutines
 from vsacli.control.codegen.interface import Function, Structure, structures
 
-PRECISIONS = ("double", "float")
+PRECISIONS = REAL_TYPES
 
 WIDTH = 110
 """Characters of a line, at most, but for comments behind code."""
-
-_OPERATORS = {"and": " && ", "or": " || "}
 
 HELPERS = {
     "maximum": "{type} maximum({type} a, {type} b) {{ return a >= b || a != a ? a : b; }}",
@@ -45,99 +50,6 @@ static inline int search(const {type} *nodes, int count, {type} x)
 """Functions beyond math.h; of the two sides of a comparison, maximum and minimum let NaN pass."""
 
 
-class Scalar(Dialect):
-    """Plain C99.
-
-    Args:
-        precision: one of `PRECISIONS`.
-    """
-
-    def __init__(self, precision: str) -> None:
-        types = {Kind.REAL: precision, Kind.TRUTH: "int", Kind.BITS: "unsigned", Kind.INDEX: "int"}
-        super().__init__(types)
-        self._suffix = "f" if precision == "float" else ""
-
-    def constant(self, value: float | int | bool, kind: Kind) -> str:
-        """As of `Dialect`."""
-        return super().constant(single(value) if self._suffix and kind is Kind.REAL else value, kind)
-
-    def real(self, number: float) -> str:
-        """As of `Dialect`; NAN and INFINITY of math.h are floats."""
-        if not self._suffix:
-            return digits(number).replace("INFINITY", "HUGE_VAL").replace("NAN", "(double)NAN")
-        text = digits(single(number))
-        if "N" in text:
-            return text
-        return text.replace(")", "f)") if text.endswith(")") else f"{text}f"
-
-    def array_type(self, values: tuple[float, ...], searched: bool) -> str:
-        """As of `Dialect`: the smallest that holds all digits, or as many as the precision has."""
-        number = self.types[Kind.REAL]
-        if searched:
-            return number
-        return next((name for name, holds in _SMALLER_TYPES.items() if all(map(holds, values))), number)
-
-    def entry(self, number: float, array_type: str) -> str:
-        """As of `Dialect`."""
-        return self.real(number) if array_type in PRECISIONS else str(int(number))
-
-    def take(self, place: Place, index: str) -> str:
-        """As of `Dialect`."""
-        own, of_entry = self.types[Kind.REAL], place.array.type
-        entry = f"{place.array.name}[{index}{f' + {place.offset}' if place.offset else ''}]"
-        return entry if of_entry == own else f"({own}){entry}"
-
-    def integer(self, number: int) -> str:
-        """As of `Dialect`."""
-        return str(number)
-
-    def truth(self, value: bool) -> str:
-        """As of `Dialect`."""
-        return str(int(value))
-
-    def logical(self, operator: str, operands: Sequence[str]) -> str:
-        """As of `Dialect`."""
-        return f"!{operands[0]}" if operator == "not" else _OPERATORS[operator].join(operands)
-
-    def where(self, _kind: Kind, truth: str, a: str, b: str) -> str:
-        """As of `Dialect`."""
-        return f"{truth} ? {a} : {b}"
-
-    def masked(self, truth: str, mask: str) -> str:
-        """As of `Dialect`."""
-        return f"{truth} ? {mask}u : 0u"
-
-    def function(self, kind: Kind, name: str, operands: Sequence[str]) -> str:
-        """As of `Dialect`."""
-        if name == "search":
-            return f"search({', '.join(operands)})"
-        if name in HELPERS:
-            called = f"{name}_index" if kind is Kind.INDEX else name
-        else:
-            called = f"{name}{self._suffix}"
-        return f"{called}({', '.join(operands)})"
-
-    def any(self, truth: str) -> str:
-        """As of `Dialect`."""
-        return truth
-
-    def replaced(self, _kind: Kind, _truth: str, new: str, _old: str) -> str:
-        """As of `Dialect`."""
-        return new
-
-    def from_slot(self, kind: Kind, slot: str) -> str:
-        """As of `Dialect`."""
-        return slot if kind is Kind.REAL else f"({self.types[kind]}){slot}"
-
-    def to_slot(self, kind: Kind, value: str) -> str:
-        """As of `Dialect`; floating-point numbers of either precision hold all flags and indices."""
-        return value if kind is Kind.REAL else f"({self.types[Kind.REAL]}){value}"
-
-    def from_table(self, entry: str) -> str:
-        """As of `Dialect`."""
-        return entry
-
-
 def _holds_float(value: float) -> bool:
     """Whether single precision has all digits of a number that is not below its range."""
     return math.isnan(value) or (single(value) == value and float(np.float32(value)) == value)
@@ -159,16 +71,76 @@ BYTES = {"signed char": 1, "short": 2, "float": 4, "double": 8}
 """Of an entry of each type."""
 
 
+def scalar_dialect(precision: str) -> Dialect:
+    """Return the dialect of plain C99 for a single sample.
+
+    Args:
+        precision: one of `PRECISIONS`.
+    """
+    literal = _single_literal if precision == "float" else _double_literal
+    suffix = "f" if precision == "float" else ""
+
+    def array_type(values: tuple[float, ...], searched: bool) -> str:
+        """Return the smallest type that holds all digits, or as many as the precision has."""
+        smaller = () if searched else _SMALLER_TYPES.items()
+        return next((name for name, holds in smaller if all(map(holds, values))), precision)
+
+    def take(place: Place, index: str) -> str:
+        entry = f"{place.array.name}[{index}{f' + {place.offset}' if place.offset else ''}]"
+        return entry if place.array.type == precision else f"({precision}){entry}"
+
+    def function(kind: Kind, name: str) -> str:
+        if name == "search":
+            return name
+        if name in HELPERS:
+            return f"{name}_index" if kind is Kind.INDEX else name
+        return f"{name}{suffix}"
+
+    return Dialect(
+        types={Kind.REAL: precision, Kind.TRUTH: "int", Kind.BITS: "unsigned", Kind.INDEX: "int"},
+        real=literal,
+        literal=literal,
+        array_type=array_type,
+        take=take,
+        function=function,
+        templates={
+            "integer": "{0}",
+            "true": "1",
+            "false": "0",
+            "and": "{0} && {1}",
+            "or": "{0} || {1}",
+            "not": "!{0}",
+            "bits": "{0} ? {1}u : 0u",
+            "any": "{0}",
+            "spread": "{0}",
+        },
+        where=dict.fromkeys(Kind, "{0} ? {1} : {2}"),
+        replaced=dict.fromkeys(Kind, "{1}"),
+    )
+
+
+def _double_literal(number: float) -> str:
+    """Return a constant; NAN and INFINITY of math.h are floats."""
+    return digits(number).replace("INFINITY", "HUGE_VAL").replace("NAN", "(double)NAN")
+
+
+def _single_literal(number: float) -> str:
+    text = digits(single(number))
+    if "N" in text:
+        return text
+    return text.replace(")", "f)") if text.endswith(")") else f"{text}f"
+
+
 def definitions(prefix: str, functions: Sequence[Function], precision: str) -> Iterator[str]:
     """Yield all that the source file defines: constants, helpers, subroutines, then the functions."""
-    dialect = Scalar(precision)
+    dialect = scalar_dialect(precision)
     programs = [function.program for function in functions]
     tables = Tables(programs, dialect.array_type)
     subroutines = Subroutines(programs)
-    writer = Writer(dialect, tables, subroutines)
-    bodies = ["\n".join(indented(writer.function(body))) for body in subroutines.bodies.values()]
+    writer = Writer(dialect, tables, subroutines.name)
+    bodies = ["\n".join(indented(text)) for text in subroutines.functions(writer)]
     bodies += [
-        "\n".join(_definition(prefix, function, program, writer, dialect))
+        "\n".join(_definition(prefix, function, program, writer))
         for function, program in zip(functions, programs, strict=True)
     ]
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
@@ -211,15 +183,13 @@ def indented(lines: Iterable[str], depth: int = 0) -> Iterator[str]:
         depth += line.endswith("{")
 
 
-def _definition(
-    prefix: str, function: Function, program: Program, writer: Writer, dialect: Dialect
-) -> Iterator[str]:
+def _definition(prefix: str, function: Function, program: Program, writer: Writer) -> Iterator[str]:
     entries = [f"{name}->{entry}" for name, structure in function.arguments for entry in structure.entries]
     if is_of_calls(program):
-        code = CallingCode(function.name, program, writer, dialect)
+        code = CallingCode(function.name, program, writer)
         yield from indented(code.declarations("static"))
         yield f"{signature(prefix, function)}\n{{"
-        yield f"    {dialect.types[Kind.REAL]} {VALUES}[{code.slots}];"
+        yield f"    {writer.dialect.types[Kind.REAL]} {VALUES}[{code.slots}];"
         yield from (f"    {VALUES}[{slot}] = {entry};" for slot, entry in enumerate(entries))
         yield from (f"    {line}" for line in code.statements())
         outputs = (output for output in program.outputs if isinstance(output, Symbol))

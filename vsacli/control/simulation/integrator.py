@@ -13,10 +13,9 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Stored
-from vsacli.control.simulation.budget import Deadline, Progress
-from vsacli.control.simulation.ending import INCOMPLETE, Ending
-from vsacli.control.simulation.equations.equations import Edge, Equations
-from vsacli.control.simulation.equations.stages import dop853_with_stages
+from vsacli.control.simulation.compiled_loop import dop853_with_stages
+from vsacli.control.simulation.ending import INCOMPLETE, Deadline, Ending, Progress
+from vsacli.control.simulation.loop_equations import Edge, Equations
 from vsacli.control.simulation.sliding import Sliding, Switch
 from vsacli.control.simulation.stiff import jacobian, resolved
 

@@ -11,7 +11,7 @@ from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import measured
-from vsacli.control.simulation.state_vector import Phase
+from vsacli.control.simulation.closed_loop import Phase
 from vsacli.documents.fields import LARGEST
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot

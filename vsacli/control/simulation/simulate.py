@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from vsacli.analysis.run import Run
-from vsacli.analysis.uncertainty_text import undetermined_text
+from vsacli.analysis.trouble_text import undetermined_text
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
@@ -19,20 +19,17 @@ from vsacli.base.flags import Flag, has
 from vsacli.compute.engine import Tell, unheard
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
-from vsacli.control.simulation.budget import Budget, Progress
-from vsacli.control.simulation.closed_loop import ClosedLoop
-from vsacli.control.simulation.controllers import Feedforward, LinearizingFeedback
-from vsacli.control.simulation.equations.recorded_equations import Computing, RecordedEquations
-from vsacli.control.simulation.goal_tolerance import GoalTolerance
-from vsacli.control.simulation.history import History, history
+from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, LinearizingFeedback
+from vsacli.control.simulation.ending import Budget, Progress
+from vsacli.control.simulation.history import History, StateTrajectory, continuous, history, sampled
 from vsacli.control.simulation.integrator import Integrator, Tolerances
-from vsacli.control.simulation.joint_tracking import joint_trackings, stiffness_warnings
-from vsacli.control.simulation.reference import Reference
-from vsacli.control.simulation.rounding import check_rounding
+from vsacli.control.simulation.joint_tracking import GoalTolerance, joint_trackings, stiffness_warnings
+from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.sensors import Readings, Sensors
 from vsacli.control.simulation.simulation_report import SimulationReport, verdict_on
 from vsacli.control.simulation.sliding import sliding
-from vsacli.control.simulation.state_trajectory import StateTrajectory, continuous, sampled
+from vsacli.control.simulation.stiff import check_rounding
+from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block, fitted
 from vsacli.robot.model import Robot

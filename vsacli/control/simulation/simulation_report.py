@@ -10,8 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vsacli.analysis.energy_text import energy_lines
-from vsacli.analysis.report_text import WIDTH, warnings_and_notes
+from vsacli.analysis.report_text import WIDTH, energy_lines, warnings_and_notes
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import ReportText

@@ -1,13 +1,104 @@
-"""Functions of time that are costly at one instant, as piecewise polynomials through blocks of samples."""
+"""Functions of time that are costly at one instant, as piecewise polynomials through blocks of samples.
+
+A `Table` is what a recorded program reads as inputs, a `Reference` the trajectory that a controller follows.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import COMMANDED, DAMPING, POSITION
+from vsacli.base.wrench import WRENCH_NAMES, Wrench
+from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+
+class Table:
+    """Columns as piecewise polynomials of time; called with an `Instant`, it is an input of a program.
+
+    Attributes:
+        ends: of the cells, (cells + 1,), s.
+        coefficients: of powers of the time elapsed in the cell, highest first, (cells, powers, columns).
+    """
+
+    def __init__(self, ends: FloatArray, coefficients: FloatArray) -> None:
+        self.ends = np.ascontiguousarray(ends)
+        self.coefficients = np.ascontiguousarray(coefficients)
+
+    @classmethod
+    def of(cls, function: Callable[[FloatArray], FloatArray], breakpoints: FloatArray) -> Table:
+        """Of a function of time; see `tabulate`."""
+        polynomial = tabulate(function, breakpoints)
+        return cls(polynomial.x, np.moveaxis(polynomial.c, 1, 0))
+
+    @property
+    def columns(self) -> int:
+        """How many there are."""
+        return int(self.coefficients.shape[2])
+
+    @cached_property
+    def polynomial(self) -> PPoly[Any]:
+        """The same as SciPy has it."""
+        from scipy.interpolate import PPoly
+
+        return PPoly(np.moveaxis(self.coefficients, 1, 0), self.ends)
+
+    def __call__(self, time: Any) -> FloatArray:
+        """Columns at a time, (columns,), or at times (samples,), (samples, columns)."""
+        return time.columns_of(self) if isinstance(time, Instant) else self._at(time)
+
+    def _at(self, time: float | FloatArray) -> FloatArray:
+        if np.ndim(time):
+            return self.polynomial(time)
+        cell = int(np.searchsorted(self.ends[1:-1], time, "right"))
+        powers = (time - self.ends[cell]) ** np.arange(len(self.coefficients[cell]) - 1, -1, -1)
+        columns: FloatArray = powers @ self.coefficients[cell]
+        return columns
+
+
+class Constant(Table):
+    """Columns that stay as they are until they are set; (columns,) whatever the time."""
+
+    def __init__(self, values: FloatArray) -> None:
+        super().__init__(np.array([0.0, 1.0]), values[None, None].copy())
+
+    def set(self, values: FloatArray) -> None:
+        """From now on."""
+        self.coefficients[0, 0] = values
+
+    def _at(self, _time: float | FloatArray) -> FloatArray:
+        values: FloatArray = self.coefficients[0, 0]
+        return values
+
+
+class Instant:
+    """The time of a program: what tables have then are inputs of it.
+
+    Args:
+        inputs: makes so many further inputs, as an array.
+
+    Attributes:
+        tables: those that were read, in the order of their inputs.
+    """
+
+    def __init__(self, inputs: Callable[[int], FloatArray]) -> None:
+        self._inputs = inputs
+        self.tables: dict[Table, FloatArray] = {}
+
+    def columns_of(self, table: Table) -> FloatArray:
+        """What a table has at this time."""
+        if table not in self.tables:
+            self.tables[table] = self._inputs(table.columns)
+        return self.tables[table]
+
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -104,3 +195,53 @@ def _coefficients(nodes: FloatArray, lengths: FloatArray) -> FloatArray:
 
 def _halved(starts: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.concatenate((starts, starts + lengths / 2)), np.tile(lengths / 2, 2)
+
+
+class Reference:
+    """What a trajectory commands, and the wrench that acts meanwhile, as functions of time.
+
+    A time gives arrays (joints,), times (samples,) give arrays (samples, joints).
+
+    Attributes:
+        frame: of the wrench, None if there is none.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self.frame = None if trajectory.wrench is None else trajectory.wrench.frame
+        signals = (POSITION, *(COMMANDED[key] for key in trajectory.commanded))
+        self._commands = _tabulated(trajectory, [name for signal in signals for name in signal.names])
+        self._wrench = _tabulated(trajectory, WRENCH_NAMES) if self.frame else None
+        damped = DAMPING.key in trajectory.commanded
+        self._damping = _tabulated(trajectory, DAMPING.names) if damped else None
+
+    def __call__(self, time: float | FloatArray) -> Motion:
+        """Motion, stiffness and wrench."""
+        return Motion.of(np.asarray(time), self._commands(time), self.wrench(time))
+
+    def damping(self, time: float | FloatArray) -> dict[str, FloatArray]:
+        """The damping with its derivatives, by name; nothing if none is commanded."""
+        return {} if self._damping is None else self._damping(time)
+
+    def wrench(self, time: float | FloatArray) -> Wrench | None:
+        """The wrench alone."""
+        return None if self._wrench is None else Wrench(**self._wrench(time), frame=self.frame or "")
+
+
+def _tabulated(
+    trajectory: Trajectory, names: Sequence[str]
+) -> Callable[[float | FloatArray], dict[str, FloatArray]]:
+    """Variables of the motion by name, as functions of time."""
+
+    def columns(time: FloatArray) -> FloatArray:
+        variables = trajectory.at(time).variables()
+        return np.concatenate([variables[name] for name in names], axis=1)
+
+    table = Table.of(columns, trajectory.breakpoints)
+    width = table.columns // len(names)
+    parts = [slice(start, start + width) for start in range(0, table.columns, width)]
+
+    def arrays(time: float | FloatArray) -> dict[str, FloatArray]:
+        values = table(time)
+        return {name: values[..., part] for name, part in zip(names, parts, strict=True)}
+
+    return arrays

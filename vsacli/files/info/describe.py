@@ -1,30 +1,133 @@
-"""What a file holds, as JSON values: of a trajectory the ranges of its signals, of a result its report."""
+"""Descriptions of files as JSON values: ranges of a trajectory, reports of results, a study, the cache."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, StorageError
 from vsacli.base.json_records import json_value
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import orders_of_derivation
+from vsacli.base.storage import unfinished
 from vsacli.base.units import Quantity
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
-from vsacli.documents.other_formats import refuse_other_formats
+from vsacli.compute.engine.cache import MOST_BYTES, Cache, CacheError, open_cache
 from vsacli.documents.paths import find
+from vsacli.documents.source import refuse_other_formats
 from vsacli.files.file_kinds import FileKind, recognise
 from vsacli.files.info.robot_info import describe_robot
-from vsacli.files.info.study_info import describe_study
 from vsacli.files.placeholder_robot import placeholder_robot
-from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.simulation import open_stored
+from vsacli.results.store.reader import StoredResult, open_stored
+from vsacli.results.store.study_table import StoredStudy
 from vsacli.robot.file import load_robot
+from vsacli.studies.sweeps import StudySummary
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
+
+
+def describe_cache(folder: str) -> dict[str, Any]:
+    """The cache of compiled code, and unfinished files in a folder and in that for temporary files.
+
+    Raises:
+        StorageError: the cache cannot be used.
+    """
+    with _opened() as cache:
+        sizes = [entry.size for entry in cache.entries()]
+        found = [each for place in _places(Path(folder), cache.folder) for each in unfinished(place)]
+    return {
+        "kind": "cache",
+        "folder": str(cache.folder),
+        "entries": len(sizes),
+        "size": sum(sizes),
+        "limit": MOST_BYTES,
+        "unfinished": [
+            {"path": str(each.path), "size": each.size, "owner": each.owner.value} for each in found
+        ],
+    }
+
+
+def clear_cache() -> None:
+    """Remove all compiled code.
+
+    Raises:
+        StorageError: the cache cannot be used.
+    """
+    with _opened() as cache:
+        cache.clear()
+
+
+@contextmanager
+def _opened() -> Iterator[Cache]:
+    try:
+        yield open_cache()
+    except CacheError as error:
+        raise StorageError("compiled code", str(error)) from error
+
+
+def _places(*folders: Path) -> list[Path]:
+    """These folders, and that for temporary files if there is one, each once."""
+    places = dict.fromkeys(folders)
+    with suppress(OSError):
+        places[Path(tempfile.gettempdir())] = None
+    return list(places)
+
+
+KIND = "table of a study"
+
+
+def describe_study(path: str) -> dict[str, Any]:
+    """A table as JSON values: what the study found, what varies, provenance, and inputs with their SHA-256.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    with StoredStudy(path) as table:
+        provenance = table.provenance()
+        inputs = [{"path": each.path, "sha256": each.sha256} for each in table.inputs()]
+        return {
+            "kind": KIND,
+            **StudySummary.of(table).as_json(),
+            "parameters": [_parameter(table, path) for path in table.parameters],
+            "columns": list(table.columns),
+            "provenance": {"created": str(table.attributes["created"]), **provenance, "inputs": inputs},
+        }
+
+
+def _parameter(table: StoredStudy, path: str) -> dict[str, Any]:
+    """What varies: its values if they are few, else their range."""
+    if table.parameter_is_text(path):
+        return {"path": path, "values": sorted(set(table.texts(path)))}
+    values = table.read(path)
+    low, high = (float(values.min()), float(values.max())) if len(values) else (None, None)
+    different = len(np.unique(values))
+    return {"path": path, "units": table.unit(path), "min": low, "max": high, "different": different}
+
+
+def study_lines(table: Mapping[str, Any]) -> Iterator[str]:
+    """The description as text."""
+    yield str(StudySummary.from_json(table))
+    provenance = table["provenance"]
+    yield f"created {provenance['created']} with NumPy {provenance['numpy']}, engine {provenance['engine']}"
+    yield f"method {provenance['method']}, seed {provenance['seed']}"
+    yield f"command line: {provenance['command_line']}"
+    yield from (f"input {each['path']}, SHA-256 {each['sha256']}" for each in provenance["inputs"])
+    for each in table["parameters"]:
+        if "values" in each:
+            yield f"{each['path']}: {', '.join(each['values'])}"
+        elif each["different"] == 1:
+            yield f"{each['path']}: {each['min']:.6g} {each['units']}"
+        else:
+            span = f"{each['min']:.6g} to {each['max']:.6g} {each['units']}"
+            yield f"{each['path']}: {span}, {each['different']} values"
+    yield f"columns: {', '.join(table['columns'])}"
+
 
 BLOCK_SAMPLES = 8192
 

@@ -17,9 +17,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.units import WrenchQuantity
-from vsacli.documents.table_header import read_header
-from vsacli.results.curves import Curve
-from vsacli.results.recorded_curves import Highest, RecordedCurve, Spectrum
+from vsacli.documents.csv_file import read_header
+from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
+from vsacli.results.charts.reduction import Curve
 from vsacli.results.store.excerpt import WHOLE, Span, joint_numbers, steps_between
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot

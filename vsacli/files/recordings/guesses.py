@@ -9,11 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from vsacli.documents.column_mapping import MappedColumn
+from vsacli.documents.csv_file import split_heading
 from vsacli.documents.fields import IDENTIFIER
-from vsacli.documents.table_header import split_heading
-from vsacli.files.recordings.first_rows import FirstRows
+from vsacli.files.recordings.first_rows import FirstRows, TimeColumn
 from vsacli.files.recordings.names import AXES, GENERIC, POSES, QUANTITIES, WORDS, JointNames, words_of
-from vsacli.files.recordings.times import TimeColumn
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE
 
 TAKEN = ("q", "stiffness")

@@ -15,15 +15,21 @@ from vsacli.base.errors import InputError
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import for_yaml
-from vsacli.base.unit_expressions import conversion_factor
-from vsacli.documents.column_mapping import REST, TIME, ColumnMapping, MappedColumn
+from vsacli.documents.column_mapping import REST, ColumnMapping, MappedColumn
 from vsacli.documents.columns_file import FORMAT, checked_rate
+from vsacli.documents.csv_file import read_header, split_heading
+from vsacli.documents.expression import conversion_factor
 from vsacli.documents.table import Table, read_table
-from vsacli.documents.table_header import read_header, split_heading
-from vsacli.files.recordings.first_rows import FirstRows, read_first_rows
+from vsacli.documents.time_column import TIME
+from vsacli.files.recordings.first_rows import (
+    FirstRows,
+    TimeColumn,
+    read_first_rows,
+    time_column,
+    unread_times,
+)
 from vsacli.files.recordings.guesses import TAKEN, Guess, guesses
-from vsacli.files.recordings.mapping_text import mapping_lines
-from vsacli.files.recordings.times import TimeColumn, time_column, unread_times
+from vsacli.files.recordings.recording_text import mapping_lines
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.trajectory import file as trajectory_file

@@ -1,15 +1,30 @@
-"""The description of a recording as text."""
+"""A recording as text: its description, and a mapping of its columns in YAML with comments on guesses."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from vsacli.base.tables import aligned
+from vsacli.base.texts import for_yaml
+from vsacli.documents.column_mapping import REST, MappedColumn
+from vsacli.documents.expression import BOOLEANS
+from vsacli.documents.time_column import TIME
+from vsacli.files.recordings.first_rows import TimeColumn
+from vsacli.files.recordings.guesses import TAKEN, Guess
 from vsacli.trajectory.recorded.stamps import step_text
 
 KIND = "recording"
+
+COMMENTED = {
+    "dq": "measured; a fit of the positions mostly gives a better one",
+    "tau_motor_1": "for compare and identify, if it is what motor 1 gives on the joint side of its gear",
+}
+"""Why a column is not proposed but shown."""
+
+_PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./]*")
 
 
 def recording_lines(recording: Mapping[str, Any]) -> Iterator[str]:
@@ -49,3 +64,65 @@ def _columns(recording: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
             holds,
             *("-" if math.isnan(column[end]) else f"{column[end]:.5g}" for end in ("min", "max")),
         )
+
+
+def mapping_lines(
+    time: TimeColumn | None,
+    guesses: Sequence[Guess],
+    joint_names: Sequence[str],
+    leaves_out: bool,
+    rate: float | None = None,
+) -> Iterator[str]:
+    """The keys `columns` and `ignore`.
+
+    Args:
+        time: the stamps.
+        guesses: what the columns may stand for.
+        joint_names: of the robot, empty if it is not known.
+        leaves_out: whether there are further columns.
+        rate: rows per second, which is said in place of times.
+    """
+    times = [] if rate is not None else _time(time)
+    lines = [*times, *_unknown(guesses, joint_names), *map(_entry, guesses)]
+    width = max((len(entry) for entry, _ in lines), default=0)
+    yield "columns:"
+    for entry, comment in lines:
+        yield f"  {entry:<{width}}  # {comment}" if comment else f"  {entry}"
+    if leaves_out:
+        yield f"ignore: {REST}"
+
+
+def _time(time: TimeColumn | None) -> Iterator[tuple[str, str]]:
+    if time is None:
+        yield f"# {TIME}: ...", "no column holds times; say which does, or the rate of the rows"
+    else:
+        yield f"{TIME}: {_written(time.source)}", time.reason
+
+
+def _unknown(guesses: Sequence[Guess], joint_names: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Joints whose positions no column's name speaks of."""
+    found = {guess.name for guess in guesses}
+    for joint in joint_names or ([] if found else ["<joint>"]):
+        if f"{joint}.q" not in found:
+            yield f"# {joint}.q: ...", "the name or the number of its column"
+
+
+def _entry(guess: Guess) -> tuple[str, str]:
+    reason = guess.reason if guess.sure else f"guessed: {guess.reason}"
+    if guess.quantity not in TAKEN:
+        comment = COMMENTED[guess.quantity]
+        return f"# {guess.name}: {_written(guess.source)}", comment if guess.sure else f"{comment}; {reason}"
+    return f"{guess.name}: {_written(guess.source)}", reason
+
+
+def _written(source: MappedColumn) -> str:
+    keys = {"column": source.column, "unit": source.unit, "nanoseconds": source.nanoseconds}
+    given = {key: _word(value) for key, value in keys.items() if value is not None}
+    if list(given) == ["column"]:
+        return given["column"]
+    return f"{{{', '.join(f'{key}: {value}' for key, value in given.items())}}}"
+
+
+def _word(value: str | int) -> str:
+    plain = isinstance(value, int) or (_PLAIN.fullmatch(value) and value.lower() not in BOOLEANS)
+    return str(value) if plain else for_yaml(str(value))

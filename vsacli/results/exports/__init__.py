@@ -6,10 +6,10 @@ from vsacli.base.lazy import LazyRegistry
 
 FORMATS = LazyRegistry(
     {
-        "csv": "vsacli.results.exports.csv_table:CSV",
-        "mat": "vsacli.results.exports.mat_file:MAT",
-        "parquet": "vsacli.results.exports.parquet_table:PARQUET",
-        "joint-trajectory": "vsacli.results.exports.joint_trajectory:JOINT_TRAJECTORY",
+        "csv": "vsacli.results.exports.formats:CSV",
+        "mat": "vsacli.results.exports.formats:MAT",
+        "parquet": "vsacli.results.exports.formats:PARQUET",
+        "joint-trajectory": "vsacli.results.exports.formats:JOINT_TRAJECTORY",
     }
 )
 """Formats by their names on a command line, each a `ResultFormat`."""

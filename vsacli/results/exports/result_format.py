@@ -1,4 +1,4 @@
-"""What all formats of exported results have in common, and the export itself."""
+"""The declaration of a format of exported results, and the export itself."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def export_result(
         rate: samples per second, the stored rate or a whole fraction of it; all samples by default.
         allow_nan: show that samples are missing, and infinite ones as they are, instead of refusing.
         side: of the gear on which motion and torque of the motors are given; see `Selection`.
-        progress: shows how far the work is.
+        progress: shows how much is done.
 
     Raises:
         InputError: a variable is not in the file or has no place in the format, the rate is not possible, a
@@ -115,7 +115,7 @@ def export_result(
 
 
 def _gaps(selection: Selection, chosen: Chosen) -> Iterator[Gap]:
-    """The samples of a variable that are not finite, of each joint that has it."""
+    """Yield the samples of a variable that are not finite, of each joint that has it."""
     faults = np.concatenate(
         [chosen.faults(selection.read(chosen, *span)) for span in selection.spans([chosen])]
     )

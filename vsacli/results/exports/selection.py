@@ -1,7 +1,8 @@
-"""What an export takes of a result: some variables, at some samples, on one side of the gears."""
+"""The part of a result that is exported: some variables, at a sample rate, on one side of the gears."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
@@ -12,9 +13,8 @@ import numpy.typing as npt
 
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.units import WrenchQuantity
+from vsacli.base.units import WrenchQuantity, time_text
 from vsacli.base.variables import VARIABLES, Variable, column_names, select_variables
-from vsacli.results.exports.sample_rate import stride_of
 from vsacli.results.store.reader import StoredResult
 
 Side: TypeAlias = Literal["joint", "motor"]
@@ -23,9 +23,14 @@ Side: TypeAlias = Literal["joint", "motor"]
 CELLS = 2**18
 """Values of a variable held in memory at a time."""
 
+RATE_TOLERANCE = 1e-6
+"""Relative error of a rate typed with at least six digits, such as 333.3333."""
+STEP_TOLERANCE = 1e-3
+"""Error of stored times, in steps: twice that of times at 1 kHz printed with six decimals."""
+
 MISSING, INFINITE = "has no value", "is infinite"
 FAULTS = ("", MISSING, INFINITE)
-"""What may be wrong with a sample, as sentences go on."""
+"""Faults of a sample, as sentences go on."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +39,9 @@ class Chosen:
 
     Attributes:
         variable: its declaration; on the side of the motors its name ends in `_shaft`.
-        stored: what it is called in the result.
+        stored: its name in the result.
         there: (joints, columns of each), which columns there are; of the wrench (axes, 1).
-        scale: what its stored values are multiplied by; None if they stay as they are.
+        scale: factor of its stored values; None if they stay as they are.
     """
 
     variable: Variable
@@ -46,16 +51,16 @@ class Chosen:
 
     @property
     def on_shaft(self) -> bool:
-        """Whether it is what happens on the shaft of a motor, which turns at any joint."""
+        """Whether it is of the shaft of a motor, which turns at any joint."""
         return self.scale is not None
 
     @property
     def name(self) -> str:
-        """What it is called in the export."""
+        """Its name in the export."""
         return self.variable.name
 
     def columns(self, joint_names: Iterable[str]) -> Iterator[str]:
-        """Names of the columns that there are."""
+        """Return the names of the columns that there are."""
         return compress(column_names(self.variable, joint_names), self.there.flat)
 
     def units(self, joint_types: Iterable[str]) -> list[str]:
@@ -136,7 +141,7 @@ class Selection:
         return len(self.time) * len(self.chosen)
 
     def spans(self, together: Sequence[Chosen]) -> Iterator[tuple[int, int]]:
-        """Consecutive ranges of samples, at least one, in which some variables need little memory."""
+        """Yield consecutive ranges of samples, at least one, in which some variables need little memory."""
         widest = max((each.there.size for each in together), default=1)
         length = max(1, CELLS // (widest * self._stride))
         count = len(self.time)
@@ -144,14 +149,14 @@ class Selection:
             yield start, min(start + length, count)
 
     def blocks(self) -> Iterator[Samples]:
-        """All samples, some of them in memory at a time; at least one block."""
+        """Yield all samples, some of them in memory at a time; at least one block."""
         for start, stop in self.spans(self.chosen):
             yield Samples(
                 self.time[start:stop], {each.name: self.read(each, start, stop) for each in self.chosen}
             )
 
     def read(self, chosen: Chosen, start: int, stop: int) -> FloatArray | FlagArray:
-        """Some samples of a variable, (samples, ...)."""
+        """Read some samples of a variable, (samples, ...)."""
         span = start * self._stride, min(stop * self._stride, self.result.samples)
         values = self.result.read(chosen.stored, *span)[:: self._stride]
         return values if chosen.scale is None else values * chosen.scale
@@ -166,7 +171,7 @@ def _chosen(result: StoredResult, variable: Variable, on_shaft: bool) -> Chosen:
 
 
 def _existing(result: StoredResult, variable: Variable) -> BoolArray:
-    """(joints, columns of each): which columns of a variable there are; of the wrench (axes, 1)."""
+    """Return which columns of a variable there are, (joints, columns of each); of the wrench (axes, 1)."""
     if "joint" not in variable.dims:
         return np.ones((len(column_names(variable, ())), 1), dtype=bool)
     return result.existing(variable)
@@ -183,3 +188,55 @@ def _check_geared(result: StoredResult) -> None:
             f"known; add it (1 without a gear) and run {result.command} again, or export with --side joint"
         )
         raise InputError.one(message, result.path)
+
+
+def stride_of(result: StoredResult, rate: float) -> int:
+    """Return the decimation factor from the stored rate to a rate, Hz.
+
+    Raises:
+        InputError: the stored rate is no whole multiple of it, or there is none.
+    """
+    check_rate(rate)
+    stored = _stored_rate(result)
+    ratio = stored / rate
+    stride = round(ratio)
+    if ratio < 1 - RATE_TOLERANCE:
+        message = f"the rate {rate:.9g} Hz exceeds the stored {stored:.9g} Hz; samples are not interpolated"
+        raise InputError.one(message, result.path)
+    if abs(ratio - stride) > RATE_TOLERANCE * ratio:
+        nearest = f"{stored / math.ceil(ratio):.9g} and {stored / math.floor(ratio):.9g} Hz"
+        message = (
+            f"the stored {stored:.9g} Hz are no whole multiple of {rate:.9g} Hz; the nearest are {nearest}"
+        )
+        raise InputError.one(message, result.path)
+    return stride
+
+
+def check_rate(rate: float) -> None:
+    """Raise InputError unless a rate, Hz, is finite and positive."""
+    if not (rate > 0 and math.isfinite(rate)):
+        raise InputError.one(f"the rate must be positive, not {rate:g} Hz")
+
+
+def _stored_rate(result: StoredResult) -> float:
+    """Return the samples per second of a file with equal steps."""
+    time, steps = result.time, result.samples - 1
+    if steps < 1:
+        raise InputError.one(
+            "holds fewer than two samples and so no rate; export without --rate", result.path
+        )
+    step = float(time[-1] - time[0]) / steps
+    error = np.abs(time - (time[0] + step * np.arange(result.samples)))
+    if error.max() > STEP_TOLERANCE * step:
+        place = f"near t = {time_text(float(time[error.argmax()]))}"
+        message = (
+            f"the stored times are not equally spaced ({place}); set rate: {_round(1 / step):g} in the"
+            f" trajectory file and run {result.command} again, or export without --rate"
+        )
+        raise InputError.one(message, result.path)
+    return 1 / step
+
+
+def _round(rate: float) -> float:
+    """Round a rate to three digits, as somebody would choose it."""
+    return float(f"{rate:.3g}")

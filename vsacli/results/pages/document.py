@@ -1,28 +1,74 @@
-"""One HTML file: the template of the project around texts, numbers and scripts, closed to the network."""
+"""One HTML file: the template of the project around texts, numbers and scripts, closed to the network.
+
+A page carries BokehJS, which draws its plots, as the Python package `bokeh` brings it. Texts are `Facts` of
+each file: its report, how it was made, and what it was made from.
+"""
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import json
 from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, distribution
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, NamedTuple
 
+from vsacli.base.errors import InputError
 from vsacli.base.tables import ReportText
-from vsacli.results.pages.library import Library
+from vsacli.base.texts import for_terminal, one_line
+from vsacli.documents.source import Source
 from vsacli.results.pages.packing import Packed, as_script
+from vsacli.results.store.inputs import StoredInput
 
 TEMPLATE, STYLE = "page.html", "page.css"
 
 SCRIPTS = ("marks.js", "figures.js", "charts.js", "robot.js", "scatter.js", "page.js")
 """The project's own, in the order in which they run."""
 
+LIBRARY_SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
+"""The library itself, and its functions for JavaScript; not its widgets, tables, WebGL and MathJax."""
+
 LARGEST_SHOWN = 200_000
 """Letters of an input up to which a page shows all of it; tables of samples are longer."""
 
+FAIR = ("over_limit", "doubtful", "strayed", "untold")
+"""Verdicts on what was computed all the same."""
+
+TOO_LONG = "too long for a page"
+
+
+class Library(NamedTuple):
+    """A library for a page.
+
+    Attributes:
+        name: with its version.
+        scripts: what a page runs, in this order.
+    """
+
+    name: str
+    scripts: tuple[str, ...]
+
+
+def plotting_library() -> Library:
+    """Return what is installed; found by its files, since to import Bokeh takes a second.
+
+    Raises:
+        InputError: it is not installed.
+    """
+    try:
+        installed = distribution("bokeh")
+    except PackageNotFoundError:
+        reason = "pages need the package bokeh, which is not installed; pip install bokeh gets it"
+        raise InputError.one(reason) from None
+    folder = Path(str(installed.locate_file("bokeh/server/static/js")))
+    scripts = (folder / name for name in LIBRARY_SCRIPTS)
+    return Library(f"Bokeh {installed.version}", tuple(each.read_text(encoding="utf-8") for each in scripts))
+
 
 class RemedyText(NamedTuple):
-    """What would mend a run that failed, as a page says it.
+    """The fix of a run that failed.
 
     Attributes:
         lines: a sentence or more each.
@@ -34,7 +80,7 @@ class RemedyText(NamedTuple):
 
 
 class Facts(NamedTuple):
-    """What a page says of a file in words.
+    """The texts on a page about a file.
 
     Attributes:
         title: what was run.
@@ -78,7 +124,7 @@ class InputText(NamedTuple):
 def rendered(
     library: Library, title: str, facts: Sequence[Facts], data: Mapping[str, Any], packed: Packed
 ) -> str:
-    """The page.
+    """Return the page.
 
     Args:
         library: that draws its plots.
@@ -105,6 +151,47 @@ def rendered(
 
 
 def _hash(script: str) -> str:
-    """What names a script in a Content Security Policy: no other one runs, wherever it came from."""
+    """Return what names a script in a Content Security Policy: no other one runs, wherever it came from."""
     digest = hashlib.sha256(script.encode("utf-8")).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
+
+
+def tone_of(verdict: str) -> str:
+    """Return the look of a verdict, as of `Facts`."""
+    return "good" if verdict == "ok" else "fair" if verdict in FAIR else "bad"
+
+
+def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return pairs of a word and what it says of how a file was made; inputs are left out."""
+    rows = []
+    for name, value in provenance.items():
+        if name != "inputs" and value not in ("", {}):
+            text = value if isinstance(value, str) else json.dumps(value)
+            rows.append((name.replace("_", " "), text))
+    changed = {each["path"]: each["changes"] for each in provenance["inputs"] if "changes" in each}
+    return rows + [(f"--set of {path}", json.dumps(changes)) for path, changes in changed.items()]
+
+
+def input_text(file: StoredInput) -> InputText:
+    """Return an input as a page shows it."""
+    text = None if file.content is None else file.content.decode("utf-8", "backslashreplace")
+    instead = f"{TOO_LONG}; vsacli info --extract gets it from the file"
+    return InputText(one_line(file.path), file.sha256, _shown(text), instead)
+
+
+def source_text(file: Source) -> InputText:
+    """Return a file as it was read, as a page shows it."""
+    return InputText(one_line(file.path), file.sha256, _shown(file.text), TOO_LONG)
+
+
+def _shown(text: str | None) -> str | None:
+    """Return a text if a page shows all of it, else nothing."""
+    if text is None or len(text) > LARGEST_SHOWN:
+        return None
+    return "\n".join(map(one_line, text.splitlines()))
+
+
+def printable(report: ReportText) -> ReportText:
+    """Return a report whose texts name files or columns, with nothing in it that a page would not show."""
+    rows = [tuple(map(one_line, row)) for row in report.rows]
+    return ReportText(one_line(report.headline), rows, list(map(for_terminal, report.lines)))

@@ -1,4 +1,4 @@
-"""Numbers for the scripts of a page: arrays in base64, everything else as JSON."""
+"""Charts and numbers for the scripts of a page: arrays in base64, everything else as JSON."""
 
 from __future__ import annotations
 
@@ -10,6 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vsacli.base.json_records import json_value
+from vsacli.results.charts.chart import REACHABLE, Band, Chart
+
+BEYOND = 5.0
+"""Height up to which the corridor is drawn beyond its part that is shown at first, in heights of that."""
+
+CUT_OFF = "peaks of near-singular steps are cut off; Ctrl and the wheel show them"
 
 
 class Packed:
@@ -32,6 +38,48 @@ class Packed:
     def texts(self) -> list[str]:
         """The arrays in base64, by number."""
         return [base64.b64encode(content).decode("ascii") for content in self._numbers]
+
+    def chart(self, chart: Chart, start: float) -> dict[str, Any]:
+        """Return a chart for `charts.js`, its arrays by their numbers.
+
+        Args:
+            chart: over time.
+            start: time from which the page counts, s.
+        """
+        series = []
+        for line in chart.lines:
+            band = None if line.band is None else self._band(line.band, chart)
+            series.append(
+                {
+                    "label": line.label,
+                    "colour": line.colour,
+                    "joint": line.joint,
+                    "file": line.file,
+                    "role": line.role,
+                    "time": self.add(line.curve.time - start),
+                    "values": self.add(line.curve.values),
+                    "band": band,
+                    "rms": line.rms,
+                }
+            )
+        return {
+            "title": chart.title,
+            "name": chart.name,
+            "unit": chart.unit,
+            "series": series,
+            "limits": [{"joint": limit.joint, "value": limit.value} for limit in chart.limits],
+            "shown": chart.shown,
+            "band": chart.band if any(line.band for line in chart.lines) else "",
+            "note": CUT_OFF if chart.cut_off else "",
+        }
+
+    def _band(self, band: Band, chart: Chart) -> tuple[int, int]:
+        """Return lower and upper edge, those of a corridor as far as anybody would look."""
+        low, high = band.low, band.high
+        if chart.band == REACHABLE and chart.shown is not None:
+            spare = BEYOND * (chart.shown[1] - chart.shown[0])
+            low, high = np.maximum(low, chart.shown[0] - spare), np.minimum(high, chart.shown[1] + spare)
+        return self.add(low), self.add(high)
 
 
 def as_script(content: Any) -> str:

@@ -10,12 +10,10 @@ import numpy as np
 from vsacli.base.arrays import IndexArray, evenly
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import one_line
-from vsacli.results.pages.document import Facts, rendered
-from vsacli.results.pages.facts import input_text
-from vsacli.results.pages.library import plotting_library
+from vsacli.results.charts.study_points import StudyPoints
+from vsacli.results.pages.document import Facts, input_text, plotting_library, rendered
 from vsacli.results.pages.packing import Packed
-from vsacli.results.store.stored_study import StoredStudy
-from vsacli.results.study_points import StudyPoints
+from vsacli.results.store.study_table import StoredStudy
 
 MOST_RUNS = 20_000
 """Points of a plot; with more a browser is slow, and they hide one another."""

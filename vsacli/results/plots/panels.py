@@ -1,156 +1,225 @@
-"""Panels, legend and title of a figure, for any number of joints."""
+"""Charts as panels: curves that break at gaps, their bands and limits, cut-off peaks, shaded failures."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.gridspec import SubplotSpec
-from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.units import TIME
-from vsacli.results.plots.letters import make_legible
-from vsacli.results.plots.styles import shortened
-from vsacli.results.store.reader import StoredResult
+from vsacli.results.charts.chart import REACHABLE, UNCERTAIN, Chart, Limit, Line
+from vsacli.results.charts.reduction import Curve, marked_spans
+from vsacli.results.plots.styles import LineStyle, line_style, shortened
 
-PANEL_WIDTH = 3.0
-"""Inches: with fonts of 10 pt, two panels side by side stay readable in one column of a paper."""
+MARKERS_PER_CURVE = 8
+MARKER_STAGGER = 0.37
+"""Shift of the markers from curve to curve, in marker distances: those of coinciding curves stay apart."""
 
-LATE = 1e5
-"""First time, s, from which on ticks count from it: their digits would not fit side by side."""
+LIMIT_SIGHT = 0.5
+"""Share of the height of a panel beyond it within which limits are still drawn: farther ones would leave
+curves less than half of it."""
 
-FINE, FEW_TICKS = 0.1, 4
-"""Length of a span, s, below which the digits of more than so many ticks would not fit side by side."""
+LIMIT_ROOM = 0.05
+"""Free space behind a limit, as a share of that sight."""
 
-JOINTS_PER_PANEL = 7
-TITLE_LENGTH, LABEL_BESIDE = 70, 16
-"""Characters of a title, and of a name beside a panel."""
+ZERO: dict[str, Any] = {"color": "0.6", "linewidth": 0.8}
+"""Line of what differences and margins are seen against."""
 
-_INCHES_PER_CHARACTER = 0.07
-_INCHES_PER_HANDLE = 0.7
+_LIMIT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (1, 2))}
+_ENVELOPE: dict[str, Any] = {"alpha": 0.3, "linewidth": 0.5}
+_SPREAD: dict[str, Any] = {"alpha": 0.3, "linewidth": 0}
+_AREA: dict[str, Any] = {"facecolor": "#8fc1ec", "alpha": 0.4, "linewidth": 0, "zorder": 0.8}
+_EDGE: dict[str, Any] = {"color": "#6f9fc8", "linewidth": 0.9, "zorder": 1}
 
-AxesGrid = npt.NDArray[Any]
-"""Panels in rows and columns."""
+# Opaque and edged: bands do not darken where they meet, and a single sample stays visible.
+_INFEASIBLE = {"facecolor": "0.8", "edgecolor": "0.8", "linewidth": 1.5, "zorder": 0.5}
+_SINGULAR = {"facecolor": "none", "edgecolor": "0.45", "linewidth": 0.8, "hatch": "////", "zorder": 0.6}
 
-
-def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
-    """Joints that share a panel: of one type, hence one unit, and evenly split where they are many."""
-    groups: list[list[int]] = []
-    for joint_type in dict.fromkeys(joint_types):
-        joints = [joint for joint, other in enumerate(joint_types) if other == joint_type]
-        panels = math.ceil(len(joints) / JOINTS_PER_PANEL)
-        groups += [part.tolist() for part in np.array_split(joints, panels)]
-    return groups
+_MARK: dict[str, Any] = {"markersize": 6, "linestyle": ""}
+_BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "pad": 0.5}
 
 
-def folding(joints: int, most_rows: int) -> tuple[int, int]:
-    """Rows, and how often to begin beside them, for one row of panels per joint."""
-    folds = math.ceil(joints / most_rows)
-    return math.ceil(joints / folds), folds
-
-
-def joint_panels(
-    place: SubplotSpec,
-    time: FloatArray,
-    present: BoolArray,
-    most_rows: int,
-    heights: Sequence[float] = (1.0,),
-) -> AxesGrid:
-    """Panels of each joint, (joints * heights, columns), with a common time axis in each column.
-
-    Args:
-        place: where they go.
-        time: what the time axes span, ascending, s.
-        present: (joints, columns), which panels there are, one joint below the other; others are removed.
-        most_rows: joints below each other before the next begins beside them.
-        heights: of the panels that a joint has, one below the other, relative to each other.
-    """
-    joints, columns = present.shape
-    rows, folds = folding(joints, most_rows)
-    each = len(heights)
-    places = place.subgridspec(rows * each, folds * columns, height_ratios=[*heights] * rows)
-    grid = places.subplots(squeeze=False).reshape(rows * each, folds, columns)
-    panels = grid.swapaxes(0, 1).reshape(-1, columns)
-    for unused in panels[joints * each :].flat:
-        unused.remove()
-    present = np.repeat(present, each, axis=0)
-    for first in range(0, len(present), rows * each):
-        fold = slice(first, min(first + rows * each, len(present)))
-        share_time(panels[fold], present[fold], time)
-    return panels[: joints * each]
-
-
-def share_time(panels: AxesGrid, present: BoolArray, time: FloatArray) -> None:
-    """Remove the panels that are not present; those of each column share a time axis over this span."""
-    for unused in panels[~present]:
-        unused.remove()
-    for column, there in zip(panels.T, present.T, strict=True):
-        if there.any():
-            _share_time(column[there], time)
-
-
-def _share_time(column: Sequence[Axes], time: FloatArray) -> None:
-    """Let panels, top to bottom, share a time axis, labelled below the last."""
-    for axes in column[:-1]:
-        axes.sharex(column[-1])
-        axes.tick_params(labelbottom=False)
-    column[-1].set_xlabel(f"time [{TIME}]")
-    if time[0] >= LATE:
-        whole = math.floor(time[0])
-        column[-1].set_xlabel(f"time after {whole} {TIME} [{TIME}]")
-        column[-1].xaxis.set_major_formatter(lambda tick, _: f"{tick - whole:g}")
-    if time[-1] > time[0]:
-        column[-1].set_xlim(time[0], time[-1])
-        if time[-1] - time[0] < FINE:
-            column[-1].locator_params(axis="x", nbins=FEW_TICKS)
+def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
+    """Draw a chart into an empty panel; return what a legend shows besides its lines."""
+    if chart.zero:
+        axes.axhline(0.0, **ZERO)
+    corridors = _draw_corridors(axes, chart) if chart.band == REACHABLE else None
+    handles: list[Artist] = []
+    for line in chart.lines:
+        handles += draw_curve(axes, line.curve, line_style(line.look), line.look)
+    handles += _draw_spreads(axes, chart.lines) if corridors is None else corridors
+    if chart.shown is not None:
+        axes.set_ylim(chart.shown)
+    if chart.cut_off:
+        handles += _mark_peaks(axes, chart.lines)
+    if chart.from_zero:
+        axes.set_ylim(bottom=0.0)
+    handles += _draw_limits(axes, chart.limits)
+    for failures, joints in chart.failures:
+        handles += _shade(axes, failures.time, *failures.among(joints))
+    if chart.title:
+        add_title(axes, chart.title)
+    if chart.axis:
+        axes.set_ylabel(chart.axis)
+    return handles
 
 
 def add_title(axes: Axes, title: str) -> None:
-    """The title of a panel, at its left and taken literally."""
+    """Set the title of a panel, at its left and taken literally."""
     axes.set_title(shortened(title), loc="left", parse_math=False)
 
 
-def add_legend(axes: Axes, handles: Sequence[Artist]) -> None:
-    """Name these beside a panel, at its right."""
-    labels = [shortened(str(handle.get_label()), LABEL_BESIDE) for handle in handles]
-    legend = axes.legend(handles, labels, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    _take_literally(legend)
+def draw_curve(axes: Axes, curve: Curve, style: LineStyle, index: int = 0) -> list[Artist]:
+    """Draw a curve that breaks at NaN; a point alone between two gaps becomes a dot.
+
+    Of one whose samples would make a blot of a line, their mean and range.
+
+    Args:
+        axes: where to draw.
+        curve: of a joint or result.
+        style: color, dashes and marker.
+        index: number of the curve in its panel, which places its markers.
+
+    Returns:
+        Entries of a legend besides the line.
+    """
+    time, values = (curve.time, curve.values) if curve.envelope is None else curve.envelope[:2]
+    markers = _marker_points(time, index * MARKER_STAGGER % 1)
+    axes.plot(time, values, **style.words, markevery=markers)
+    gap = np.pad(np.isnan(values), 1, constant_values=True)
+    alone = ~gap[1:-1] & gap[:-2] & gap[2:]
+    if alone.any():
+        axes.plot(time[alone], values[alone], color=style.color, linestyle="none", marker=".", markersize=4)
+    if curve.envelope is None:
+        return []
+    axes.fill_between(time, curve.envelope.low, curve.envelope.high, color=style.color, **_ENVELOPE)
+    return [Patch(color="0.5", **_ENVELOPE, label="smallest to largest")]
 
 
-def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
-    """Add the title and, below all panels, one legend with each label once in as many columns as fit."""
-    figure.suptitle(shortened(title, TITLE_LENGTH), fontsize=11, parse_math=False)
-    by_label = {str(handle.get_label()): handle for handle in handles}
-    if by_label:
-        labels = [shortened(label) for label in by_label]
-        width = _INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * max(map(len, labels))
-        rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
-        columns = math.ceil(len(labels) / rows)
-        legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)
-        _take_literally(legend)
-    make_legible(figure)
-    return figure
+def _marker_points(time: FloatArray, shift: float) -> list[int]:
+    """Return points next to `MARKERS_PER_CURVE` equidistant times."""
+    wanted = time[0] + (np.arange(MARKERS_PER_CURVE) + shift) / MARKERS_PER_CURVE * (time[-1] - time[0])
+    return [int(point) for point in np.unique(np.searchsorted(time, wanted))]
 
 
-def _take_literally(legend: Legend) -> None:
-    for text in legend.get_texts():
-        text.set_parse_math(False)
+def _draw_spreads(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
+    """Draw bands of standard deviations.
+
+    The axes keep their range, as at the ends of a recording deviations may be hundreds of times those inside.
+    """
+    bands = [line.band for line in lines if line.band is not None]
+    shown = axes.get_ylim() if bands else None
+    for band in bands:
+        axes.fill_between(band.time, band.low, band.high, color=line_style(band.look).color, **_SPREAD)
+    if shown is None:
+        return []
+    axes.set_ylim(shown)
+    return [Patch(facecolor="0.5", **_SPREAD, label=UNCERTAIN)]
 
 
-def result_title(result: StoredResult) -> str:
-    """Robot and trajectory, once if they are called alike, and where an incomplete run ended."""
-    ending = "" if result.complete else f" (stopped at {result.time[-1]:.4g} s)"
-    return ", ".join(dict.fromkeys((result.robot_name, result.trajectory_name))) + ending
+def _draw_corridors(axes: Axes, chart: Chart) -> list[Artist]:
+    """Draw ranges of the stiffness, as far as they are shown."""
+    bands = [line.band for line in chart.lines if line.band is not None]
+    bottom, top = chart.shown or axes.get_ylim()
+    for time, low, high, _ in bands:
+        area = np.maximum(low, bottom), np.minimum(high, top)
+        axes.fill_between(time, *area, ~np.isnan(low), **_AREA)
+        for edge in (low, high):
+            axes.plot(time, np.where(np.isinf(edge), np.nan, edge), **_EDGE)
+    return [Patch(**_AREA, label=REACHABLE)] if bands else []
 
 
-def missing_variables(figure: str, variables: Sequence[str]) -> str:
-    """The sentence for a figure that cannot be drawn."""
-    needed = " and ".join(variables)
-    return f"figure {figure} needs {needed}, which this result was written without (--variables)"
+def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
+    """Draw bounds of curves that are drawn already, as far as they are in sight or nearly so."""
+    low, high = axes.get_ylim()
+    reach = LIMIT_SIGHT * (high - low)
+    seen = {(limit.look, limit.value) for limit in limits if low - reach <= limit.value <= high + reach}
+    for look, value in sorted(seen):
+        axes.axhline(value, color=line_style(look).color, **_LIMIT)
+        low, high = min(low, value - LIMIT_ROOM * reach), max(high, value + LIMIT_ROOM * reach)
+    if seen:
+        axes.set_ylim(low, high)
+    return [Line2D([], [], color="0.4", **_LIMIT, label="limit")] if seen else []
+
+
+def _shade(axes: Axes, time: FloatArray, infeasible: BoolArray, singular: BoolArray) -> list[Artist]:
+    """Draw gray bands where samples are infeasible, hatched ones where they are singular, at full height.
+
+    Args:
+        axes: where to draw.
+        time: (samples,), s.
+        infeasible: (samples,).
+        singular: (samples,).
+
+    Returns:
+        Entries of a legend for the bands drawn.
+    """
+    handles: list[Artist] = []
+    kinds: tuple[tuple[BoolArray, dict[str, Any], str], ...] = (
+        (infeasible, _INFEASIBLE, "infeasible"),
+        (singular, _SINGULAR, "singular"),
+    )
+    for marked, look, label in kinds:
+        if marked.any():
+            extents = [(start, end - start) for start, end in marked_spans(time, marked).tolist()]
+            axes.broken_barh(extents, (0, 1), transform=axes.get_xaxis_transform(), label=label, **look)
+            handles.append(Patch(**look, label=label))
+    return handles
+
+
+class _Peak(NamedTuple):
+    """The farthest point of a stretch at which a curve leaves the panel."""
+
+    time: float
+    value: float
+    color: str
+
+
+def _mark_peaks(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
+    """Mark where curves leave a panel whose scale near-singular peaks do not set."""
+    time = lines[0].curve.time
+    middle = (time[0] + time[-1]) / 2
+    for sign, end in zip((-1, 1), axes.get_ylim(), strict=True):
+        peaks = [peak for line in lines for peak in _peaks(line, sign, end)]
+        if peaks:
+            _mark(axes, peaks, sign, middle)
+    return [Line2D([], [], marker="^", color="0.4", **_MARK, label="cut off, near-singular")]
+
+
+def _peaks(line: Line, sign: int, end: float) -> list[_Peak]:
+    """Return the farthest point of each stretch beyond one end of the panel."""
+    time, values, color = line.curve.time, line.curve.values, line_style(line.look).color
+    heights = np.where(np.isnan(values), -np.inf, sign * values)
+    changes = np.flatnonzero(np.diff(heights > sign * end, prepend=False, append=False))
+    stretches = changes.reshape(-1, 2).tolist()
+    points = [start + int(np.argmax(heights[start:stop])) for start, stop in stretches]
+    return [_Peak(float(time[at]), float(values[at]), color) for at in points]
+
+
+def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float) -> None:
+    """Draw a triangle for each peak at the edge that it leaves by, and write the height of the farthest."""
+    place, edge = axes.get_xaxis_transform(), 0.97 if sign > 0 else 0.03
+    marker = "^" if sign > 0 else "v"
+    for peak in peaks:
+        axes.plot([peak.time], [edge], transform=place, color=peak.color, marker=marker, **_MARK)
+    farthest = max(peaks, key=lambda peak: sign * peak.value)
+    at_right, value = farthest.time > middle, farthest.value
+    axes.annotate(
+        f"{value:.0f}"
+        if 1000 <= abs(value) < 1e6
+        else f"{value:.3g}",  # exponents only where they are needed
+        (farthest.time, edge),
+        (-6 if at_right else 6, 0),
+        xycoords=place,
+        textcoords="offset points",
+        ha="right" if at_right else "left",
+        va="top" if sign > 0 else "bottom",
+        fontsize=8,
+        color=farthest.color,
+        bbox=_BACKGROUND,
+    )

@@ -13,10 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from vsacli.results.plots.drawing import ZERO, draw_curve
-from vsacli.results.plots.panels import PANEL_WIDTH, AxesGrid, add_title, complete, folding, share_time
-from vsacli.results.plots.styles import DIFFERENCE, LineStyle, house_style, line_handle, line_style
-from vsacli.results.recorded_curves import Highest, RecordedCurve, Spectrum
+from vsacli.results.charts.chart import DIFFERENCE, PANEL_WIDTH, folding
+from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
+from vsacli.results.plots.panels import ZERO, add_title, draw_curve
+from vsacli.results.plots.sheets import AxesGrid, complete, share_time
+from vsacli.results.plots.styles import LineStyle, house_style, line_handle, line_style
 
 COLUMNS, MOST_ROWS = 4, 14
 ROW_HEIGHT = 1.8
@@ -61,14 +62,15 @@ def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) ->
     span = np.array([min(times), max(times)])
     for first in range(0, len(panels), rows):
         fold = panels[first : first + rows]
-        share_time(fold[:, :2], np.ones((len(fold), 2), dtype=bool), span)
+        for column in fold[:, :2].T:
+            share_time(column, span)
         for axes in fold[-1, 2:]:
             axes.set_xlabel("frequency [Hz]")
 
 
 def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
     axes.plot(curve.recorded.time, curve.recorded.values, **_SAMPLES)
-    handles = draw_curve(axes, curve.fitted, 0, _FIT)
+    handles = draw_curve(axes, curve.fitted, _FIT)
     if not np.any(curve.spectrum.recorded):  # at rest: rounding is no scale
         middle = float(np.mean(curve.recorded.values))
         axes.set_ylim(middle - 0.1 * (abs(middle) or 1.0), middle + 0.1 * (abs(middle) or 1.0))
@@ -80,7 +82,7 @@ def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
 def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
     """Draw what the spline leaves, the noise that is stated, and the ends whose derivatives mean little."""
     axes.axhline(0.0, **ZERO)
-    handles = draw_curve(axes, curve.residual, 0, DIFFERENCE)
+    handles = draw_curve(axes, curve.residual, line_style(DIFFERENCE))
     if curve.rms > 0:
         for level in (-2 * curve.noise, 2 * curve.noise):
             axes.axhline(level, **_NOISE)

@@ -14,7 +14,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.plots.panels import PANEL_WIDTH, complete
+from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.plots.sheets import complete
 from vsacli.results.plots.styles import house_style, line_style, shortened
 
 PANEL_HEIGHT = 2.3
@@ -48,7 +49,7 @@ EDGE, BRAKING = "0.35", 0.3
 
 
 class Bounds(NamedTuple):
-    """What a motor is held to, infinite where by nothing.
+    """The limits of a motor, infinite where there is none.
 
     Attributes:
         max_torque, continuous_torque: largest, and of the root mean square.
@@ -65,7 +66,7 @@ class Bounds(NamedTuple):
     resistance: float
 
     def torque_at(self, speed: FloatArray) -> FloatArray:
-        """The largest torque that drives at a speed; NaN where it cannot turn so fast."""
+        """Return the largest torque that drives at a speed; NaN where it cannot turn so fast."""
         torque = np.full_like(speed, self.max_torque)
         if math.isfinite(self.max_voltage):
             left = self.max_voltage - self.torque_constant * speed
@@ -100,7 +101,7 @@ class TorqueSpeed(NamedTuple):
 
 
 def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
-    """A panel for each motor: sizes of torque over sizes of speed, paler where it brakes."""
+    """Draw a panel for each motor: sizes of torque over sizes of speed, paler where it brakes."""
     with house_style():
         folds = math.ceil(len(motors) / (2 * MOST_ROWS))
         columns = min(2 * folds, len(motors))
@@ -121,7 +122,7 @@ def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
 
 
 def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
-    """A panel; returns what a legend shows for it."""
+    """Draw a panel; return what a legend shows for it."""
     speeds, torques = (np.concatenate([np.abs(run[part]) for run in motor.runs.values()]) for part in (0, 1))
     right = _end(float(speeds.max()), [min(motor.bounds.max_velocity, _fastest(motor.bounds))])
     top = _end(float(torques.max()), [motor.bounds.max_torque, motor.bounds.continuous_torque])
@@ -142,13 +143,13 @@ def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
 
 
 def _end(used: float, bounds: Sequence[float]) -> float:
-    """Where an axis ends: beyond what is used, and beyond bounds that are in sight."""
+    """Return the end of an axis: beyond what is used, and beyond bounds that are in sight."""
     seen = [bound for bound in bounds if bound <= SIGHT * used]
     return ROOM * max([used, *seen]) or 1.0
 
 
 def _fastest(bounds: Bounds) -> float:
-    """The speed at which the voltage leaves no torque."""
+    """Return the speed at which the voltage leaves no torque."""
     return bounds.max_voltage / bounds.torque_constant if math.isfinite(bounds.max_voltage) else math.inf
 
 
@@ -172,7 +173,7 @@ def _draw_bounds(axes: Axes, bounds: Bounds, right: float, top: float) -> list[A
 
 
 def _draw_run(axes: Axes, velocity: FloatArray, torque: FloatArray, color: str) -> None:
-    """Sizes of torque over sizes of speed, dark where the motor drives."""
+    """Draw sizes of torque over sizes of speed, dark where the motor drives."""
     drives = velocity * torque >= 0
     for shown, alpha, order in ((~drives, BRAKING, 2), (drives, 1.0, 3)):
         axes.plot(

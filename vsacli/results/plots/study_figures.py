@@ -1,10 +1,14 @@
-"""Figures of studies: margin and cost over what varies, the Pareto front, how probable it is to succeed."""
+"""Figures of studies: margin and cost over what varies, the Pareto front, the probability of success.
+
+And the ranking of a sensitivity analysis: a bar for each parameter.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,11 +17,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.plots.drawing import ZERO
-from vsacli.results.plots.panels import PANEL_WIDTH, add_title, complete
+from vsacli.results.charts.chart import PANEL_WIDTH
+from vsacli.results.charts.study_points import StudyPoints
+from vsacli.results.plots.panels import ZERO, add_title
+from vsacli.results.plots.sheets import complete
 from vsacli.results.plots.styles import house_style, line_handle, line_style, shortened
-from vsacli.results.store.stored_study import StoredStudy
-from vsacli.results.study_points import StudyPoints
+from vsacli.results.store.study_table import StoredStudy
 
 MARGIN, COST, PARETO, FEASIBILITY_OF_RUNS = "margin", "cost", "pareto", "feasibility"
 """Names of the figures; the files are called `<stem>-<name>`."""
@@ -31,11 +36,17 @@ MOST_LETTERS = 30
 MOST_PANELS = 6
 """Numbers that vary whose panels one figure holds: those that the margin follows most."""
 
+BAR_HEIGHT = 0.28
+"""Inches."""
+
+LABEL_LENGTH, ROOM_FOR_LABELS = 16, 0.35
+"""Characters of a joint's name beside its bar, and the space for it, relative to the longest bar."""
+
 _FINE, _LOST = line_style(2).color, line_style(1).color
 
 
 def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
-    """The figures of the table of a study, by name.
+    """Draw the figures of the table of a study, by name.
 
     Raises:
         InputError: there is nothing to draw.
@@ -53,7 +64,7 @@ def study_figures(table: StoredStudy) -> Mapping[str, Figure]:
 
 
 def compared_studies(tables: Sequence[StoredStudy], labels: Sequence[str]) -> Figure:
-    """How probable each margin is in several studies.
+    """Draw how probable each margin is in several studies.
 
     Raises:
         InputError: there is nothing to draw in one.
@@ -63,7 +74,7 @@ def compared_studies(tables: Sequence[StoredStudy], labels: Sequence[str]) -> Fi
 
 
 def _over_numbers(points: StudyPoints) -> Figure:
-    """Margin, and cost below, over each number that varies."""
+    """Draw margin, and cost below, over each number that varies."""
     paths = _most_followed(points)
     rows = 1 if points.cost is None else 2
     figure = Figure((PANEL_WIDTH * max(2, len(paths)), PANEL_HEIGHT * rows + 0.9), layout="constrained")
@@ -82,7 +93,7 @@ def _over_numbers(points: StudyPoints) -> Figure:
 
 
 def _most_followed(points: StudyPoints) -> list[str]:
-    """The numbers that the margin follows most, by their correlation, in the order of the table."""
+    """Return the numbers that the margin follows most, by their correlation, in the order of the table."""
     there = np.isfinite(points.margin)
 
     def followed(path: str) -> float:
@@ -117,7 +128,7 @@ def _handles(points: StudyPoints) -> list[Line2D]:
 
 
 def _is_grid(points: StudyPoints) -> bool:
-    """Whether two numbers vary, each value of one combined once with each of the other."""
+    """Return whether two numbers vary, each value of one combined once with each of the other."""
     if len(points.varying) != 2:
         return False
     pairs = np.column_stack(list(points.varying.values()))
@@ -126,7 +137,7 @@ def _is_grid(points: StudyPoints) -> bool:
 
 
 def _over_map(points: StudyPoints) -> Figure:
-    """Margin, and cost beside it, or costs before and after an optimisation, as maps over two numbers."""
+    """Draw margin and cost, or costs before and after an optimization, as maps over two numbers."""
     (across, x), (up, y) = points.varying.items()
     maps = points.shown
     figure = Figure((1.5 * PANEL_WIDTH * len(maps), PANEL_HEIGHT + 1.2), layout="constrained")
@@ -152,12 +163,12 @@ def _over_map(points: StudyPoints) -> Figure:
 
 
 def _fitting(label: str) -> str:
-    """A label with its unit, in two lines if it is longer than a panel is high."""
+    """Return a label with its unit, in two lines if it is longer than a panel is high."""
     return label if len(label) <= MOST_LETTERS else label.replace(" [", "\n[")
 
 
 def _pareto(points: StudyPoints) -> Figure:
-    """Cost over margin of the feasible runs, and those of which none is better in both."""
+    """Draw cost over margin of the feasible runs, and those of which none is better in both."""
     assert points.cost is not None, "see study_figures"
     words, cost = points.cost
     figure = Figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT), layout="constrained")
@@ -176,7 +187,7 @@ def _pareto(points: StudyPoints) -> Figure:
 
 
 def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str]) -> Figure:
-    """Share of the runs whose smallest margin is at least so large, and of those that are feasible."""
+    """Draw the share of the runs whose smallest margin is at least so large, and of the feasible ones."""
     figure = Figure((2 * PANEL_WIDTH, 1.6 * PANEL_HEIGHT), layout="constrained")
     axes, handles = figure.add_subplot(), []
     for index, (points, label) in enumerate(zip(studies, labels, strict=True)):
@@ -193,12 +204,45 @@ def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str]) -> Figur
 
 
 def _share(points: StudyPoints, label: str) -> str:
-    """How many runs are feasible, with the interval."""
+    """Return how many runs are feasible, with the interval."""
     share, low, high = points.share
     return f"{label}: {100 * share:.3g} % ({100 * low:.3g} to {100 * high:.3g} %)"
 
 
 def _label(points: StudyPoints, path: str) -> str:
-    """The label of an axis with a number."""
+    """Return the label of an axis with a number."""
     unit = points.unit(path)
     return f"{shortened(path)}\n[{unit}]" if unit else shortened(path)
+
+
+class Bar(NamedTuple):
+    """The effect of a change of a parameter.
+
+    Attributes:
+        label: the parameter, and its change.
+        share: largest change of a motor torque over the largest torque of its joint.
+        joint: that one.
+    """
+
+    label: str
+    share: float
+    joint: str
+
+
+def ranking_figure(bars: Sequence[Bar], title: str) -> Figure:
+    """Draw a bar for each parameter, the most important on top, with the joint that it moves most."""
+    with house_style():
+        figure = Figure((2 * PANEL_WIDTH, BAR_HEIGHT * len(bars) + 1.2), layout="constrained")
+        axes = figure.add_subplot()
+        joints = list(dict.fromkeys(bar.joint for bar in bars))
+        colors = [line_style(joints.index(bar.joint)).color for bar in bars]
+        axes.barh(range(len(bars)), [100 * bar.share for bar in bars], color=colors, height=0.7)
+        axes.set_yticks(range(len(bars)), [bar.label for bar in bars], parse_math=False)
+        axes.invert_yaxis()
+        for place, bar in enumerate(bars):
+            text = f" {shortened(bar.joint, LABEL_LENGTH)}"
+            axes.text(100 * bar.share, place, text, va="center", fontsize=8, parse_math=False)
+        axes.margins(x=ROOM_FOR_LABELS)
+        axes.grid(visible=False, axis="y")
+        axes.set_xlabel("change of motor torque [% of its peak]")
+        return complete(figure, title, [])

@@ -1,6 +1,7 @@
-"""What every panel is drawn with: settings of matplotlib, line styles, names that fit.
+"""Looks of all panels: settings of Matplotlib, line styles, and names that fit and can be read.
 
-The first line styles are the paper's, continued to any number of joints.
+The first line styles are the paper's, continued to any number of joints. Names in letters that Matplotlib's
+own font lacks are drawn in a font of this machine, or else by their codes.
 """
 
 from __future__ import annotations
@@ -9,11 +10,17 @@ import dataclasses
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import matplotlib
 from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+from matplotlib.font_manager import FontEntry, findfont, fontManager, get_font
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
+
+from vsacli.results.charts.chart import DIFFERENCE
 
 if TYPE_CHECKING:
     from matplotlib.typing import RcKeyType
@@ -66,7 +73,7 @@ _STROKES = (
 
 @dataclass(frozen=True)
 class LineStyle:
-    """Colour, dashes and marker of a line, in matplotlib's words."""
+    """Color, dashes and marker of a line, in Matplotlib's words."""
 
     color: str
     linestyle: str
@@ -79,16 +86,14 @@ class LineStyle:
 
 
 def line_style(index: int) -> LineStyle:
-    """Style of the joint (or result) `index` from 0: solid black, dashed red, blue with +, and so on."""
+    """Return the style of a look: from 0 solid black, dashed red, blue with +, and so on."""
+    if index == DIFFERENCE:
+        return LineStyle(_COLORS[2], "-", "")
     return LineStyle(_COLORS[index % len(_COLORS)], *_STROKES[index % len(_STROKES)])
 
 
-DIFFERENCE = LineStyle(_COLORS[2], "-", "")
-"""Of one curve minus another, which is neither of them."""
-
-
 def shortened(name: str, length: int = LONGEST_LABEL) -> str:
-    """A name cut in its middle to a length a figure can hold; names often differ at their ends."""
+    """Cut a name in its middle to a length a figure can hold; names often differ at their ends."""
     tail = length // 2
     return name if len(name) <= length else name[: length - tail - 1] + "…" + name[-tail:]
 
@@ -103,5 +108,77 @@ def house_style() -> Iterator[None]:
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:
-    """What a legend shows for a curve."""
+    """Return the entry of a legend for a curve."""
     return Line2D([], [], **style.words, label=label)
+
+
+USUAL = "DejaVu Sans"
+"""The font that comes with matplotlib."""
+
+SUBSTITUTE = "Last Resort"
+"""Beginning of the name of the font that draws a picture of its script for every letter."""
+
+REGULAR = 400
+"""Weight of a font that is neither bold nor light."""
+
+
+def make_legible(figure: Figure) -> None:
+    """Give texts a further font for what is missing in the usual one; letters that no font has become codes.
+
+    Two names in a script that is nowhere installed would else be two rows of equal boxes.
+    """
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        missing = frozenset(text.get_text()) - usual_letters()
+        if missing:
+            _mend(text, missing)
+
+
+def _mend(text: Text, missing: frozenset[str]) -> None:
+    fonts = further_fonts(missing)
+    text.set_fontfamily([USUAL, *(name for name, _ in fonts)])
+    drawn = frozenset("").union(*(letters for _, letters in fonts))
+    written = text.get_text()
+    for letter in missing - drawn:
+        written = written.replace(letter, letter.encode("unicode_escape").decode("ascii"))
+    text.set_text(written)
+
+
+@cache
+def usual_letters() -> frozenset[str]:
+    """Return what the usual font can draw, and the end of a line."""
+    return _letters(findfont(USUAL)) | {"\n"}
+
+
+@cache
+def further_fonts(missing: frozenset[str]) -> tuple[tuple[str, frozenset[str]], ...]:
+    """Return names of installed fonts that draw some of these letters, each with those it is for."""
+    found = []
+    for entry in installed_fonts():
+        if not missing:
+            break
+        here = missing & _letters(entry.fname)
+        if here:
+            found.append((entry.name, here))
+            missing -= here
+    return tuple(found)
+
+
+def installed_fonts() -> Iterator[FontEntry]:
+    """Return the fonts of this machine, upright regular ones first."""
+    entries = sorted(
+        fontManager.ttflist,
+        key=lambda entry: (entry.weight != REGULAR, entry.style != "normal", entry.name, entry.fname),
+    )
+    return (entry for entry in entries if not entry.name.startswith(SUBSTITUTE))
+
+
+@cache
+def _letters(path: str) -> frozenset[str]:
+    """Return what a font can draw; nothing if it has no outlines, as those of colored pictures."""
+    try:
+        font = get_font(path)
+        font.set_size(10, 72)
+        return frozenset(map(chr, font.get_charmap()))
+    except (OSError, RuntimeError):
+        return frozenset()

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
-from vsacli.base.streams import place_of
+from vsacli.base.storage import place_of
 from vsacli.documents.source import Source
 from vsacli.results.store.damage import CheckedFile, own_dataset
 from vsacli.results.store.schema import TEXT, storable

@@ -15,15 +15,14 @@ from typing import Any
 import h5py
 import numpy as np
 
-from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import MOTORS, OF_ANY_ROBOT, VARIABLES, Variable
 from vsacli.base.version import __version__
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import declared
-from vsacli.documents.resolved_fields import ResolvedField
-from vsacli.results.store.chunks import chunk_rows
+from vsacli.documents.record_values import ResolvedField, arrays
 from vsacli.results.store.inputs import write_sources
+from vsacli.results.store.new_file import chunk_rows
 from vsacli.results.store.schema import (
     DOUBLE,
     EXISTING,
@@ -44,7 +43,7 @@ GZIP_LEVEL = 4
 
 
 def row_bytes(variable: Variable, joints: int, precision: str) -> int:
-    """Size of one sample."""
+    """Return the size of one sample."""
     return math.prod(row_shape(variable, joints)) * storage_type(variable, precision).itemsize
 
 
@@ -79,7 +78,7 @@ def create_layout(
     for variable in variables:
         dataset = _create_variable(file, variable, robot, trajectory.samples, precision)
         stored[variable.name] = dataset
-        _attach_scales(dataset, [scales[dim] for dim in ("time", *variable.dims)])
+        attach_scales(dataset, [scales[dim] for dim in ("time", *variable.dims)])
     inputs = file.create_group("inputs", track_order=True)
     write_sources(inputs, {"robot": robot.sources, "trajectory": trajectory.sources})
     _write_robot(inputs, robot, scales)
@@ -106,7 +105,7 @@ def _root_attributes(robot: Robot, trajectory: Trajectory, provenance: Mapping[s
 
 
 def _scipy_version() -> str:
-    """As its file says; to import it, or the package that finds versions, takes longer than a short run."""
+    """Return the version in its file; an import, or the package that finds versions, outlasts a short run."""
     spec = find_spec("scipy")
     text = Path(spec.origin or "").with_name("version.py").read_text(encoding="utf-8") if spec else ""
     found = re.search(r'^version\s*=\s*"([^"]+)"', text, re.MULTILINE)
@@ -114,28 +113,32 @@ def _scipy_version() -> str:
 
 
 def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str, h5py.Dataset]:
-    """The dimension scales by name."""
+    """Write the dimension scales; return them by name."""
     time = _create_variable(file, VARIABLES["time"], robot, samples, DOUBLE)
-    joint = _create_labels(file, "joint", robot.joint_names, "joint name")
-    joint_type = _create_labels(file, "joint_type", robot.joint_types, "revolute or prismatic")
+    joint = create_labels(file, "joint", robot.joint_names, "joint name")
+    joint_type = create_labels(file, "joint_type", robot.joint_types, "revolute or prismatic")
     motor = _add_array(file, "motor", np.array(MOTORS, dtype="<i8"))
     motor.attrs["long_name"] = "motor of a joint"
     scales = {"time": time, "joint": joint, "motor": motor}
     for name, scale in scales.items():
         scale.make_scale(name)
-    _attach_scales(joint_type, [joint])
+    attach_scales(joint_type, [joint])
     return scales
 
 
 def _create_wrench_axis(file: h5py.File, frame: str) -> h5py.Dataset:
-    axis = _create_labels(file, "wrench_axis", WRENCH_AXES, "force and moment along the axes of a frame")
+    axis = create_labels(file, "wrench_axis", WRENCH_AXES, "force and moment along the axes of a frame")
     axis.attrs["frame"] = frame
     axis.make_scale("wrench_axis")
     return axis
 
 
-def _create_labels(file: h5py.File, name: str, labels: tuple[str, ...], long_name: str) -> h5py.Dataset:
-    dataset = _add_array(file, name, np.array(labels, dtype=TEXT))
+def create_labels(
+    file: h5py.File, name: str, labels: Iterable[str], long_name: str, *, track_order: bool = True
+) -> h5py.Dataset:
+    """Write texts, such as the names of a dimension."""
+    texts = np.array([storable(label) for label in labels], dtype=TEXT)
+    dataset = file.create_dataset(name, data=texts, dtype=TEXT, track_order=track_order)
     dataset.attrs["long_name"] = long_name
     return dataset
 
@@ -162,7 +165,7 @@ def _create_variable(
 
 
 def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5py.Dataset]) -> None:
-    """The subgroup `robot`: each declared field as an array, e.g. `gravity`, `joints/link_mass`.
+    """Write the subgroup `robot`: each declared field as an array, e.g. `gravity`, `joints/link_mass`.
 
     One group for the joints, and no deeper: a group `motor` would collide with the coordinate `motor`.
     """
@@ -176,20 +179,20 @@ def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5p
         of_joints = field.path[0] == "joints"
         name = "_".join(field.path[1:] if of_joints else field.path)
         dataset = _write_field(joints if of_joints else group, name, field, robot.joint_types)
-        _attach_scales(dataset, [scales[dim] for dim in field.dims])
+        attach_scales(dataset, [scales[dim] for dim in field.dims])
 
 
 def resolve(robot: Robot) -> list[ResolvedField]:
-    """Every declared field of a robot, defaults included, in SI units, motors as they act on their joint."""
+    """Return every declared field of a robot, with defaults, in SI units, motors at their joints."""
     return list(_resolved(robot))
 
 
 def _resolved(record: Any) -> Iterator[ResolvedField]:
-    record = record.at_joint if isinstance(record, Motor) else record
+    record = getattr(record, "at_joint", record)  # motors as the joint has them
     for name, (field, _) in declared(type(record)).items():
         content = getattr(record, name)
         if content is not None:
-            for part in field.kind.arrays(content, _resolved):
+            for part in arrays(field.kind, content, _resolved):
                 yield part._replace(path=(name, *part.path), doc=part.doc or field.doc)
 
 
@@ -208,11 +211,11 @@ def _write_field(
 
 
 def _add_array(group: h5py.Group, name: str, values: AnyArray) -> h5py.Dataset:
-    """A new dataset of numbers, or of texts in an array of the type `TEXT`; attributes keep their order."""
+    """Write a dataset of numbers, or of texts in an array of the type `TEXT`; attributes keep their order."""
     return group.create_dataset(name, data=values, dtype=values.dtype, track_order=True)
 
 
-def _attach_scales(dataset: h5py.Dataset, scales: Iterable[h5py.Dataset]) -> None:
+def attach_scales(dataset: h5py.Dataset, scales: Iterable[h5py.Dataset]) -> None:
     """Attach to each axis its scale."""
     for axis, scale in enumerate(scales):
         dataset.dims[axis].attach_scale(scale)

@@ -1,4 +1,10 @@
-"""An HDF5 file that is being written: what the disk refuses, and signals, without HDF5 coming to harm."""
+"""An HDF5 file that is being written: samples in chunks, written in a thread, safe from the disk and signals.
+
+HDF5 cannot be unwound from a failed write, and crashes if an exception crosses its code. So it is given a
+`Sink`, which raises none, and signals that end the run wait until a piece is written. Chunks are put together
+here in the order in which they are stored, with one copy, and written whole: the library would copy each
+block into chunks of its own, look every chunk up, and keep in its cache what is not full.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +12,23 @@ import contextlib
 import io
 import os
 import threading
+import zlib
+from collections import deque
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
 
 import h5py
+import numpy as np
 
+from vsacli.base.arrays import AnyArray
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
-from vsacli.base.storage import reporting_storage_errors, storage_error
+from vsacli.base.storage import check_free_space, reporting_storage_errors, storage_error
 
 if TYPE_CHECKING:
-    from vsacli.results.store.write_behind import WriteBehind
+    from concurrent.futures import Future, ThreadPoolExecutor
 
 CHUNK_CACHE_SLOTS = 11
 """Chunks of a dataset that HDF5 finds in its cache: few, since rows are written in order."""
@@ -30,12 +42,13 @@ BEHIND = 2**25
 SYNCED = 2**26
 """Bytes after which the disk begins to store what was written, so that little is left of that at the end."""
 
+CHUNK_BYTES = 2**19
+"""Size of a chunk, at most. Of 64 kB to 1 MB tried, those from 256 kB on take the same time; smaller ones
+cost time for each chunk, larger ones memory for each variable."""
+
 
 class NewFile:
-    """An HDF5 file that is being written.
-
-    HDF5 crashes if an exception crosses its code. So its file is a `Sink`, which raises none, and signals
-    that end the run wait until a piece is written.
+    """Context manager that writes an HDF5 file, which is complete after `finish` of a subclass.
 
     Args:
         file: where it is staged.
@@ -46,20 +59,40 @@ class NewFile:
         self._cleanup = contextlib.ExitStack()
         self._file: Any = None  # h5py has no types
         self._sink: Sink | None = None
-        self._behind: WriteBehind | None = None
-        self._bytes = self._synced = 0
+        self._thread: ThreadPoolExecutor | None = None
+        self._waiting: deque[tuple[Future[None], int]] = deque()
+        self._bytes = self._synced = self._held = 0
 
-    @property
-    def is_open(self) -> bool:
-        """Whether it is open."""
-        return bool(self._file)
-
-    def open(self) -> h5py.File:
-        """Open the file, which is empty; within `used`.
+    def __enter__(self) -> Self:
+        """Create the file, with everything but samples and report.
 
         Raises:
-            StorageError: it cannot be written.
+            StorageError: it cannot be written, or does not fit its disk.
         """
+        check_free_space(self._staged.path, self._size())
+        try:
+            with interrupts_deferred(), self.used():
+                self._open()
+                self._create()
+        except BaseException:
+            self.discard()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.discard()
+
+    def _size(self) -> int:
+        """Return the bytes that the file will have, about."""
+        raise NotImplementedError
+
+    def _create(self) -> None:
+        """Write everything that is known before the first sample into the empty file."""
+        raise NotImplementedError
+
+    def _open(self) -> None:
         with reporting_storage_errors(self._staged.path):
             raw = self._staged.temporary.open("r+b", buffering=0)
         self._sink = self._cleanup.enter_context(Sink(raw))
@@ -71,11 +104,10 @@ class NewFile:
             rdcc_nslots=CHUNK_CACHE_SLOTS,
         )
         self._file = self._cleanup.enter_context(file)
-        return self._file
 
     @contextlib.contextmanager
     def used(self) -> Iterator[None]:
-        """Around any use of HDF5; an error of the disk counts more than what HDF5 makes of it.
+        """Surround any use of HDF5; an error of the disk counts more than what HDF5 makes of it.
 
         Raises:
             StorageError: the disk is full or fails.
@@ -90,29 +122,39 @@ class NewFile:
                 raise storage_error(self._staged.path, self._sink.error) from self._sink.error
 
     def do(self, task: Callable[[], None], size: int) -> None:
-        """Use the file in a task that holds so many bytes: now, or of a long file behind the caller's back.
+        """Use the file in a task that holds so many bytes: now, or of a long file in a thread.
 
-        Within `used`, as what the task does is; tasks are done in their order.
+        Within `used`, as the task itself is; tasks are done in their order. Signals never reach the thread,
+        and what it raises comes from a later call here or of `wait`. While too many bytes wait, so does the
+        caller.
         """
         self._bytes += size
         if self._bytes <= BEHIND_FROM:
             task()
             return
-        if self._behind is None:
-            from vsacli.results.store.write_behind import WriteBehind
+        if self._thread is None:
+            from concurrent.futures import ThreadPoolExecutor
 
-            self._behind = WriteBehind(BEHIND)
-        self._behind.put(task, size)
+            self._thread = ThreadPoolExecutor(1, "vsacli-writing")
+        self._waiting.append((self._thread.submit(task), size))
+        self._held += size
+        while self._held > BEHIND:
+            self._await_oldest()
         if self._sink is not None and self._bytes - self._synced >= SYNCED:
             self._synced = self._bytes
             self._sink.begin_sync()
 
     def wait(self) -> None:
         """Wait until all tasks are done; within `used`."""
-        if self._behind is not None:
-            self._behind.wait()
+        while self._waiting:
+            self._await_oldest()
 
-    def close(self) -> None:
+    def _await_oldest(self) -> None:
+        done, size = self._waiting.popleft()
+        self._held -= size
+        done.result()
+
+    def _close(self) -> None:
         """Write what is left; within `used`."""
         assert self._sink is not None, "it is open"
         self._file.close()
@@ -121,8 +163,8 @@ class NewFile:
     def discard(self) -> None:
         """Close what is open; what is not written is lost."""
         with interrupts_deferred():
-            if self._behind is not None:
-                self._behind.discard()
+            if self._thread is not None:
+                self._thread.shutdown(cancel_futures=True)
             self._cleanup.close()
 
 
@@ -190,3 +232,65 @@ class Sink(io.RawIOBase):
         except OSError as error:
             self.error = self.error or error
         super().close()
+
+
+def chunk_rows(samples: int, row_bytes: int) -> int:
+    """Return the samples in a chunk: equal chunks, as few as `CHUNK_BYTES` allows."""
+    most = max(1, CHUNK_BYTES // row_bytes)
+    chunks = -(-samples // most)
+    return -(-samples // chunks)
+
+
+class ChunkFiller:
+    """Appends samples to a dataset, chunk by chunk.
+
+    Args:
+        dataset: its first axis is time, and its chunks are as wide as its rows; it has no filter but gzip.
+        hand_over: as `NewFile.do`.
+    """
+
+    def __init__(self, dataset: h5py.Dataset, hand_over: Callable[[Callable[[], None], int], None]) -> None:
+        self._dataset, self._hand_over = dataset, hand_over
+        self._shape, self._dtype = dataset.chunks, dataset.dtype
+        self._level: int | None = dataset.compression_opts
+        self._start = self._filled = 0
+        self._values: AnyArray = np.empty(0)
+
+    def append(self, values: AnyArray) -> None:
+        """Copy samples, (samples, ...), whatever their order in memory.
+
+        Raises:
+            FloatingPointError: a finite value is infinite in the type of the dataset.
+        """
+        rows = self._shape[0]
+        while len(values):
+            if not self._filled:
+                self._values = np.empty(self._shape, self._dtype)
+            taken = values[: rows - self._filled]
+            with np.errstate(over="raise"):
+                self._values[self._filled : self._filled + len(taken)] = taken
+            self._filled += len(taken)
+            values = values[len(taken) :]
+            if self._filled == rows:
+                self._pass_on()
+
+    def finish(self) -> None:
+        """Hand over the rest; the dataset ends with the samples there are."""
+        self._hand_over(partial(self._shorten, self._start + self._filled), 0)
+        if self._filled:
+            self._values[self._filled :] = 0  # what no reader sees
+            self._pass_on()
+
+    def _pass_on(self) -> None:
+        self._hand_over(partial(self._write, self._start, self._values), self._values.nbytes)
+        self._start += self._filled
+        self._filled, self._values = 0, np.empty(0)
+
+    def _shorten(self, samples: int) -> None:
+        if samples < self._dataset.shape[0]:
+            self._dataset.resize(samples, axis=0)
+
+    def _write(self, start: int, values: AnyArray) -> None:
+        """Write a chunk past the library's cache."""
+        content = values if self._level is None else zlib.compress(values.data, self._level)
+        self._dataset.id.write_direct_chunk((start, *(0 for _ in values.shape[1:])), content)

@@ -1,4 +1,8 @@
-"""Reading a result file, or a file of another format in the same layout."""
+"""Reading result files, and simulation files, which have the same layout.
+
+`StoredFile` opens any HDF5 file of this tool, `StoredResult` reads samples, limits and geometry, and
+`open_stored` opens a result or a simulation, whichever a file is. Everything is checked before it is used.
+"""
 
 from __future__ import annotations
 
@@ -7,38 +11,39 @@ import json
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self, TypeVar, cast
+from types import TracebackType
+from typing import Any, NamedTuple, Self, TypeVar, cast
 
 import h5py
 import numpy as np
 
-from vsacli.actuators.kinds import existing
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.simulation_variables import ACTUAL, MEASURED, SIMULATION_VARIABLES, actual, measured
 from vsacli.base.texts import one_line, shown
 from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
 from vsacli.results.store.damage import (
     SCALES,
     CheckedFile,
+    bounded,
     check_present,
     check_times,
     own_dataset,
     read_attributes,
     reporting_damage,
 )
-from vsacli.results.store.inputs import StoredInput
+from vsacli.results.store.inputs import StoredInput, read_sources
 from vsacli.results.store.schema import (
     DOUBLE,
     EXISTING,
     FORMAT,
     PRECISION,
+    SIMULATION,
     row_shape,
     storage_type,
     variable_attributes,
 )
-from vsacli.results.store.stored_file import StoredFile
-from vsacli.results.store.stored_geometry import DH, StoredGeometry
-from vsacli.results.store.stored_limits import ACHIEVED, RANGES, SIZES
+from vsacli.robot.joint import DenavitHartenberg, Pose, existing
 
 OF_JOINTS = "inputs/robot/joints/{}"
 """Where a number of the joints stands, by the path to it in the robot file, its dots as underscores."""
@@ -51,6 +56,114 @@ MADE_BY = ("created", "generated_by", "command_line", "versions", "Conventions")
 
 COMPUTED_BY = ("engine", "compiler", "threads")
 """Root attributes of files that a run has written: all of them, or none."""
+
+
+RANGES = {
+    "q": "limits_position",
+    "dq": "limits_velocity",
+    "stiffness": "limits_stiffness",
+    "damping": "damper_range",
+}
+"""Lower and upper bound of a variable of joints, by its name."""
+
+SIZES = {
+    "phi": "actuator_spring_max_deflection",
+    "dtheta": "actuator_motor_max_velocity",
+    "tau_motor": "actuator_motor_max_torque",
+    "current": "actuator_motor_max_current",
+    "voltage": "actuator_motor_max_voltage",
+}
+"""Largest size of a variable of motors, by its name."""
+
+ACHIEVED = {**{actual(name): name for name in ACTUAL}, **{measured(name): name for name in MEASURED}}
+"""What simulations add, by name: bounded as what was commanded."""
+
+DH = ("a", "alpha", "d", "theta")
+"""The numbers of a Denavit-Hartenberg row, in the order of its fields."""
+
+
+class StoredRow(NamedTuple):
+    """The part of a joint that says where frames lie."""
+
+    dh: DenavitHartenberg
+    is_revolute: bool
+
+
+class StoredGeometry(NamedTuple):
+    """A chain, which `vsacli.robot.kinematics` accepts in place of a robot."""
+
+    base: Pose
+    tool: Pose
+    joints: tuple[StoredRow, ...]
+
+    @classmethod
+    def of(cls, joint_types: Sequence[str], rows: FloatArray, base: FloatArray, tool: FloatArray) -> Self:
+        """Return the chain of numbers as they are stored.
+
+        Args:
+            joint_types: "revolute" or "prismatic", base to tip.
+            rows: Denavit-Hartenberg rows, (joints, 4), in the order of `DH`.
+            base: `xyz` and `rpy` of the pose, (2, 3).
+            tool: the same.
+        """
+        joints = (
+            StoredRow(DenavitHartenberg(**dict(zip(DH, row, strict=True))), joint_type == "revolute")
+            for row, joint_type in zip(rows.tolist(), joint_types, strict=True)
+        )
+        return cls(_pose(base), _pose(tool), tuple(joints))
+
+
+def _pose(numbers: FloatArray) -> Pose:
+    xyz, rpy = map(tuple, numbers.tolist())
+    return Pose(xyz=xyz, rpy=rpy)
+
+
+class StoredFile:
+    """An open file; a context manager that closes it.
+
+    Args:
+        path: of the file, as given.
+        file: the same, open.
+
+    Attributes:
+        path: as given.
+    """
+
+    def __init__(self, path: str | Path, file: CheckedFile) -> None:
+        self.path = Path(path)
+        self._file = file
+        self._checked: dict[str, h5py.Dataset] = {}
+
+    def _dataset(self, name: str) -> h5py.Dataset:
+        """Return a dataset, which is checked when it is first asked for."""
+        if name not in self._checked:
+            self._checked[name] = bounded(own_dataset(self._file, name))
+        return self._checked[name]
+
+    def _labels(self, name: str, rows: slice = slice(None)) -> tuple[str, ...]:
+        return tuple(map(one_line, self._dataset(name).asstr()[rows]))
+
+    def inputs(self) -> list[StoredInput]:
+        """Return the files that were read, with their content, as far as it was stored.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        with reporting_damage(self.path):
+            return list(read_sources(self._file))
+
+    def close(self) -> None:
+        """Close the file."""
+        self._checked.clear()
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
 
 
 class StoredResult(StoredFile):
@@ -111,7 +224,7 @@ class StoredResult(StoredFile):
         self._whole: set[str] = set()
 
     def motor_constant(self, name: str) -> FloatArray:
-        """A number of the motors as they act on their joints, (joints, 2); NaN where the robot gives none.
+        """Return a number of the motors as they act on their joints, (joints, 2); NaN where there is none.
 
         Raises:
             InputError: the file is damaged.
@@ -120,7 +233,7 @@ class StoredResult(StoredFile):
             return self._of_motors(f"actuator_motor_{name}")
 
     def _of_motors(self, name: str) -> FloatArray:
-        """What is stored, which has no second axis if no joint has two motors."""
+        """Return what is stored, which has no second axis if no joint has two motors."""
         constants = np.full((len(self.actuators), len(MOTORS)), np.nan)
         if OF_JOINTS.format(name) in self._file:
             stored = self._dataset(OF_JOINTS.format(name))
@@ -128,7 +241,7 @@ class StoredResult(StoredFile):
         return constants
 
     def limits(self, name: str) -> FloatArray:
-        """Lower and upper bound of a variable, (joints, 1 or 2, 2); not finite where there is none.
+        """Return lower and upper bound of a variable, (joints, 1 or 2, 2); not finite where there is none.
 
         Raises:
             InputError: the file is damaged.
@@ -144,7 +257,7 @@ class StoredResult(StoredFile):
         return bounds
 
     def geometry(self) -> StoredGeometry:
-        """What of the robot says where its frames lie.
+        """Return the part of the robot that says where its frames lie.
 
         Raises:
             InputError: the file is damaged.
@@ -158,7 +271,7 @@ class StoredResult(StoredFile):
             return StoredGeometry.of(self.joint_types, np.stack(rows, axis=-1), *poses)
 
     def has(self, variable: Variable) -> bool:
-        """Whether runs of its robot have a variable, as far as that depends on what the robot file gives."""
+        """Return whether runs of its robot have a variable, as far as that depends on the robot file."""
         if variable.requires in MOTOR_CONSTANTS:
             return not np.isnan(self.motor_constant(variable.requires)).all()
         return variable.requires in OF_ANY_ROBOT or variable.name in self.variables
@@ -170,14 +283,14 @@ class StoredResult(StoredFile):
         return cast("dict[str, Any]", shown(content))
 
     def _samples(self) -> int:
-        """How many there are, if joints and times fit together."""
+        """Return how many there are, if joints and times fit together."""
         shape = self._dataset("time").shape
         if {len(self.joint_types), len(self.actuators)} != {len(self.joint_names)} or len(shape) != 1:
             raise ValueError("joints and times do not fit together")
         return int(shape[0])
 
     def whole_span(self) -> tuple[float, float]:
-        """First and last time of the run, also of an excerpt of it, s; see `time`."""
+        """Return first and last time of the run, also of an excerpt of it, s; see `time`."""
         return float(self.time[0]), float(self.time[-1])
 
     @cached_property
@@ -193,7 +306,7 @@ class StoredResult(StoredFile):
         return values
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
-        """Steps start..stop-1 of a variable, (steps, joints) or (steps, joints, 2), in its declared units.
+        """Read samples start..stop-1 of a variable, (samples, joints) or (samples, joints, 2), in its units.
 
         Raises:
             InputError: there is no such variable, the file does not hold it, or it is damaged there.
@@ -210,7 +323,7 @@ class StoredResult(StoredFile):
         return values
 
     def rounded(self, name: str, values: AnyArray) -> FloatArray | FlagArray:
-        """Values of a variable as a file of this one's precision gives them back."""
+        """Return values of a variable as a file of this one's precision gives them back."""
         variable = self.declared[name]
         with np.errstate(over="ignore"):
             stored = values.astype(storage_type(variable, self.precision))
@@ -246,7 +359,7 @@ class StoredResult(StoredFile):
                     check_present(self._file[name].attrs, [SCALES], name)
 
     def existing(self, variable: Variable) -> BoolArray:
-        """Which columns of a variable of joints there are, (joints, 1 or 2)."""
+        """Return which columns of a variable of joints there are, (joints, 1 or 2)."""
         if variable.requires in OF_ANY_ROBOT or variable.name not in self.variables:
             return np.array(existing(variable, self.actuators))
         with reporting_damage(self.path):
@@ -254,7 +367,7 @@ class StoredResult(StoredFile):
             return stored.reshape(len(self.actuators), -1)
 
     def provenance(self) -> dict[str, Any]:
-        """Who made the file, when, with which versions, and path and SHA-256 of each file that was read.
+        """Return who made the file, when, with which versions, and path and SHA-256 of each input.
 
         Raises:
             InputError: the file is damaged.
@@ -273,6 +386,17 @@ class StoredResult(StoredFile):
                 ],
             }
         return cast("dict[str, Any]", shown(provenance))
+
+
+class StoredSimulation(StoredResult):
+    """An open simulation file; a context manager that closes it."""
+
+    format = SIMULATION
+    kind = "simulation"
+    command = "simulate"
+    declared = SIMULATION_VARIABLES
+    _of_runs = ()
+    _to_get = "run simulate again"
 
 
 def _changes(file: StoredInput) -> dict[str, Any]:
@@ -300,7 +424,7 @@ def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
 
 
 def stored_format(path: str | Path) -> str | None:
-    """The attribute `format` of an HDF5 file; None if it has none.
+    """Return the attribute `format` of an HDF5 file; None if it has none.
 
     Raises:
         InputError, StorageError: as `StoredResult.open`.
@@ -325,3 +449,8 @@ def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:
             return f"has the format {found}, but this version reads {kind.format}; run {kind.command} again"
     expected = " or ".join(f"a {kind.kind} ({kind.format})" for kind in kinds)
     return f"is a {word} ({found}), expected {expected}"
+
+
+def open_stored(path: str | Path) -> StoredResult:
+    """Open a result or a simulation file, whichever it is; see `StoredResult.open`."""
+    return open_one_of(path, StoredResult, StoredSimulation)

@@ -12,7 +12,9 @@ from vsacli.base.units import Quantity, WrenchQuantity
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.base.wrench import WRENCH_AXES
 
-FORMAT = "vsacli-result/1"
+FORMAT, SIMULATION, SENSITIVITY = "vsacli-result/1", "vsacli-simulation/1", "vsacli-sensitivity/1"
+"""Formats of files in the layout of results."""
+
 EXISTING = "existing"
 """Attribute of a variable that depends on devices of the joints: 1 at each column that a joint has."""
 

@@ -1,24 +1,28 @@
-"""The table of a study: a row for each run, in HDF5 that opens in xarray."""
+"""The table of a study: a row for each run, in HDF5 that opens in xarray; its writer and its reader."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from types import TracebackType
-from typing import Any, NamedTuple, Protocol, Self
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from vsacli.base.interrupts import interrupts_deferred
+from vsacli.base.arrays import AnyArray
+from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
-from vsacli.base.storage import check_free_space
+from vsacli.base.texts import one_line
 from vsacli.base.units import Quantity
 from vsacli.base.variables import MOTORS
 from vsacli.base.version import __version__
 from vsacli.documents.source import Source
+from vsacli.results.store.damage import SCALES, CheckedFile, check_present, read_attributes, reporting_damage
 from vsacli.results.store.inputs import write_sources
+from vsacli.results.store.layout import attach_scales, create_labels
 from vsacli.results.store.new_file import NewFile
+from vsacli.results.store.reader import StoredFile
 from vsacli.results.store.schema import TEXT, storable, unit_attributes
 
 FORMAT = "vsacli-study-table/1"
@@ -102,7 +106,7 @@ class Rows(NamedTuple):
     arrays: Mapping[str, Any]
 
 
-class StudyWriter:
+class StudyWriter(NewFile):
     """Context manager that writes the table of a study, which is complete after `finish`.
 
     Args:
@@ -112,30 +116,8 @@ class StudyWriter:
     """
 
     def __init__(self, file: Staged, head: Head, rows: int) -> None:
-        self._staged, self._hdf5, self._head, self._rows = file, NewFile(file), head, rows
-        self._written = 0
-
-    def __enter__(self) -> Self:
-        """Create the file, with everything but the rows.
-
-        Raises:
-            StorageError: it cannot be written, or does not fit its disk.
-        """
-        columns = sum(int(np.prod(self._shape(each)[1:])) for each in self._head.columns)
-        check_free_space(self._staged.path, self._rows * 8 * (columns + len(self._head.parameters) + 16))
-        try:
-            with interrupts_deferred(), self._hdf5.used():
-                self._file = self._hdf5.open()
-                self._create()
-        except BaseException:
-            self._hdf5.discard()
-            raise
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._hdf5.discard()
+        super().__init__(file)
+        self._head, self._rows, self._written = head, rows, 0
 
     def write(self, rows: Rows) -> None:
         """Append rows.
@@ -144,7 +126,7 @@ class StudyWriter:
             StorageError: the disk is full or fails.
         """
         place = slice(self._written, self._written + len(rows.run))
-        with self._hdf5.used():
+        with self.used():
             self._file["run"][place] = rows.run
             for name, values in rows.arrays.items():
                 self._file[name][place] = [storable(each) for each in values] if _texts(values) else values
@@ -156,8 +138,12 @@ class StudyWriter:
         Raises:
             StorageError: the disk is full or fails.
         """
-        with self._hdf5.used():
-            self._hdf5.close()
+        with self.used():
+            self._close()
+
+    def _size(self) -> int:
+        columns = sum(int(np.prod(self._shape(each)[1:])) for each in self._head.columns)
+        return self._rows * 8 * (columns + len(self._head.parameters) + 16)
 
     def _shape(self, column: Column) -> tuple[int, ...]:
         lengths = {"step": self._head.steps, "joint": len(self._head.joint_names), "motor": len(MOTORS)}
@@ -168,7 +154,9 @@ class StudyWriter:
         file.attrs.update(self._attributes())
         scales = {
             "run": self._dataset("run", (self._rows,), "<i8", {"long_name": "number of the run, from 0"}),
-            "joint": self._labels("joint", head.joint_names, "joint, from the base to the tip"),
+            "joint": create_labels(
+                file, "joint", head.joint_names, "joint, from the base to the tip", track_order=False
+            ),
             "motor": file.create_dataset("motor", data=np.array(MOTORS)),
         }
         scales["motor"].attrs["long_name"] = "motor of the joint"
@@ -177,9 +165,8 @@ class StudyWriter:
             scales["step"].attrs["long_name"] = "step that was kept, from 0"
         for name, scale in scales.items():
             scale.make_scale(name)
-        self._labels("joint_type", head.joint_types, "type of the joint").dims[0].attach_scale(
-            scales["joint"]
-        )
+        types = create_labels(file, "joint_type", head.joint_types, "type of the joint", track_order=False)
+        attach_scales(types, [scales["joint"]])
         for name, long_name in TEXTS.items():
             self._dataset(name, (self._rows,), TEXT, {"long_name": long_name}, [scales["run"]])
         for parameter in head.parameters:
@@ -225,16 +212,158 @@ class StudyWriter:
     ) -> Any:
         dataset = self._file.create_dataset(name, shape, dtype, track_order=True)
         dataset.attrs.update(attributes)
-        for axis, scale in enumerate(scales):
-            dataset.dims[axis].attach_scale(scale)
-        return dataset
-
-    def _labels(self, name: str, labels: Sequence[str], long_name: str) -> Any:
-        data = np.array([storable(label) for label in labels], dtype=TEXT)
-        dataset = self._file.create_dataset(name, data=data, dtype=TEXT)
-        dataset.attrs["long_name"] = long_name
+        attach_scales(dataset, scales)
         return dataset
 
 
 def _texts(values: Any) -> bool:
     return not isinstance(values, np.ndarray) and bool(len(values)) and isinstance(values[0], str)
+
+
+PROVENANCE = ("method", "seed", "engine", "compiler", "numpy", "command_line")
+"""Root attributes that say how a table was computed."""
+
+OF_COLUMNS = ("units", "long_name", "coordinates", SCALES)
+
+
+ALL = slice(None)
+"""Every row."""
+
+
+class StoredColumn(NamedTuple):
+    """A column as of `Column`."""
+
+    name: str
+    dims: tuple[str, ...]
+    quantity: Quantity
+    long_name: str
+
+
+class StoredStudy(StoredFile):
+    """An open table of a study; a context manager that closes it.
+
+    Attributes:
+        path: the file, as given.
+        attributes: the root attributes.
+        study_name, robot_name: as in the files.
+        joint_names, joint_types: base to tip.
+        parameters: paths of what varies.
+        columns: names of what is kept.
+        rows: how many runs it has.
+        steps: how many steps columns over time have; 0 if there are none.
+        runs: how many the study has.
+        fingerprint: of the whole study.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """Open a table.
+
+        Raises:
+            InputError: there is no such file, or it is no complete table of a study.
+            StorageError: the operating system refuses to read it.
+        """
+        super().__init__(path, CheckedFile(path))
+        try:
+            with reporting_damage(path):
+                self.attributes: dict[str, Any] = dict(self._file.attrs)
+                if self.attributes.get("format") != FORMAT:
+                    raise InputError.one(
+                        f"is no table of a study ({FORMAT}), as `vsacli study` writes it", path
+                    )
+                self.study_name, self.robot_name = (
+                    one_line(str(self.attributes[name])) for name in ("study_name", "robot_name")
+                )
+                self.fingerprint, self.runs = (
+                    str(self.attributes["fingerprint"]),
+                    int(self.attributes["runs"]),
+                )
+                self.parameters, self.columns = (
+                    tuple(map(str, json.loads(self.attributes[name]))) for name in ("parameters", "columns")
+                )
+                self.joint_names, self.joint_types = self.texts("joint"), self.texts("joint_type")
+                self.rows = len(self._dataset("run"))
+                self.steps = len(self._dataset("step")) if "step" in self._file else 0
+                self._check()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _check(self) -> None:
+        for name in (*TEXTS, *self.parameters, *self.columns):
+            if self._dataset(name).shape[0] != self.rows:
+                raise ValueError(f"{name} has not {self.rows} rows")
+
+    def texts(self, name: str, rows: slice = ALL) -> tuple[str, ...]:
+        """Texts of rows, or the labels of a dimension.
+
+        Raises:
+            InputError: they are damaged.
+        """
+        with reporting_damage(self.path, name):
+            return self._labels(name, rows)
+
+    def read(self, name: str, rows: slice = ALL) -> AnyArray:
+        """A column of numbers, (rows, ...), or the numbers of the runs.
+
+        Raises:
+            InputError: it is damaged, or not there.
+        """
+        with reporting_damage(self.path, name):
+            values: AnyArray = self._dataset(name)[rows]
+        return values
+
+    def column(self, name: str) -> StoredColumn:
+        """What is known of a column.
+
+        Raises:
+            InputError: it is damaged, or not there.
+        """
+        with reporting_damage(self.path, name):
+            dataset = self._dataset(name)
+            unit = str(dataset.attrs["units"])
+            per_type = (str(dataset.attrs.get(f"units_{each}", unit)) for each in ("revolute", "prismatic"))
+            dims = tuple(dimension[0].name.removeprefix("/") for dimension in dataset.dims)
+            return StoredColumn(name, dims[1:], Quantity(*per_type), str(dataset.attrs["long_name"]))
+
+    def shape(self, name: str, steps: int) -> tuple[int, ...]:
+        """Of a column's values in one row, if columns over time have so many steps."""
+        with reporting_damage(self.path, name):
+            shape = tuple(map(int, self._dataset(name).shape[1:]))
+        return (steps, *shape[1:]) if name in self.columns and "step" in self.column(name).dims else shape
+
+    def unit(self, name: str) -> str:
+        """The unit of a column or parameter; that of revolute joints if they differ."""
+        with reporting_damage(self.path, name):
+            attributes = self._dataset(name).attrs
+            return str(attributes.get("units_revolute", attributes.get("units", "")))
+
+    def parameter_is_text(self, path: str) -> bool:
+        """Whether the values of what varies are texts rather than numbers."""
+        return bool(self._dataset(path).dtype.kind != "f")
+
+    def provenance(self) -> dict[str, str]:
+        """What is known of how it was computed: method, seed and engine, and what was typed.
+
+        Raises:
+            InputError: some of it is missing.
+        """
+        with reporting_damage(self.path):
+            check_present(self.attributes, (*PROVENANCE, "created", "generated_by", "Conventions"))
+        return {name: str(self.attributes[name]) for name in PROVENANCE}
+
+    def check(self) -> None:
+        """Read everything once.
+
+        Raises:
+            InputError: something is damaged.
+        """
+        for name in (*TEXTS, *filter(self.parameter_is_text, self.parameters)):
+            self.texts(name)
+        for name in ("run", *self.columns):
+            self.read(name)
+        self.inputs()
+        self.provenance()
+        with reporting_damage(self.path):
+            read_attributes(self._file)
+            for name in self.columns:
+                check_present(self._file[name].attrs, OF_COLUMNS, name)

@@ -5,23 +5,20 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType, TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 
 from vsacli.base.arrays import AnyArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, StorageError
-from vsacli.base.interrupts import interrupts_deferred
 from vsacli.base.outputs import Staged
 from vsacli.base.signals import COMMANDED
-from vsacli.base.storage import check_free_space
 from vsacli.base.units import time_text
 from vsacli.base.variables import MOTOR_CONSTANTS, UNCERTAIN, VARIABLES, Variable, deviation, select_variables
 from vsacli.base.wrench import WRENCH_NAMES
-from vsacli.results.store.chunks import ChunkFiller
 from vsacli.results.store.layout import create_layout, row_bytes
-from vsacli.results.store.new_file import NewFile
+from vsacli.results.store.new_file import ChunkFiller, NewFile
 from vsacli.results.store.schema import DOUBLE, FLOATS, FORMAT, PRECISION, TEXT, storable
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -35,7 +32,7 @@ class Samples(Protocol):
         """Times, (samples,), s."""
 
 
-class ResultWriter:
+class ResultWriter(NewFile):
     """Context manager that writes a result file, which is complete after `finish`.
 
     A subclass writes another format: other variables in the same layout.
@@ -68,7 +65,7 @@ class ResultWriter:
     ) -> None:
         if precision not in FLOATS:
             raise InputError.one(f"unknown precision {precision!r}{did_you_mean(precision, FLOATS)}")
-        self._staged, self._hdf5 = file, NewFile(file)
+        super().__init__(file)
         self._robot = robot
         self._trajectory = trajectory
         self._variables = self._selected(variables, robot, trajectory)
@@ -77,20 +74,6 @@ class ResultWriter:
         self._provenance = {"command_line": "", **provenance, **rounded}
         self._fillers: dict[str, ChunkFiller] = {}
 
-    def __enter__(self) -> Self:
-        """Create the file, with everything but samples and report.
-
-        Raises:
-            StorageError: it cannot be written, or does not fit its disk.
-        """
-        try:
-            with interrupts_deferred():
-                self._create()
-        except BaseException:
-            self._hdf5.discard()
-            raise
-        return self
-
     def write(self, block: Samples) -> None:
         """Append a copy of a block of steps, which of a long file is written later, in a thread.
 
@@ -98,7 +81,7 @@ class ResultWriter:
             StorageError: the disk is full or fails, perhaps over an earlier block; a value is too large for
                 single precision.
         """
-        with self._hdf5.used():
+        with self.used():
             for name, filler in self._fillers.items():
                 values = self._values(block, name)
                 try:
@@ -115,43 +98,40 @@ class ResultWriter:
         Raises:
             StorageError: the disk is full or fails.
         """
-        with self._hdf5.used():
+        with self.used():
             for filler in self._fillers.values():
                 filler.finish()
-            self._hdf5.wait()
+            self.wait()
             self._complete(report)
-            self._hdf5.close()
+            self._close()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        unfinished = kind is None and self._hdf5.is_open
-        self._hdf5.discard()
+        unfinished = kind is None and bool(self._file)
+        super().__exit__(kind, error, traceback)
         if unfinished:
             raise RuntimeError("a result was left without `finish`")
 
     def _create(self) -> None:
-        check_free_space(self._staged.path, self._size())
-        with self._hdf5.used():
-            file = self._file = self._hdf5.open()
-            stored = create_layout(
-                file,
-                self._format,
-                self._robot,
-                self._trajectory,
-                self._variables,
-                self._provenance,
-                self._precision,
-            )
-        self._fillers = {name: ChunkFiller(dataset, self._hdf5.do) for name, dataset in stored.items()}
+        stored = create_layout(
+            self._file,
+            self._format,
+            self._robot,
+            self._trajectory,
+            self._variables,
+            self._provenance,
+            self._precision,
+        )
+        self._fillers = {name: ChunkFiller(dataset, self.do) for name, dataset in stored.items()}
 
     def _values(self, block: Any, name: str) -> AnyArray:
-        """What a block has for a dataset."""
+        """Return what a block has for a dataset."""
         values: AnyArray = getattr(block, name)
         return values
 
     def _too_large(self, name: str, values: AnyArray, time: FloatArray) -> StorageError:
-        """What to say of values that single precision does not hold."""
+        """Return the error on values that single precision does not hold."""
         with np.errstate(over="ignore"):
             lost = np.isfinite(values) & np.isinf(values.astype(np.float32))
         at = tuple(np.argwhere(lost)[0])
@@ -169,7 +149,7 @@ class ResultWriter:
         self._file.attrs["complete"] = int(report["complete"])
 
     def _size(self) -> int:
-        """Bytes of all samples, flags before compression."""
+        """Return the bytes of all samples, flags before compression."""
         stored = (VARIABLES["time"], *self._variables)
         joints = len(self._robot.joints)
         row = sum(row_bytes(variable, joints, self._precision) for variable in stored)
@@ -178,7 +158,7 @@ class ResultWriter:
     def _selected(
         self, names: Iterable[str] | None, robot: Robot, trajectory: Trajectory
     ) -> tuple[Variable, ...]:
-        """The variables of these names, or all that a run of the robot along the trajectory has."""
+        """Return the variables of these names, or all that a run of the robot along the trajectory has."""
         absent = {**self._absent(trajectory), **_not_given(robot, self._declared)}
         if names is None:
             return select_variables((name for name in self._declared if name not in absent), self._declared)
@@ -189,7 +169,7 @@ class ResultWriter:
         return selected
 
     def _absent(self, trajectory: Trajectory) -> dict[str, str]:
-        """The variables that a run along a trajectory does not have, each with the reason."""
+        """Return the variables that a run along a trajectory does not have, each with the reason."""
         uncertain = trajectory.uncertain
         certain = [name for name in UNCERTAIN if name not in uncertain]
         reasons = {
@@ -202,7 +182,7 @@ class ResultWriter:
 
 
 def _not_given(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
-    """The variables that a robot does not have, since its file does not give what they need."""
+    """Return the variables that a robot does not have, since its file lacks what they need."""
     return {
         name: f"no joint of {robot.name} has {_requirement(variable)}"
         for name, variable in declared.items()

@@ -1,8 +1,69 @@
-"""What an export of a robot gives."""
+"""What every exported model has: its text and notes, its XML, and what is drawn of the links."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Iterable
+from typing import NamedTuple, TypeAlias
+from xml.etree import ElementTree
+
+from vsacli.robot.model import Robot
+
+Element: TypeAlias = ElementTree.Element
+Value: TypeAlias = str | bool | float | Iterable[float]
+
+
+def element(parent: Element, tag: str, /, **attributes: Value) -> Element:
+    """A new element in another one."""
+    return add(ElementTree.SubElement(parent, tag), **attributes)
+
+
+def add(to: Element, /, **attributes: Value) -> Element:
+    """The element with attributes that are new or replaced."""
+    to.attrib.update({name: _text(value) for name, value in attributes.items()})
+    return to
+
+
+def document(root: Element, comment: str) -> str:
+    """The file, indented, with a comment at its beginning."""
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- {_harmless(comment)} -->\n{text}\n'
+
+
+def _text(value: Value) -> str:
+    """Numbers by the shortest text that reads back bit for bit; zero without a sign."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float | int):
+        return repr(float(value) or 0.0).removesuffix(".0")
+    return " ".join(map(_text, value))
+
+
+def _harmless(comment: str) -> str:
+    """Without the two hyphens that would end it."""
+    while "--" in comment:
+        comment = comment.replace("--", "- -")
+    return comment
+
+
+THICKNESS_SHARE = 0.07
+"""Radius of a rod as a share of the mean length of links."""
+
+WITHOUT_LENGTH = 0.5
+"""Length, m, of an arm all of whose origins are one."""
+
+
+def arm_length(robot: Robot) -> float:
+    """Sum of the distances from origin to origin at q = 0, m."""
+    return math.fsum(math.hypot(joint.dh.a, joint.dh.d) for joint in robot.joints) or WITHOUT_LENGTH
+
+
+def rod_radius(robot: Robot) -> float:
+    """Of the rods from origin to origin, m."""
+    return THICKNESS_SHARE * arm_length(robot) / len(robot.joints)
 
 
 class ExportedModel(NamedTuple):

@@ -13,14 +13,28 @@ from xml.etree import ElementTree
 from vsacli.base.version import __version__
 from vsacli.robot.joint import Joint, Pose
 from vsacli.robot.model import Robot
-from vsacli.robot.models.drawing import arm_length, rod_radius
-from vsacli.robot.models.exported_model import ExportedModel
-from vsacli.robot.models.mjcf_drive import Sections, add_dampers, add_drive
-from vsacli.robot.models.mjcf_lever import DRAWN, GHOST, draw_rod
-from vsacli.robot.models.mujoco_bodies import check_bodies, full_inertia
+from vsacli.robot.models.exported_model import (
+    Element,
+    ExportedModel,
+    add,
+    arm_length,
+    document,
+    element,
+    rod_radius,
+)
+from vsacli.robot.models.mjcf_drives import (
+    DRAWN,
+    GHOST,
+    Sections,
+    Start,
+    add_dampers,
+    add_drive,
+    add_start,
+    check_bodies,
+    draw_rod,
+    full_inertia,
+)
 from vsacli.robot.models.passive_forces import check_friction, forces_text, forces_words
-from vsacli.robot.models.start import Start, add_start
-from vsacli.robot.models.xml_text import Element, add, document, element
 
 LOWEST_VERSION = "3.7"
 """Of MuJoCo: the first with springs whose torque is a polynomial; tried with 3.5, 3.6, 3.7 and 4.0."""

@@ -19,9 +19,7 @@ from vsacli.base.texts import one_line
 from vsacli.base.version import __version__
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.models.mjcf_drive import has_springs_of
-from vsacli.robot.models.mjcf_rotor import motor_name
-from vsacli.robot.models.mujoco_bodies import file_of
+from vsacli.robot.models.mjcf_drives import file_of, has_springs_of, motor_name
 
 _TEXT = '''"""Passive forces of {name}, by vsacli {version}: {words}.
 
@@ -91,7 +89,7 @@ def forces_text(robot: Robot) -> str | None:
     if not joints:
         return None
     from vsacli.compute.tracing import Kind, trace
-    from vsacli.compute.tracing.python_text import function_text
+    from vsacli.compute.tracing.python_functions import function_text
 
     names = [name for joint in joints for name in _coordinates(joint)]
     program = trace(lambda rows: _forces(joints, rows), [Kind.REAL] * (2 * len(names)))

@@ -17,11 +17,9 @@ from vsacli.base.errors import InputError
 from vsacli.base.version import __version__
 from vsacli.robot.joint import UNBOUNDED, Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.models.drawing import rod_radius
-from vsacli.robot.models.exported_model import ExportedModel
-from vsacli.robot.models.start import Start
-from vsacli.robot.models.xml_text import Element, add, document, element
-from vsacli.robot.urdf.rigid_motion import pose_matrix, roll_pitch_yaw
+from vsacli.robot.models.exported_model import Element, ExportedModel, add, document, element, rod_radius
+from vsacli.robot.models.mjcf_drives import Start
+from vsacli.robot.urdf.link_tree import pose_matrix, roll_pitch_yaw
 
 ROOT, TOOL = "world", "tool"
 """Links at the ends; those between are called `<joint>_link`."""

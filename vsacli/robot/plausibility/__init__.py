@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
 from vsacli.documents.plausibility import Written, findings, strange
-from vsacli.documents.record_numbers import Entry, NumberPath
+from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.documents.source import Source
 from vsacli.robot.plausibility.bodies import BODY_RULES
 from vsacli.robot.plausibility.drives import DRIVE_RULES

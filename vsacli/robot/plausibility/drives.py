@@ -12,7 +12,7 @@ from vsacli.base import units
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import declared
 from vsacli.documents.plausibility import Measured, Rule, Slip
-from vsacli.documents.record_numbers import Entry, NumberPath
+from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, FASTEST, RPM, SIZES, Measure
 from vsacli.robot.plausibility.facts import Facts, joint_path, motors, ratio

@@ -13,7 +13,7 @@ import numpy as np
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.plausibility import Measured
-from vsacli.documents.record_numbers import Entry, Number, NumberPath
+from vsacli.documents.record_values import Entry, Number, NumberPath
 from vsacli.robot.joint import Joint, Link, Pose
 
 WEIGHT_PER_MASS = 9.81

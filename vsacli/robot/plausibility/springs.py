@@ -13,7 +13,7 @@ from vsacli.actuators.transmission import Command, Transmission
 from vsacli.base import units
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN
 from vsacli.documents.plausibility import Measured, Rule, Slip
-from vsacli.documents.record_numbers import Entry, NumberPath
+from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETRES, SIZES, TURN
 from vsacli.robot.plausibility.facts import Facts, joint_path, ratio, written_once

@@ -1,8 +1,7 @@
 """From URDF files: a serial chain as a robot file with standard Denavit-Hartenberg rows."""
 
-from vsacli.robot.urdf.conversion import Conversion
+from vsacli.robot.urdf.conversion import Conversion, import_urdf
 from vsacli.robot.urdf.placeholders import Placeholders
-from vsacli.robot.urdf.robot_from_chain import import_urdf
 from vsacli.robot.urdf.robot_text import robot_text
 
 __all__ = ["Conversion", "Placeholders", "import_urdf", "robot_text"]

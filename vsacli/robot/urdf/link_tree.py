@@ -1,15 +1,90 @@
-"""A URDF as records: links, and the joints that make a tree of them."""
+"""The links and joints of a URDF as a tree, motions between their frames, and the path of a chain in it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError
 from vsacli.base.units import POSITION, Quantity
-from vsacli.robot.urdf.rigid_motion import Body, cross_matrix
+from vsacli.documents.tree import quoted
+
+
+def transform(rotation: FloatArray, origin: FloatArray) -> FloatArray:
+    """The pose of a frame with these axes (columns) and this origin."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, origin
+    return pose
+
+
+def pose_matrix(xyz: Iterable[float], rpy: Iterable[float]) -> FloatArray:
+    """The pose of an `origin`: at xyz, with the axes of Rz(yaw) Ry(pitch) Rx(roll)."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in rpy)
+    rotation = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    return transform(rotation, np.array(list(xyz)))
+
+
+def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
+    """Angles with which `pose_matrix` gives this rotation, to rounding even where roll and yaw are one."""
+    r = rotation
+    yaw = math.atan2(r[1, 0], r[0, 0])
+    c, s = math.cos(yaw), math.sin(yaw)
+    pitch = math.atan2(-r[2, 0], c * r[0, 0] + s * r[1, 0])
+    roll = math.atan2(s * r[0, 2] - c * r[1, 2], c * r[1, 1] - s * r[0, 1])
+    return roll, pitch, yaw
+
+
+def inverse(pose: FloatArray) -> FloatArray:
+    """The inverse of a rigid motion."""
+    rotation = pose[:3, :3].T
+    return transform(rotation, -rotation @ pose[:3, 3])
+
+
+def cross_matrix(vector: FloatArray) -> FloatArray:
+    """The matrix with which a vector multiplies from the left as a cross product."""
+    x, y, z = vector
+    return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+
+
+class Body(NamedTuple):
+    """A rigid body: mass, centre of mass (3,), inertia about it (3, 3); in some frame."""
+
+    mass: float
+    com: FloatArray
+    inertia: FloatArray
+
+    def moved(self, pose: FloatArray) -> Body:
+        """The body in the frame in which its own frame has this pose."""
+        rotation = pose[:3, :3]
+        return Body(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
+
+
+def welded(bodies: list[Body]) -> Body:
+    """Bodies of one frame as a single body (parallel axes); without mass, one at the origin."""
+    mass = math.fsum(body.mass for body in bodies)
+    moment = sum((body.mass * body.com for body in bodies), np.zeros(3))
+    com = moment / mass if mass > 0 else np.zeros(3)
+    inertia = sum((body.inertia + _steiner(body.mass, body.com - com) for body in bodies), np.zeros((3, 3)))
+    return Body(mass, com, (inertia + inertia.T) / 2)
+
+
+def _steiner(mass: float, arm: FloatArray) -> FloatArray:
+    cross = cross_matrix(arm)
+    result: FloatArray = -mass * cross @ cross
+    return result
+
 
 ROTATING = ("revolute", "continuous")
 MOVING = (*ROTATING, "prismatic")
@@ -148,3 +223,89 @@ def below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
         for joint in children.get(waiting.pop(), ()):
             yield joint
             waiting.append(joint.child)
+
+
+MAX_TIPS = 12
+"""Links that a message offers as tip."""
+
+
+class ChainPath(NamedTuple):
+    """The joints from one link to another, fixed ones included."""
+
+    base: str
+    tip: str
+    joints: tuple[UrdfJoint, ...]
+
+    @property
+    def moving(self) -> tuple[UrdfJoint, ...]:
+        """Joints of the path that are not fixed."""
+        return tuple(joint for joint in self.joints if not joint.is_fixed)
+
+
+def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
+    """The path from a base link (the root if None) to a tip link (the only one there can be if None).
+
+    Raises:
+        InputError: there is no such link or path, or no joint moves on it.
+    """
+    start = urdf.root if base is None else _known(urdf, base, "base")
+    end = _only_tip(urdf, start) if tip is None else _known(urdf, tip, "tip")
+    path = _path(urdf, start, end)
+    if not path.moving:
+        raise InputError.one(f"no joint moves between {quoted(start)} and {quoted(end)}", urdf.file)
+    return path
+
+
+def _known(urdf: Urdf, name: str, end: str) -> str:
+    if name not in urdf.links:
+        near = did_you_mean(name, urdf.links)
+        raise InputError.one(f"{end}: there is no link {quoted(name)}{near}", urdf.file)
+    return name
+
+
+def _path(urdf: Urdf, base: str, tip: str) -> ChainPath:
+    above = urdf.above(tip)
+    links = [joint.parent for joint in above] + [tip]
+    if base not in links:
+        raise InputError.one(f"the link {quoted(tip)} does not hang below {quoted(base)}", urdf.file)
+    return ChainPath(base, tip, tuple(above[links.index(base) :]))
+
+
+def _only_tip(urdf: Urdf, base: str) -> str:
+    """The end of the only branch that moves, if only one link could be meant by that."""
+    leaves = {leaf: _path(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
+    longest = max(leaves.values(), key=len, default=())
+    tips = [leaf for leaf, moving in leaves.items() if moving and moving == longest]
+    straight = all(moving == longest[: len(moving)] for moving in leaves.values())
+    if not longest:
+        raise InputError.one(f"no joint moves below {quoted(base)}", urdf.file)
+    if not straight or len(tips) > 1:
+        offered = [*_forks(urdf, base), *(leaf for leaf, moving in leaves.items() if moving)]
+        raise InputError.one(_ambiguous(urdf, base, list(dict.fromkeys(offered))), urdf.file)
+    return tips[0]
+
+
+def _leaves(urdf: Urdf, base: str) -> list[str]:
+    joints = list(below(base, urdf.joints.values()))
+    parents = {joint.parent for joint in joints}
+    return [joint.child for joint in joints if joint.child not in parents]
+
+
+def _forks(urdf: Urdf, base: str) -> Iterator[str]:
+    """Links behind a moving joint from which more than one branch with moving joints goes on."""
+    branches: dict[str, set[str]] = {}
+    for moving in (joint for joint in below(base, urdf.joints.values()) if not joint.is_fixed):
+        for joint in _path(urdf, base, moving.child).joints:
+            branches.setdefault(joint.parent, set()).add(joint.child)
+    for link, ways in branches.items():
+        if len(ways) > 1 and _path(urdf, base, link).moving:
+            yield link
+
+
+def _ambiguous(urdf: Urdf, base: str, tips: list[str]) -> str:
+    counts = [len(_path(urdf, base, tip).moving) for tip in tips]
+    found = [f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)]
+    more = f" and {len(found) - MAX_TIPS} more" if len(found) > MAX_TIPS else ""
+    offered = ", ".join(found[:MAX_TIPS])
+    which = f"several links below {quoted(base)} could be the end effector"
+    return f"{which}; choose one with --tip: {offered}{more}"

@@ -1,8 +1,9 @@
 """Structure of what equations leave: what would explain it, and which numbers it makes wrong.
 
-What noise leaves has no structure. Each cause of `causes` is tested; the one that explains most is taken,
-then what is left is tested again. What is found so is told if it matters: if a number would be another one,
-by more than its standard error says, if most of what is left is no noise, or if that is too much anyway.
+What noise leaves has no structure. Each cause of `causes` is tested by `addition`; the one that explains most
+is taken, then what is left is tested again. What is found so is told if it matters: if a number would be
+another one, by more than its standard error says, if most of what is left is no noise, or if that is too much
+anyway.
 """
 
 from __future__ import annotations
@@ -14,13 +15,95 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.causes import Cause, causes
-from vsacli.studies.identification.estimation.additions import FEWEST_ROWS, Addition, addition
-from vsacli.studies.identification.estimation.equations import Equations
-from vsacli.studies.identification.estimation.least_squares import least_squares
-from vsacli.studies.identification.estimation.solution import Solution
+from vsacli.studies.identification.conditioning import Signals
+from vsacli.studies.identification.estimation import (
+    SEPARABLE,
+    Equations,
+    System,
+    freedom_of,
+    least_squares,
+    wider,
+)
+from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.identification_report import CHANGED, significant
-from vsacli.studies.identification.records.signals import Signals
+from vsacli.studies.identification.independence import independence
+from vsacli.studies.identification.residual_causes import Cause, causes
+
+FEWEST_ROWS = 3
+"""Equations to an unknown below which residuals say too little of what columns are missing."""
+
+
+class Addition(NamedTuple):
+    """Effect of some further columns on a fit.
+
+    Attributes:
+        chance: probability of an effect as large if the columns had none.
+        left: share that they leave of the sum of squares of the residuals, in units of the noise.
+        sizes: coefficients of the columns, (columns,).
+    """
+
+    chance: float
+    left: float
+    sizes: FloatArray
+
+
+def addition(
+    equations: Sequence[Equations], columns: Sequence[FloatArray], noise: dict[str, float]
+) -> Addition | None:
+    """Add columns to equations and test them; None if the unknowns explain them all, or rows are too few.
+
+    Args:
+        equations: of each record, at the values that fit best.
+        columns: of each record, (rows, columns).
+        noise: of each group.
+    """
+    system = System.of([each._replace(noise=None) for each in equations])
+    weight = np.array([1 / noise[name] for name in system.groups])[system.group]
+    known = independence(system.slopes * weight[:, None], SEPARABLE).q
+    further = np.concatenate(columns) * weight[:, None]
+    new, to_columns = _beyond(known, further)
+    count, freedom = new.shape[1], freedom_of(system)
+    if not count or freedom <= count or len(weight) < FEWEST_ROWS * (known.shape[1] + count):
+        return None
+    together = np.hstack((known, new)) / weight[:, None]
+    ends = np.cumsum([len(each.measured) for each in equations])[:-1]
+    parts = np.split(together, ends)
+    fit = least_squares(
+        [each._replace(slopes=part, noise=None) for each, part in zip(equations, parts, strict=True)],
+        np.zeros(together.shape[1]),
+    )
+    sizes, covariance = fit.solution[-count:], fit.covariance[-count:, -count:]
+    if not np.all(np.diagonal(covariance) > 0):
+        return None
+    left = system.residual - together @ fit.solution
+    return Addition(
+        chance=_chance(sizes, covariance / wider(freedom), freedom),
+        left=float(np.sum((left * weight) ** 2) / np.sum((system.residual * weight) ** 2)),
+        sizes=to_columns @ sizes,
+    )
+
+
+def _beyond(known: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal basis of what known ones leave of columns, and the columns' coefficients by the basis's."""
+    norms = np.linalg.norm(columns, axis=0)
+    scale = 1 / np.where(norms > 0, norms, 1.0)
+    left = columns * scale
+    for _ in range(2):  # twice: rounding of the first leaves a trace of the known ones
+        left = left - known @ (known.T @ left)
+    basis, sizes, turned = np.linalg.svd(left, full_matrices=False)
+    there = sizes > SEPARABLE
+    return basis[:, there], scale[:, None] * turned[there].T / sizes[there]
+
+
+def _chance(sizes: FloatArray, covariance: FloatArray, freedom: int) -> float:
+    """Probability that Hotelling's statistic of numbers that are zero is as large."""
+    from scipy.special import fdtrc
+
+    count = len(sizes)
+    statistic = float(sizes @ np.linalg.solve(covariance, sizes))
+    second = freedom - count + 1
+    return float(fdtrc(count, second, statistic * second / (freedom * count)))
+
 
 CHANCE = 1e-4
 """Probability that a cause that is none is taken for one. Of an arm with seven joints some hundred are

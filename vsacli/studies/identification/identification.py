@@ -1,42 +1,58 @@
-"""Identify the numbers of a robot from records: from files to what is found."""
+"""Identify the numbers of a robot from recordings, and write them into its file."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import wrench_columns
 from vsacli.documents.columns_file import load_columns
+from vsacli.documents.edited import edited, moved_files, texts_at, unaliased, with_errors
+from vsacli.robot.file import text_to_change
 from vsacli.robot.model import Robot, check_robot
-from vsacli.studies.identification.estimation.solution import Solution, solution
+from vsacli.robot.modified_dh import modified_link
+from vsacli.robot.parameters import JOINTS, parameters
+from vsacli.studies.identification.conditioning import Signals, bandwidth_of, bounds, conditioned
+from vsacli.studies.identification.consistent_links import ConsistentLinks, doubts_of, found_links
 from vsacli.studies.identification.explanations import Explanation, explanation
-from vsacli.studies.identification.fitted_file import to_write
-from vsacli.studies.identification.gains import Gain, gains
+from vsacli.studies.identification.fitted_system import Solution, solution
 from vsacli.studies.identification.identification_report import (
     DOUBTFUL,
     MISFIT,
     OK,
     UNTOLD,
     Identification,
+    Number,
     RecordReport,
     Residual,
     SystemReport,
+    significant,
+    system_report,
+    torques,
 )
-from vsacli.studies.identification.links.consistent_links import ConsistentLinks
-from vsacli.studies.identification.links.found_links import doubts_of, found_links
-from vsacli.studies.identification.links.link_system import LINKS, link_system, without_links
-from vsacli.studies.identification.motors.motor_system import motor_systems
-from vsacli.studies.identification.motors.unknowns import FRICTION, GROUPS, SPRINGS, check_fit, with_friction
-from vsacli.studies.identification.records.bandwidth import bandwidth_of, bounds
-from vsacli.studies.identification.records.delays import Delay, delay, without_delay
-from vsacli.studies.identification.records.record_doubts import model_doubts
-from vsacli.studies.identification.records.records import Record, check_distinct, complete_joints, read_record
-from vsacli.studies.identification.records.signals import Signals, conditioned
-from vsacli.studies.identification.system_reports import system_report, torques
+from vsacli.studies.identification.link_equations import LINKS, link_system, without_links
+from vsacli.studies.identification.motor_equations import (
+    FRICTION,
+    GROUPS,
+    SPRINGS,
+    check_fit,
+    motor_systems,
+    with_friction,
+)
+from vsacli.studies.identification.recording_checks import (
+    Delay,
+    Gain,
+    delay,
+    gains,
+    model_doubts,
+    without_delay,
+)
+from vsacli.studies.identification.recordings import Record, check_distinct, complete_joints, read_record
 
 WORDS = (*GROUPS, LINKS)
 """What users may ask for by a word."""
@@ -83,11 +99,11 @@ def identify(
     first = solutions(sought, joints, fit, signals)
     notes = [*_notes(robot, joints, fit, signals), *(f"{path}: {PUSHED}" for path in pushed)]
     if not first:
-        raise _nothing_to_find(notes)
+        nothing = "the joints that were recorded have nothing of what is to be found"
+        raise InputError.one(f"{nothing} ({'; '.join(notes)})" if notes else nothing)
     delays = [delay(first, each) for each in signals]
-    late = any(each.matters(record.rate) for each, record in zip(delays, signals, strict=True))
-    signals = [_aligned(*each) for each in zip(signals, delays, strict=True)]
-    found = solutions(sought, joints, fit, signals) if late else first
+    signals, moved = _without_delays(signals, delays)
+    found = solutions(sought, joints, fit, signals) if moved else first
     reports = tuple(system_report(robot, each, signals) for each in found)
     links = next((found_links(robot, each) for each in found if each.system.title == LINKS), None)
     doubts = [tuple(model_doubts(robot, joints, *each)) for each in zip(records, signals, strict=True)]
@@ -113,10 +129,11 @@ def identify(
     )
 
 
-def _nothing_to_find(notes: Sequence[str]) -> InputError:
-    nothing = "the joints that were recorded have nothing of what is to be found"
-    reasons = "; ".join(notes)
-    return InputError.one(f"{nothing}{reasons and f' ({reasons})'}")
+def _without_delays(signals: Sequence[Signals], delays: Sequence[Delay]) -> tuple[list[Signals], bool]:
+    """Return signals without the delays that matter, and whether there are any."""
+    late = [by.matters(each.rate) for each, by in zip(signals, delays, strict=True)]
+    moved = zip(signals, delays, late, strict=True)
+    return [without_delay(each, by.seconds) if matters else each for each, by, matters in moved], any(late)
 
 
 def _read(
@@ -166,11 +183,6 @@ def solutions(
     if LINKS not in fit or without_links(robot, joints, fit, signals):
         return motors
     return [*motors, solution(link_system(robot, fit, motors), signals)]
-
-
-def _aligned(signals: Signals, late: Delay) -> Signals:
-    """A record without the delay of its torques, as far as this can be told."""
-    return without_delay(signals, late.seconds) if late.matters(signals.rate) else signals
 
 
 def _verdict(
@@ -252,3 +264,70 @@ def _fitted(
         return fitted
     joints = map(lambda joint, link: dataclasses.replace(joint, link=link), fitted.joints, links.links)
     return dataclasses.replace(fitted, joints=tuple(joints))
+
+
+NOTHING = 1e-9
+"""Size of numbers of links, SI units, that are left by rounding."""
+
+
+def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
+    """The numbers that a file with what was found holds: of friction that it has none of, what was found."""
+    known = set(map(str, parameters(robot)))
+    for number in (number for system in systems for number in system.numbers):
+        if number.told and not number.sum and (number.path in known or number.changed):
+            yield number
+
+
+def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
+    """The text of the robot's file with the numbers found, their standard errors behind them as comments.
+
+    Everything else, comments too, stays as the user wrote it; paths lead to the same files. Friction that the
+    file has none of is put in where it was found.
+
+    Args:
+        robot: as it was read from its file.
+        found: what was identified.
+        folder: where the text will stand.
+
+    Raises:
+        InputError: the robot was not read from a file.
+    """
+    own, home = text_to_change(robot)
+    known = set(map(str, parameters(robot)))
+    values: dict[str, Any] = {}
+    errors: dict[str, str] = {}
+    for number in to_write(robot, found.systems):
+        _, joint, *rest = number.path.split(".")
+        path = ".".join((JOINTS, str(robot.joint_names.index(joint)), *rest))  # as the text has it
+        value = float(significant(number.value, number.standard_error))
+        errors[path] = f"{number.standard_error:.2g}"
+        if number.value == number.before:
+            continue
+        if number.path in known:
+            values[path] = value
+        else:
+            parent, _, key = path.rpartition(".")
+            values.setdefault(parent, {"coulomb": 0.0})[key] = value
+    values |= _changed_links(robot, found.fitted, own)
+    files = dict(moved_files(own, home, Path(folder)))
+    text = edited(unaliased(own, values), {**values, **files})
+    return with_errors(text, errors)
+
+
+def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:
+    """Numbers of links by path, in frames of the file's convention, of those that are not as they were."""
+    modified = dict(texts_at(text, "convention")).get("convention") == "modified"
+    found: dict[str, Any] = {}
+    for index, (joint, before) in enumerate(zip(fitted.joints, robot.joints, strict=True)):
+        if joint.link != before.link:
+            link = modified_link(joint) if modified else joint.link
+            place = f"{JOINTS}.{index}.link"
+            found[f"{place}.mass"] = _rounded(link.mass)
+            found[f"{place}.com"] = [_rounded(each) for each in link.com]
+            found[f"{place}.inertia"] = {key: _rounded(value) for key, value in vars(link.inertia).items()}
+    return found
+
+
+def _rounded(value: float) -> float:
+    """With more digits than records tell, so that links stay bodies, but for what is nothing in any unit."""
+    return 0.0 if abs(value) < NOTHING else float(f"{value:.7g}")

@@ -1,9 +1,9 @@
-"""What an identification says, as text and as JSON."""
+"""The report of an identification: numbers, residuals and curves of its systems, as text and as JSON."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -12,8 +12,15 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText, aligned
+from vsacli.base.variables import VARIABLES
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import JOINTS
+from vsacli.studies.identification.conditioning import Signals, torque_noise
+from vsacli.studies.identification.estimation import Equations
+from vsacli.studies.identification.fitted_system import Solution, held_out, rms
+from vsacli.studies.identification.motor_equations import motor_names
+from vsacli.studies.identification.recordings import TORQUE, Record
 
 OK, UNTOLD, MISFIT, DOUBTFUL = "ok", "untold", "misfit", "doubtful"
 """Verdicts, the worst last: all numbers are told; some are not; the equations leave more than noise; a record
@@ -206,7 +213,7 @@ class Identification(Published):
             [
                 self._headline(),
                 self._summary(),
-                *map(_used, self.records),
+                *map(_used_line, self.records),
                 *(line.rstrip() for line in aligned(self._numbers())),
                 *aligned(self.residual_rows()),
                 *self._sentences(),
@@ -215,7 +222,7 @@ class Identification(Published):
 
     def as_text(self) -> ReportText:
         """The report in its parts, of its tables the numbers; the other is `residual_rows`."""
-        lines = [self._summary(), *map(_used, self.records), *self._sentences()]
+        lines = [self._summary(), *map(_used_line, self.records), *self._sentences()]
         return ReportText(self._headline(), self._numbers(), lines)
 
     def _headline(self) -> str:
@@ -272,7 +279,7 @@ def _off(errors: float) -> str:
     return f"changed, {size:.{int(size < TENS)}f} errors" if size < LARGEST_SAID else "changed"
 
 
-def _used(record: RecordReport) -> str:
+def _used_line(record: RecordReport) -> str:
     used = f"{record.duration:.4g} s at {record.rate:.4g} Hz, filtered to {record.bandwidth:.3g} Hz"
     line = f"{record.path}: {used}"
     if not math.isfinite(record.delay):
@@ -288,3 +295,111 @@ def significant(value: float, error: float) -> str:
     decimals = 1 - math.floor(math.log10(error))
     rounded = round(value, decimals)
     return f"{rounded:.{max(decimals, 0)}f}"
+
+
+SMOOTH_CURVES = 8
+"""Rows of figures to one of the equations, whose curves have corners."""
+
+
+def system_report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemReport:
+    """What a system told, and how well it holds."""
+    system, fit = found.system, found.fit
+    of_joint = f"{JOINTS}.{system.title}.actuator."
+    names = [system.names[number].removeprefix(of_joint) for number in found.free]
+    combinations = [
+        f"only {each.words(names)} can be told: {each.value:.6g} +- {each.standard_error:.2g}"
+        for each in fit.inseparable
+    ]
+    return SystemReport(
+        title=system.title,
+        numbers=tuple(numbers_of(found)),
+        condition=fit.condition,
+        combinations=tuple(combinations),
+        residuals=tuple(_residuals(robot, found, signals)),
+        converged=fit.converged,
+    )
+
+
+def numbers_of(found: Solution) -> Iterator[Number]:
+    """What was found of each number of a system."""
+    system, fit = found.system, found.fit
+    inseparable = {at for each in fit.inseparable for at, _ in each.terms}
+    said = zip(system.names, system.units, system.sums, strict=True)
+    for number, (name, unit, total) in enumerate(said):
+        before = float(system.before[number])
+        if number in found.bound:
+            value, error = found.bound[number]
+            note = "came out impossible" if np.isnan(error) else "" if value == before else "at its bound"
+        else:
+            at = found.free.index(number)
+            value, error = float(fit.values[at]), float(fit.standard_errors[at])
+            note = "cannot be told apart" if at in inseparable else ""
+            note = "changes nothing" if at in fit.unexcited else note
+        yield Number(name, unit, before, value, error, note, total)
+
+
+def _residuals(robot: Robot, found: Solution, signals: list[Signals]) -> Iterator[Residual]:
+    equations = [found.equations(each) for each in signals]
+    beyond = held_out(found, signals)
+    measured, residual, group = (
+        np.concatenate(parts)
+        for parts in (
+            [each.measured for each in equations],
+            [each.measured - each.predicted for each in equations],
+            [each.group for each in equations],
+        )
+    )
+    for name in dict.fromkeys(map(str, group)):
+        rows = group == name
+        yield Residual(
+            group=name,
+            unit=_unit(robot, name),
+            torque=rms(measured[rows]),
+            residual=rms(residual[rows]),
+            noise=_noise(robot, name, signals, equations),
+            held_out=beyond.get(name, float("nan")),
+        )
+
+
+def _joint_of(robot: Robot, group: str) -> int:
+    """Index of the joint whose motor, or link, a group is."""
+    return robot.joint_names.index(group.rpartition(" ")[2])
+
+
+def _unit(robot: Robot, group: str) -> str:
+    return VARIABLES[TORQUE].quantity.unit(robot.joint_types[_joint_of(robot, group)])
+
+
+def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequence[Equations]) -> float:
+    """Of what is measured, by that of torques, and by that of positions; NaN if either is not known."""
+    index = _joint_of(robot, group)
+    motors, sprung = motor_names(robot, index), robot.joints[index].actuator.sprung
+    of_positions = [each.noise()[0][each.group == group] for each in equations if each.noise is not None]
+    noise = rms(np.concatenate(of_positions)) if of_positions else math.nan
+    if sprung and group not in motors:  # what springs carry, which positions tell
+        return noise
+    motor = motors.index(group) if sprung else 0
+    of_torque = np.array([torque_noise(each)[index, motor] for each in signals])
+    return math.hypot(noise, rms(of_torque[~np.isnan(of_torque)]))
+
+
+def torques(
+    robot: Robot, found: Sequence[Solution], records: Sequence[Record], signals: Sequence[Signals]
+) -> Iterator[Torques]:
+    """Measured and predicted torques of all records and systems."""
+    for record, coarse in zip(records, signals, strict=True):
+        stride = max(1, coarse.filter.stride // SMOOTH_CURVES)
+        of_record = coarse._replace(filter=coarse.filter._replace(stride=stride))
+        time: FloatArray = of_record.time[::stride]
+        for each in found:
+            equations = each.equations(of_record)
+            for name in dict.fromkeys(map(str, equations.group)):
+                rows = equations.group == name
+                yield Torques(
+                    record=record.path,
+                    group=name,
+                    unit=_unit(robot, name),
+                    time=time,
+                    measured=equations.measured[rows],
+                    predicted=equations.predicted[rows],
+                )

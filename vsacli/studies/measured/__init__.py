@@ -1,6 +1,6 @@
 """What a laboratory measured beside what was computed."""
 
 from vsacli.studies.measured.against_result import compare
-from vsacli.studies.measured.comparison_report import Comparison
+from vsacli.studies.measured.agreement import Comparison
 
 __all__ = ["Comparison", "compare"]

@@ -14,12 +14,9 @@ from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import actual, measured
 from vsacli.base.variables import Variable
 from vsacli.documents.columns_file import load_columns
-from vsacli.results.store.reader import StoredResult
-from vsacli.results.store.simulation import open_stored
-from vsacli.studies.measured.agreement import Agreement
+from vsacli.results.store.reader import StoredResult, open_stored
+from vsacli.studies.measured.agreement import SHOWN_LAG, Agreement, Comparison
 from vsacli.studies.measured.alignment import Alignment, align
-from vsacli.studies.measured.comparison_report import SHOWN_LAG, Comparison
-from vsacli.studies.measured.exchange import exchanged_places
 from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square, still_signal
 from vsacli.studies.measured.measured_columns import (
     Measured,
@@ -30,7 +27,7 @@ from vsacli.studies.measured.measured_columns import (
     stand_ins,
 )
 from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Computed, Pairing, interpolated
-from vsacli.studies.measured.slips import NOTABLE, WILD, slips
+from vsacli.studies.measured.slips import NOTABLE, WILD, exchanged_places, slips
 
 POSITIONS = ("q", "theta")
 """By these a recording is aligned if it has any: torques depend on the model, positions were commanded."""

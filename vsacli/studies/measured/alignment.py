@@ -17,10 +17,17 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.studies.measured.exchange import exchanged_places
-from vsacli.studies.measured.likeness import Moments, exactness, moments_of, unlikeness
 from vsacli.studies.measured.line_fit import LineFit, fit_line
-from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Pairing, tame
+from vsacli.studies.measured.pairing import (
+    FEWEST_SAMPLES,
+    Moments,
+    Pairing,
+    exactness,
+    moments_of,
+    tame,
+    unlikeness,
+)
+from vsacli.studies.measured.slips import exchanged_places
 
 MOST_POINTS = 200_000
 """Points of the grid on which the shift is looked for first; the computed signal is known between them."""

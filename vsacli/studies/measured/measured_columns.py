@@ -13,11 +13,12 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.simulation_variables import actual, measured
-from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.variables import MOTORS, Variable
-from vsacli.documents.column_mapping import TIME, ColumnMapping
+from vsacli.documents.column_mapping import ColumnMapping
+from vsacli.documents.csv_file import split_heading
+from vsacli.documents.expression import conversion_factor
 from vsacli.documents.table import Table, read_table
-from vsacli.documents.table_header import split_heading
+from vsacli.documents.time_column import TIME
 
 
 class Jointed(Protocol):

@@ -2,6 +2,6 @@
 
 from vsacli.studies.sensitivities.analysis import analysed, sensitivity
 from vsacli.studies.sensitivities.sensitivity_report import Sensitivity
-from vsacli.studies.sensitivities.sensitivity_run import SensitivityRun
+from vsacli.studies.sensitivities.slopes import SensitivityRun
 
 __all__ = ["Sensitivity", "SensitivityRun", "analysed", "sensitivity"]

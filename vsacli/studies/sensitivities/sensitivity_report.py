@@ -10,7 +10,7 @@ from typing import ClassVar
 from vsacli.base.json_records import Published, named
 from vsacli.base.tables import aligned
 from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
-from vsacli.studies.sensitivities.monte_carlo import MonteCarlo
+from vsacli.studies.sensitivities.tolerances import MonteCarlo
 
 SHOWN = 15
 """Numbers in the table, the most important first."""

@@ -1,28 +1,56 @@
-"""How uncertain the numbers of a robot are: one share for all, or a file that says it of each."""
+"""How uncertain the numbers of a robot are, and runs of robots that are drawn from these tolerances."""
 
 from __future__ import annotations
 
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base import units
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
+from vsacli.base.flags import Flag, has
+from vsacli.base.json_records import Published, named
+from vsacli.base.units import Quantity
 from vsacli.documents import tree
-from vsacli.documents.expression import ExpressionError
+from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.field_kinds import PER_CENT
 from vsacli.documents.fields import LARGEST
-from vsacli.documents.kinds.shares import PER_CENT
-from vsacli.documents.number import evaluate
 from vsacli.documents.source import Problems, read_source
-from vsacli.documents.yaml_tree import parse_yaml
+from vsacli.documents.tree import parse_yaml
+from vsacli.dynamics.inverse import compute_block, fitted, usual_block
+from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
-from vsacli.studies.sensitivities.parameter_steps import SMALL_CHANGES
+from vsacli.trajectory.trajectory import Trajectory
+
+RELATIVE = 0.01
+"""Change of most numbers."""
+
+SMALL_CHANGES: Mapping[Quantity, tuple[float, str]] = {
+    units.LENGTH: (1e-3, "1 mm"),
+    units.ANGLE: (math.radians(1), "1 deg"),
+}
+"""Change of numbers that are zero as often as not, so that a share of them says nothing, and its words."""
+
+
+def step_of(parameter: Parameter) -> float:
+    """The change, in SI units; zero for a number that is zero and is compared by a share of it."""
+    change, _ = SMALL_CHANGES.get(parameter.quantity, (RELATIVE * abs(parameter.value), ""))
+    return change
+
+
+def words_of(parameter: Parameter) -> str:
+    """The change as people say it."""
+    _, words = SMALL_CHANGES.get(parameter.quantity, (0.0, f"{100 * RELATIVE:g} %"))
+    return words
+
 
 FORM = "e.g. {normal: 5 %} or {uniform: 0.001}"
 _PLAIN = re.compile(r"[-+.\d]+(e[-+]?\d+)?|nan|inf", re.IGNORECASE)
@@ -149,3 +177,115 @@ def _number(text: str, whole: str, unit: str = "") -> float:
     if number > LARGEST:
         raise InputError.one(f"a tolerance must be at most {LARGEST:g}, not {whole!r}")
     return number
+
+
+@dataclass(frozen=True)
+class MonteCarlo(Published):
+    """What became of the robots that were drawn.
+
+    Attributes:
+        drawn: how many.
+        refused: how many of those are no robots: a mass below zero, say.
+        lost: share of the others that have an infeasible or singular step, by joint.
+        torque: largest standard deviation of a motor torque among those that have none, by joint, N m (N);
+            NaN where fewer than two have none.
+    """
+
+    drawn: int
+    refused: int
+    lost: dict[str, float]
+    torque: dict[str, float]
+
+    shape: ClassVar = named("drawn", "refused", "lost", "torque")
+
+
+def monte_carlo(
+    robot: Robot,
+    trajectory: Trajectory,
+    chosen: Sequence[Parameter],
+    tolerances: Sequence[Tolerance | None],
+    runs: int,
+    *,
+    seed: int = 0,
+    progress: Callable[[int], None] = lambda _: None,
+) -> MonteCarlo:
+    """Run perturbed robots over a trajectory.
+
+    Args:
+        robot: the robot.
+        trajectory: for this robot.
+        chosen: its numbers.
+        tolerances: of those, None for what is exact.
+        runs: how many robots are drawn.
+        seed: of the draws.
+        progress: is told how many further robots are done.
+
+    Raises:
+        InputError: the tolerances are so large that all that were drawn are no robots.
+    """
+    trajectory, random = fitted(robot, trajectory), np.random.default_rng(seed)
+    sums = _Sums(trajectory.samples, len(robot.joints))
+    refused = 0
+    for _ in range(runs):
+        drawn = {
+            str(each): each.value + tolerance.drawn(random)
+            for each, tolerance in zip(chosen, tolerances, strict=True)
+            if tolerance is not None
+        }
+        try:
+            sums.add(*_run(robot.replace(drawn), trajectory))
+        except InputError as error:
+            refused += 1
+            if refused == runs:
+                raise InputError.one(
+                    f"none of {runs} drawn robots is one, choose smaller tolerances: {error}"
+                ) from None
+        progress(1)
+    return MonteCarlo(
+        drawn=runs,
+        refused=refused,
+        lost=dict(zip(robot.joint_names, sums.lost.tolist(), strict=True)),
+        torque=dict(zip(robot.joint_names, sums.deviation.tolist(), strict=True)),
+    )
+
+
+def _run(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:
+    """tau_motor, (samples, joints, 2), and which joints have a step that cannot be done, (joints,)."""
+    size = usual_block(len(robot.joints))
+    blocks = [
+        compute_block(robot, trajectory.block(start, start + size))
+        for start in range(0, trajectory.samples, size)
+    ]
+    lost = np.any([has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=0) for block in blocks], axis=0)
+    return np.concatenate([block.tau_motor for block in blocks]), lost
+
+
+class _Sums:
+    """Means and variances of motor torques over robots, by Welford's recurrence."""
+
+    def __init__(self, samples: int, joints: int) -> None:
+        self._lost = np.zeros(joints)
+        self._runs, self._count = 0, np.zeros(joints)
+        self._mean, self._squares = np.zeros((2, samples, joints, 2))
+
+    def add(self, torque: FloatArray, lost: BoolArray) -> None:
+        """Merge a robot; joints that have lost a step do not count."""
+        self._runs += 1
+        self._lost += lost
+        self._count += ~lost
+        kept = ~lost[None, :, None] & np.isfinite(torque)
+        change = np.where(kept, torque - self._mean, 0.0)
+        self._mean += change / np.maximum(self._count, 1)[:, None]
+        self._squares += change * np.where(kept, torque - self._mean, 0.0)
+
+    @property
+    def lost(self) -> FloatArray:
+        """Share of the robots, (joints,)."""
+        return self._lost / max(self._runs, 1)
+
+    @property
+    def deviation(self) -> FloatArray:
+        """Largest over steps and motors, (joints,); NaN where fewer than two robots have torques."""
+        variance = self._squares / np.maximum(self._count - 1, 1)[:, None]
+        largest = np.sqrt(variance.max(axis=(0, 2), initial=0.0))
+        return np.asarray(np.where(self._count > 1, largest, np.nan))

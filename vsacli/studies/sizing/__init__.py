@@ -3,8 +3,7 @@
 from vsacli.studies.sizing.catalogue import CatalogueMotor
 from vsacli.studies.sizing.choices import CRITERIA
 from vsacli.studies.sizing.motor_sizing import MotorSizing
-from vsacli.studies.sizing.sized_file import sized_text
-from vsacli.studies.sizing.sizing import size_drives
+from vsacli.studies.sizing.sizing import size_drives, sized_text
 from vsacli.studies.sizing.sizing_report import Sizing
 
 __all__ = ["CRITERIA", "CatalogueMotor", "MotorSizing", "Sizing", "size_drives", "sized_text"]

@@ -1,24 +1,181 @@
-"""What trajectories ask of each motor and each spring of a robot, whichever motors those are."""
+"""What trajectories require of each motor and each spring of a robot, whichever those are."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.flags import Flag, has
-from vsacli.base.json_records import Published
+from vsacli.base.json_records import Published, named
 from vsacli.base.variables import Block
 from vsacli.dynamics.dampers import motor_torques
 from vsacli.robot.model import Robot
-from vsacli.studies.sizing.motor_demand import MotorDemand
-from vsacli.studies.sizing.spring_demand import SpringDemand, SpringPeaks
+from vsacli.studies.sizing.shaft import shaft_signals
 from vsacli.trajectory.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Peak(Published):
+    """The largest size of something, and when it is; NaN if it never exists.
+
+    Attributes:
+        value: the size.
+        trajectory: its name.
+        time: in it, s.
+    """
+
+    value: float = math.nan
+    trajectory: str = ""
+    time: float = math.nan
+
+    @classmethod
+    def of(cls, values: FloatArray, time: FloatArray, trajectory: str) -> Self:
+        """Of those values that exist, each (samples,)."""
+        sizes = np.where(np.isfinite(values), np.abs(values), -1.0)
+        step = int(sizes.argmax())
+        return cls(float(sizes[step]), trajectory, float(time[step])) if sizes[step] >= 0 else cls()
+
+    def or_larger(self, other: Self) -> Self:
+        """The larger one of both."""
+        return self if self.value >= other.value or math.isnan(other.value) else other
+
+
+@dataclass(frozen=True, eq=False)
+class MotorDemand:
+    """What is asked of a motor on the joint's side of its gear, at all steps that can be done; (samples,).
+
+    Attributes:
+        joint, joint_type: whose motor it is.
+        number: 1 or 2.
+        trajectories: their names.
+        run: index of the trajectory that the step belongs to.
+        time: of the step in it, s.
+        weight: time that the step stands for in means over time, s.
+        velocity, acceleration: of the motor.
+        load: what springs, a damper and a coupled rotor exert against it.
+        torque: of the motor that the robot file has.
+    """
+
+    joint: str
+    joint_type: str
+    number: int
+    trajectories: tuple[str, ...]
+    run: IndexArray = field(repr=False)
+    time: FloatArray = field(repr=False)
+    weight: FloatArray = field(repr=False)
+    velocity: FloatArray = field(repr=False)
+    acceleration: FloatArray = field(repr=False)
+    load: FloatArray = field(repr=False)
+    torque: FloatArray = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """Of the motor."""
+        return f"{self.joint} {self.number}"
+
+    def peak(self, values: FloatArray) -> Peak:
+        """The largest size of values, (samples,)."""
+        step = int(np.abs(values).argmax())
+        return Peak(float(abs(values[step])), self.trajectories[int(self.run[step])], float(self.time[step]))
+
+    def rms(self, values: FloatArray) -> float:
+        """Root mean square over time of values, (samples,)."""
+        return float(np.sqrt(self.mean(values * values)))
+
+    @cached_property
+    def signals(self) -> FloatArray:
+        """The seven that the torque on a shaft is a sum of, (7, samples)."""
+        return shaft_signals(self.velocity, self.acceleration, self.load)
+
+    def mean(self, values: FloatArray) -> FloatArray:
+        """Over time, of the last axis; over the steps if no two that follow each other can be done."""
+        weight = self.weight if self.weight.any() else np.ones_like(self.weight)
+        mean: FloatArray = values @ weight / weight.sum()
+        return mean
+
+    @cached_property
+    def moments(self) -> FloatArray:
+        """Means over time of the products of the signals, (7, 7), with which squares of torques average."""
+        return self.mean(self.signals[:, None] * self.signals)
+
+    @cached_property
+    def top_speed(self) -> float:
+        """Largest speed."""
+        return float(np.abs(self.velocity).max(initial=0.0))
+
+
+@dataclass(frozen=True)
+class SpringDemand(Published):
+    """What a spring must bear.
+
+    Attributes:
+        joint, joint_type: whose it is.
+        spring: which of its springs.
+        energy: largest energy in it, J.
+        torque: largest |torque|, N m (N).
+        deflection: largest |deflection|, rad (m).
+        max_deflection: what the robot file admits; infinite if it says nothing.
+    """
+
+    joint: str
+    joint_type: str
+    spring: str
+    energy: Peak
+    torque: Peak
+    deflection: Peak
+    max_deflection: float
+
+    shape: ClassVar = named("joint", "spring", "energy", "torque", "deflection", "max_deflection", "share")
+
+    @property
+    def share(self) -> float:
+        """Of the deflection that is admissible; NaN if nothing is said of that."""
+        return self.deflection.value / self.max_deflection if math.isfinite(self.max_deflection) else math.nan
+
+
+class SpringPeaks:
+    """Keeps what springs bear at most; `add` blocks in order."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._found: dict[tuple[str, str], SpringDemand] = {}
+
+    def add(self, block: Block, trajectory: str) -> None:
+        """Merge a block of a trajectory."""
+        for index, joint in enumerate(self._robot.joints):
+            for load in joint.actuator.spring_loads(block.of_joint(index)):
+                energy, torque, deflection = (
+                    Peak.of(values, block.time, trajectory)
+                    for values in (load.energy, load.torque, load.deflection)
+                )
+                new = SpringDemand(
+                    joint.name, joint.type, load.name, energy, torque, deflection, load.max_deflection
+                )
+                key = joint.name, load.name
+                self._found[key] = _larger(self._found.get(key, new), new)
+
+    def report(self) -> tuple[SpringDemand, ...]:
+        """What was found of each spring."""
+        return tuple(self._found.values())
+
+
+def _larger(one: SpringDemand, other: SpringDemand) -> SpringDemand:
+    """The larger of the peaks of both."""
+    return replace(
+        one,
+        energy=one.energy.or_larger(other.energy),
+        torque=one.torque.or_larger(other.torque),
+        deflection=one.deflection.or_larger(other.deflection),
+    )
+
 
 UNDONE = Flag.INFEASIBLE | Flag.SINGULAR | Flag.INTERNAL_INSTABILITY | Flag.NOT_FINITE
 """Steps that have no motor torque, or none that a machine could follow."""

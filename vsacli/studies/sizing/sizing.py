@@ -1,4 +1,4 @@
-"""Sizing of drives: what trajectories ask of motors and springs, and which motors of a catalogue would do."""
+"""Sizing of drives: what trajectories require, which motors would do, and the robot's file with them."""
 
 from __future__ import annotations
 
@@ -6,23 +6,30 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
-from vsacli.actuators.limit_check import LIMIT_ROUNDING
 from vsacli.actuators.motor import JointMotor
+from vsacli.actuators.reach import LIMIT_ROUNDING
 from vsacli.base.errors import InputError, check_type
+from vsacli.documents.edited import edited, moved_files, unaliased
 from vsacli.documents.record_table import RecordTable
+from vsacli.robot.file import text_to_change
 from vsacli.robot.model import Robot, check_robot
 from vsacli.studies.sizing.catalogue import CatalogueMotor, read_catalogue
-from vsacli.studies.sizing.choices import CRITERIA, Choice, check_criterion, choices, usual_criterion
-from vsacli.studies.sizing.coupled_motors import coupled_choices
-from vsacli.studies.sizing.demand import demanded
-from vsacli.studies.sizing.gears import Gears, gears_of_joints
-from vsacli.studies.sizing.motor_demand import MotorDemand
-from vsacli.studies.sizing.motor_sizing import MotorSizing, OwnMotor
-from vsacli.studies.sizing.ratios import ratios_within
+from vsacli.studies.sizing.choices import (
+    CRITERIA,
+    Choice,
+    check_criterion,
+    choices,
+    coupled_choices,
+    usual_criterion,
+)
+from vsacli.studies.sizing.demand import MotorDemand, demanded
+from vsacli.studies.sizing.motor_sizing import MotorSizing, OwnMotor, WorkingPoints
+from vsacli.studies.sizing.ratios import Gears, gears_of_joints, ratios_within
 from vsacli.studies.sizing.shaft import Shaft
 from vsacli.studies.sizing.sizing_report import Sizing
-from vsacli.studies.sizing.working_points import WorkingPoints
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -159,3 +166,49 @@ def _notes(robot: Robot, table: RecordTable[CatalogueMotor] | None) -> Iterator[
         yield f"{', '.join(coupled)}: the coupled inertia stays as it is, whatever the motors"
     if table is not None and table.others:
         yield f"columns of the catalogue that were left out: {', '.join(table.others)}"
+
+
+KEPT = ("max_torque", "max_velocity", "torque_constant", "resistance", "max_current", "max_voltage")
+"""Columns of a catalogue that a robot file has by the same name."""
+
+
+def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
+    """The text of the robot's file with the best motors in it, where one does.
+
+    Everything else, comments too, stays as the user wrote it. Masses of links stay as they are, and so does a
+    coupled inertia on the joint's side; a robot file knows no continuous torque and no efficiency of gears.
+
+    Args:
+        robot: as it was read from its file.
+        sizing: what was found for it, a motor for each place.
+        folder: where the text will stand.
+
+    Raises:
+        InputError: the robot was not read from a file.
+    """
+    own, home = text_to_change(robot)
+    values: dict[str, Any] = {}
+    for index, joint in enumerate(robot.joints):
+        places = [motor for motor in sizing.motors if motor.joint == joint.name]
+        place = f"joints.{index}.actuator"
+        motors = [_as_in_robot_file(each) for each in places]
+        values[f"{place}.motor"] = motors[0] if len(motors) == 1 else motors
+        if joint.actuator.coupled_rotors:
+            ratios = math.prod(motor["gear_ratio"] for motor in motors)
+            values[f"{place}.coupled_inertia"] = joint.actuator.coupled_rotors / ratios
+    files = dict(moved_files(own, home, Path(folder)))
+    return edited(unaliased(own, values), {**values, **files})
+
+
+def _as_in_robot_file(place: MotorSizing) -> dict[str, Any]:
+    """The motor that was chosen, with its gear, as `motor:` of an actuator."""
+    motor, choice = place.record, place.best
+    assert motor is not None, "as of every place"
+    assert choice is not None, "likewise"
+    found: dict[str, Any] = {"inertia": motor.inertia, "gear_ratio": choice.ratio}
+    found |= {name: getattr(motor, name) for name in KEPT if getattr(motor, name) is not None}
+    if motor.damping:
+        found["damping"] = motor.damping
+    if motor.coulomb:
+        found["friction"] = {"coulomb": motor.coulomb}
+    return found

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 from vsacli.analysis.report_text import warnings_and_notes
 from vsacli.base.json_records import Published, named
-from vsacli.studies.sizing import sizing_text as text
-from vsacli.studies.sizing.choices import CRITERIA
-from vsacli.studies.sizing.demand import Outcome
+from vsacli.base.tables import aligned
+from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, time_text
+from vsacli.studies.sizing.choices import CRITERIA, Choice
+from vsacli.studies.sizing.demand import Outcome, Peak, SpringDemand
 from vsacli.studies.sizing.motor_sizing import MotorSizing
-from vsacli.studies.sizing.spring_demand import SpringDemand
+from vsacli.studies.sizing.shaft import LIMITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +78,11 @@ class Sizing(Published):
         return "\n".join(
             [
                 self._headline(),
-                *text.left_out(self.outcomes),
-                *(text.asked_table(known, several=several) if self.catalogue else ()),
-                *(text.choice_table(known) if self.catalogue else text.own_table(known, several=several)),
-                *text.lacking(self.lacking),
-                *text.spring_table(self.springs, several=several),
+                *left_out(self.outcomes),
+                *(asked_table(known, several=several) if self.catalogue else ()),
+                *(choice_table(known) if self.catalogue else own_table(known, several=several)),
+                *lacking(self.lacking),
+                *spring_table(self.springs, several=several),
                 *warnings_and_notes(self.warnings, self.notes),
             ]
         )
@@ -107,3 +110,194 @@ class Sizing(Published):
         if lacking == places:
             return f"{offered} none that does"
         return f"{offered} one for {which}, chosen by {CRITERIA[self.criterion]}"
+
+
+WORDS = {
+    "torque": "peak torque",
+    "continuous_torque": "rms torque",
+    "velocity": "speed",
+    "voltage": "voltage",
+}
+"""Of the limits of a motor."""
+
+
+def left_out(outcomes: Sequence[Outcome]) -> Iterator[str]:
+    """What the sizing does not know of."""
+    for outcome in outcomes:
+        if outcome.left_out:
+            yield (
+                f"{outcome.trajectory}: {outcome.left_out} of {outcome.samples} steps cannot be done and are "
+                "left out, so that this is not for the whole motion; check-feasibility says why"
+            )
+
+
+def asked_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
+    """What is asked of any motor."""
+    if not motors:
+        return
+    rows = [("asked, joint side", "peak load", "at", "rms load", "speed", "acceleration")]
+    for motor in motors:
+        asked, joint_type = motor.asked, motor.demand.joint_type
+        assert asked is not None, "motors of which something is known"
+        rows.append(
+            (
+                motor.name,
+                _number(asked.load.value, TORQUE.unit(joint_type)),
+                _when(asked.load, several=several),
+                _number(asked.rms_load, TORQUE.unit(joint_type)),
+                _number(asked.velocity.value, VELOCITY.unit(joint_type)),
+                _number(asked.acceleration, JOINT_ACCELERATION.unit(joint_type)),
+            )
+        )
+    yield from aligned(rows)
+
+
+def own_table(motors: Sequence[MotorSizing], *, several: bool) -> Iterator[str]:
+    """What the robot's own motors do, on their shafts or, without known gears, on the joint's side."""
+    if not motors:
+        return
+    rows = [
+        ("motor", "peak torque", "at", "rms", "speed", "power", "current", "voltage", "loss", "uses most")
+    ]
+    for motor in motors:
+        assert motor.own is not None, "motors of which something is known"
+        points, on_joint = motor.own.points, motor.gear_ratio is None
+        torque, velocity = motor.units
+        rows.append(
+            (
+                motor.name + (" (joint side)" if on_joint else ""),
+                _number(points.torque.value, torque),
+                _when(points.torque, several=several),
+                _number(points.rms_torque, torque),
+                _number(points.velocity.value, velocity),
+                _number(points.power, "W"),
+                _number(points.current, "A"),
+                _number(points.voltage, "V"),
+                _number(points.copper_loss, "W"),
+                _most(motor.own.shares),
+            )
+        )
+    yield from aligned(_without_empty(rows))
+
+
+def choice_table(motors: Sequence[MotorSizing]) -> Iterator[str]:
+    """The best motor of a catalogue for each place."""
+    if not motors:
+        return
+    used = [name for name in LIMITS if any(motor.best and name in motor.best.shares for motor in motors)]
+    rows = [
+        (
+            "motor",
+            "choice",
+            "gear",
+            "gears that do",
+            *(WORDS[name] for name in used),
+            "loss",
+            "motors that do",
+        )
+    ]
+    for motor in motors:
+        best = motor.best
+        assert best is not None, "a catalogue has motors"
+        rows.append(
+            (
+                motor.name,
+                best.motor if best.does else f"none, nearest {best.motor}",
+                f"{best.ratio:.4g}",
+                _gears(best),
+                *(_share(best.shares.get(name, math.nan)) for name in used),
+                _number(best.copper_loss, "W"),
+                f"{sum(choice.does for choice in motor.choices)}",
+            )
+        )
+    yield from aligned(_without_empty(rows))
+
+
+def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
+    """For each motor for which nothing does, what comes nearest to it and what is in its way."""
+    for motor in motors:
+        shares = motor.best.shares if motor.best else motor.own.shares if motor.own else {}
+        beyond = [
+            f"{_share(shares[name])} of its {WORDS[name]}" for name in LIMITS if shares.get(name, 0) > 1
+        ]
+        if motor.asked is None:
+            yield f"{motor.name}: no step can be done, so that nothing is known of it"
+        elif motor.best is not None:
+            with_gear = f"{motor.best.motor} with the gear {motor.best.ratio:.4g}"
+            yield f"{motor.name}: no motor does; nearest is {with_gear}, which would use {_listed(beyond)}"
+        else:
+            reason = f"it uses {_listed(beyond)}{_other_gears(motor)}"
+            yield f"{motor.name}: its limits do not suffice, {reason}"
+
+
+def _other_gears(motor: MotorSizing) -> str:
+    if motor.own is None or motor.own.low is None or motor.own.high is None:
+        return ""
+    if math.isnan(motor.own.low):
+        return "; no other gear would do"
+    return f"; gears {_range(motor.own.low, motor.own.high)} would do"
+
+
+def spring_table(springs: Sequence[SpringDemand], *, several: bool) -> Iterator[str]:
+    """What each spring must bear."""
+    known = [spring for spring in springs if math.isfinite(spring.energy.value)]
+    if not known:
+        return
+    header = ("spring", "energy", "at", "torque", "deflection", "of admissible")
+    yield from aligned(_without_empty([header, *(_spring_row(spring, several=several) for spring in known)]))
+
+
+def _spring_row(spring: SpringDemand, *, several: bool) -> tuple[str, ...]:
+    return (
+        f"{spring.joint} {spring.spring}",
+        _number(spring.energy.value, "J"),
+        _when(spring.energy, several=several),
+        _number(spring.torque.value, TORQUE.unit(spring.joint_type)),
+        _number(spring.deflection.value, POSITION.unit(spring.joint_type)),
+        _share(spring.share),
+    )
+
+
+def _without_empty(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Rows below a header, without the columns that say nothing of any."""
+    kept = [index for index in range(len(rows[0])) if any(row[index] != "-" for row in rows[1:])]
+    return [tuple(row[index] for index in kept) for row in rows]
+
+
+def _gears(choice: Choice) -> str:
+    if choice.ratios:
+        return ", ".join(f"{ratio:g}" for ratio in choice.ratios)
+    return "-" if math.isnan(choice.low) else _range(choice.low, choice.high)
+
+
+def _range(low: float, high: float) -> str:
+    if low == 0:
+        return "any" if math.isinf(high) else f"up to {high:.4g}"
+    return f"from {low:.4g}" if math.isinf(high) else f"{low:.4g} to {high:.4g}"
+
+
+def _most(shares: dict[str, float]) -> str:
+    if not shares:
+        return "-"
+    name = max(shares, key=lambda each: shares[each])
+    return f"{_share(shares[name])} of {WORDS[name]}"
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:.3g} {unit}" if math.isfinite(value) else "-"
+
+
+def _share(share: float) -> str:
+    if math.isnan(share):
+        return "-"
+    return f"{100 * share:.3g} %" if share < 10 else f"{share:.3g} times"
+
+
+def _when(peak: Peak, *, several: bool) -> str:
+    if math.isnan(peak.time):
+        return "-"
+    return f"{peak.trajectory} {time_text(peak.time)}" if several else time_text(peak.time)
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(words)

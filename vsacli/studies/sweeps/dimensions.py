@@ -1,23 +1,37 @@
-"""What varies over a study, with the values it takes: numbers, or whatever else a file could hold."""
+"""What varies over a study, with the values of each run: entries of `vary:` held against its files.
+
+An entry becomes one `Dimension`, or several if a distribution fits several numbers. A `Design` combines the
+values of all: a grid, or points that are drawn.
+"""
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.units import ANY_SI_UNIT
 from vsacli.documents import tree
-from vsacli.documents.expression import ExpressionError
-from vsacli.documents.number import evaluate
-from vsacli.documents.record_numbers import Entry, NumberPath
-from vsacli.documents.record_numbers import Number as NumberAt
+from vsacli.documents.expression import ExpressionError, evaluate
+from vsacli.documents.reading import ChangeError, changed
+from vsacli.documents.record_values import Entry, NumberPath, numbers
+from vsacli.documents.record_values import Number as NumberAt
+from vsacli.documents.source import Problems, is_table
+from vsacli.robot.commanded_joints import CommandedJoints
+from vsacli.robot.file import ReadRobot
+from vsacli.robot.model import Robot
 from vsacli.studies.sensitivities.tolerances import Tolerance, distribution
-from vsacli.studies.sweeps.ways import Drawn, Linked, Listed, Ranged, Spaced, Varied
+from vsacli.studies.sweeps.study_file import GRID, Drawn, Linked, Listed, Ranged, Spaced, StudyFile, Varied
+from vsacli.trajectory.changes import divided
+from vsacli.trajectory.file import read_trajectory
 
 MOST_VALUES = 1_000_000
 """Of one path: more than any study has runs."""
@@ -185,3 +199,154 @@ def _number(text: str, unit: str) -> float:
             f"expected a number{f' in {unit}' if unit else ''}, found {text!r}: {error}"
         ) from None
     return number
+
+
+class Entries:
+    """What varies, and what is wrong with it.
+
+    Args:
+        file: what the study file says.
+        path: of the study file.
+        read: the robot file.
+        robot: what that says.
+        trajectories: paths of the trajectory files.
+    """
+
+    def __init__(
+        self, file: StudyFile, path: str, read: ReadRobot, robot: Robot, trajectories: Sequence[str]
+    ) -> None:
+        self._file, self._path, self._read = file, path, read
+        self._joints = CommandedJoints.of(robot)
+        self._documents = [read_trajectory(each, self._joints) for each in trajectories if not is_table(each)]
+        self._tables = len(self._documents) < len(trajectories)
+        self._found: list[tuple[Varied, Dimension]] = []
+
+    @property
+    def _dimensions(self) -> tuple[Dimension, ...]:
+        return tuple(dimension for _, dimension in self._found)
+
+    def dimensions(self) -> tuple[Dimension, ...]:
+        """What varies.
+
+        Raises:
+            InputError: entries do not fit what is there, each with its line.
+        """
+        problems, held_numbers = Problems(self._path), self._numbers()
+        for varied in self._file.vary:
+            with _noting(problems, varied):
+                further = dimensions_of(varied, held_numbers, self._dimensions)
+                self._found += [(varied, dimension) for dimension in further]
+        counts = Counter(dimension.path for dimension in self._dimensions)
+        for varied, dimension in self._found:
+            if counts[dimension.path] > 1:
+                problems.add(varied.line, f"{dimension.path} varies twice")
+        problems.check()
+        return self._dimensions
+
+    def try_values(self) -> None:
+        """Make the change of each listed value alone.
+
+        Raises:
+            InputError: some cannot be made.
+        """
+        problems = Problems(self._path)
+        for varied, dimension in self._found:
+            with _noting(problems, varied):
+                for value in () if dimension.linked else dimension.values or (dimension.centre,):
+                    self._change(dimension.path, value)
+        problems.check()
+
+    def _numbers(self) -> list[Held]:
+        trajectories = (numbers(document, self._joints.types) for document, _ in self._documents)
+        every = [*numbers(self._read.document), *(each for found in trajectories for each in found)]
+        return held(every, self._joints.types)
+
+    def _change(self, path: str, value: object) -> None:
+        changes = divided({path: value})
+        if changes.trajectory and self._tables:
+            raise ChangeError.one("a trajectory of the study is a table, in which nothing can be set")
+        if changes.robot:
+            changed(self._read.document, self._read.source, changes.robot)
+        for document, source in self._documents if changes.trajectory else ():
+            changed(document, source, changes.trajectory, self._joints.types, self._joints.exempt)
+
+
+@contextmanager
+def _noting(problems: Problems, varied: Varied) -> Iterator[None]:
+    """Note what is wrong with an entry."""
+    try:
+        yield
+    except InputError as error:
+        for problem in error.problems:
+            message = problem.message.removeprefix(f"{varied.path}: ")
+            problems.add(varied.line, f"{varied.path}: {message}")
+
+
+MOST_RUNS = 1_000_000
+"""At some 10 ms each that is three hours; the table has 300 MB."""
+
+
+class Design:
+    """The points of a study, the same for each trajectory.
+
+    Attributes:
+        points: how many there are.
+    """
+
+    def __init__(self, file: StudyFile, dimensions: Sequence[Dimension], trajectories: int) -> None:
+        """Find the points.
+
+        Raises:
+            InputError: they are more than can be computed.
+        """
+        self._dimensions = dimensions
+        self._own = [each for each in dimensions if not each.linked]
+        self._sizes = [len(each.values) for each in self._own]
+        self.points = math.prod(self._sizes) if file.method == GRID else file.samples or 0
+        if self.points * trajectories > MOST_RUNS:
+            advice = "take fewer values, or draw some points by `method: latin_hypercube` and `samples:`"
+            total = f"{self.points * trajectories:,} runs"
+            if file.method == GRID:
+                total += f" ({' x '.join(f'{size:,}' for size in (trajectories, *self._sizes))})"
+            raise InputError.one(f"{total} are more than {MOST_RUNS:,}; {advice}")
+        self._shares = None if file.method == GRID else _shares(file, self.points, len(self._own))
+
+    def different(self, dimensions: Sequence[Dimension]) -> int:
+        """How many different values some dimensions have together."""
+        own = [each for each in dimensions if not each.linked]
+        if self._shares is not None and own:
+            return self.points
+        return math.prod(len(each.values) for each in own)
+
+    def values(self, point: int) -> dict[str, Any]:
+        """The value of each dimension at a point, by path."""
+        if self._shares is None:
+            places = np.unravel_index(point, self._sizes) if self._sizes else ()
+            found = {each.path: each.values[place] for each, place in zip(self._own, places, strict=True)}
+        else:
+            found = {
+                each.path: each.drawn(share)
+                for each, share in zip(self._own, self._shares[point], strict=True)
+            }
+        return {each.path: self._value(each, found) for each in self._dimensions}
+
+    def _value(self, dimension: Dimension, found: dict[str, Any]) -> Any:
+        if not dimension.linked:
+            return found[dimension.path]
+        origin = next(each for each in self._own if each.path == dimension.linked)
+        value, number = found[origin.path], origin.number(found[origin.path])
+        return value if number is None else number * dimension.factor
+
+
+def _shares(file: StudyFile, points: int, dimensions: int) -> FloatArray:
+    """Shares from 0 to 1, (points, dimensions): of each dimension's values those below the one to take.
+
+    A Latin hypercube has one point in each of as many layers of a dimension as there are points (McKay,
+    Beckman and Conover 1979).
+    """
+    random = np.random.default_rng(file.seed)
+    shares: FloatArray = random.random((points, dimensions))
+    if file.method == "latin_hypercube":
+        shares += np.column_stack([random.permutation(points) for _ in range(dimensions)])
+        shares /= points
+    return np.clip(shares, 2.0**-54, 1 - 2.0**-53)  # at 0 and 1 a normal distribution is infinite

@@ -1,21 +1,28 @@
-"""The row of a run: what is kept of it, or why it could not be computed."""
+"""The row of a run: what is kept of it, or why it could not be computed; and tasks of several runs.
+
+A task is computed by another process, here or on another machine, which reads the study again by its `Job`.
+"""
 
 from __future__ import annotations
 
 import json
-from typing import NamedTuple
+import os
+import threading
+import time
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, Problem
 from vsacli.base.texts import one_line
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
-from vsacli.studies.sweeps.kept import columns
-from vsacli.studies.sweeps.over_time import Recorder
-from vsacli.studies.sweeps.study import ChangedError, Point, Study
+from vsacli.studies.sweeps.columns import Recorder, scalars
+from vsacli.studies.sweeps.study import ChangedError, Point, Study, load_study
 from vsacli.trajectory.changes import Divided
 from vsacli.trajectory.devices import with_devices
 from vsacli.trajectory.file import declared_trajectory
@@ -114,13 +121,13 @@ class Computer:
             optimum = optimise.optimum(robot, trajectory)
             if optimum.trajectory is None:
                 return _without_values(run, key, IMPOSSIBLE, "; ".join(optimum.reasons))
-            trajectory, costs = optimum.trajectory, [cost.values(optimum) for cost in self._study.costs]
+            trajectory, costs = optimum.trajectory, optimise.costs_of(optimum)
         computed = Run(robot, trajectory, engine=self._study.engine, threads=1)
         recorder = Recorder(self._study.over_time, self._study.file.every)
         for block in computed:
             recorder.add(block)
         report = computed.report()
-        values = np.concatenate([*costs, columns(self._study.kept, report)])
+        values = np.concatenate([*costs, scalars(self._study.kept, report)])
         return Row(run, key, report.verdict, "", values, recorder.curves)
 
     def _trajectory(self, robot: Robot, index: int, changes: Divided) -> Trajectory:
@@ -129,3 +136,71 @@ class Computer:
             declared = declared_trajectory(self._study.trajectories[index], robot, changes.trajectory)
             self._read = (place, joints, declared)
         return self._read[2]
+
+
+class Job(NamedTuple):
+    """A study as another process reads it again, on this machine or on another one.
+
+    Attributes:
+        path: of the study file.
+        engine: that computes.
+        computed_by: versions of all that rows depend on, and their names.
+        fingerprint: of the study.
+    """
+
+    path: str
+    engine: str
+    computed_by: tuple[tuple[str, str], ...]
+    fingerprint: str
+
+    @classmethod
+    def of(cls, study: Study) -> Self:
+        """Return that of a study, whose path does not depend on the working folder."""
+        path = os.path.abspath(study.source.path)
+        return cls(path, study.engine, tuple(study.computed_by.items()), study.fingerprint)
+
+    def study(self) -> Study:
+        """Read the study here.
+
+        Raises:
+            InputError: it cannot be read here, what computes here is not what computes there, or a file has
+                another content here.
+        """
+        study = load_study(self.path, self.engine)
+        differing = [
+            f"{name} is {here or 'missing'} instead of {there or 'none'}"
+            for (name, there), here in zip(self.computed_by, study.computed_by.values(), strict=True)
+            if here != there
+        ]
+        if differing:
+            raise InputError.one(f"other rows would be computed here: {', '.join(differing)}")
+        if study.fingerprint != self.fingerprint:
+            raise InputError.one(
+                "a file of the study is another one here, or was changed meanwhile; run it again", self.path
+            )
+        return study
+
+
+class Answer(NamedTuple):
+    """Result of a task: the seconds that it took, and rows of its runs, or problems why there are none."""
+
+    seconds: float
+    rows: tuple[Row, ...] = ()
+    problems: tuple[Problem, ...] = ()
+
+
+def answer(job: Job, runs: Sequence[int]) -> Answer:
+    """Compute the rows of runs here."""
+    try:
+        computer = _computer(job, threading.get_ident())
+        begin = time.perf_counter()
+        rows = tuple(map(computer.row, runs))
+    except InputError as error:
+        return Answer(0.0, problems=error.problems)
+    return Answer(time.perf_counter() - begin, rows)
+
+
+@lru_cache(maxsize=4)
+def _computer(job: Job, _thread: int) -> Computer:
+    """The computer of a thread, kept for its next tasks: threads share none."""
+    return Computer(job.study())

@@ -4,43 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
 
 from vsacli.base.errors import InputError, check_path
 from vsacli.base.outputs import Outputs
 from vsacli.base.progress import Progress, unseen
-from vsacli.compute.engine import processors, unheard
-from vsacli.results.store.stored_study import StoredStudy
-from vsacli.studies.sweeps.executors import Rows, executor
+from vsacli.compute.engine import unheard
+from vsacli.results.store.study_table import StoredStudy
+from vsacli.studies.sweeps.executors import executor
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.rows import Row
 from vsacli.studies.sweeps.study import Study, load_study
-from vsacli.studies.sweeps.writing import write
-
-RUNS_A_PROCESS = 25
-"""A process takes as long to begin as some 25 short runs."""
-
+from vsacli.studies.sweeps.study_tables import write
 
 MOST_LINES_NAMED = 5
 """Damaged lines of a journal up to which all are named."""
-
-
-class Shard(NamedTuple):
-    """Which part of a study is computed: part `number` of `parts`, the runs taken in turn."""
-
-    number: int = 1
-    parts: int = 1
-
-    def runs(self, study: Study) -> range:
-        """Its runs."""
-        return range(self.number - 1, study.runs, self.parts)
-
-    @property
-    def suffix(self) -> str:
-        """What the name of its table has behind that of the study."""
-        return f"-{self.number}-of-{self.parts}" if self.parts > 1 else ""
 
 
 def run_study(
@@ -84,15 +63,16 @@ def run_study(
         TypeError: path is none.
     """
     check_path(path, "run_study(path)")
-    study, part = load_study(path, engine), _part(shard)
-    target = Path(f"{Path(path).stem}{part.suffix}.h5" if table is None else table)
+    study = load_study(path, engine)
+    runs, suffix = _part(study, *shard)
+    target = Path(f"{Path(path).stem}{suffix}.h5" if table is None else table)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in study.sources]) as outputs:
         outputs.check(target)
         with Journal(target.with_name(f"{target.name}.journal")) as journal:
             _tell_damage(journal, tell)
-            file, runs = outputs.file(target), part.runs(study)
+            file = outputs.file(target)
             with _telling_what_is_kept(journal, tell):
-                lost = _computed(study, runs, journal, _Means(processes, dask), progress, tell)
+                lost = _computed(study, runs, journal, (processes, dask), progress, tell)
                 write(study, runs, lost, journal, file, command_line=command_line)
     if lost:
         tell(
@@ -104,25 +84,13 @@ def run_study(
     return StoredStudy(target)
 
 
-def _part(shard: tuple[int, int]) -> Shard:
-    number, parts = shard
+def _part(study: Study, number: int, parts: int) -> tuple[range, str]:
+    """Return the runs of a part of a study, and what the name of its table ends with."""
     if not 1 <= number <= parts:
-        raise InputError.one(f"shard must be the number of a part and how many there are, not {shard}")
-    return Shard(number, parts)
-
-
-class _Means(NamedTuple):
-    """What may compute: processes of this machine, as many as pay if None; or a cluster."""
-
-    processes: int | None
-    dask: str | None
-
-    def of(self, study: Study, runs: int, tell: Callable[[str], object]) -> AbstractContextManager[Rows]:
-        """What computes so many runs."""
-        short = self.dask is None and study.file.optimize is None
-        paying = 1 + runs // RUNS_A_PROCESS if short else runs
-        count = min(processors(), paying) if self.processes is None else min(self.processes, runs)
-        return executor(study, count, self.dask, tell)
+        raise InputError.one(
+            f"shard must be the number of a part and how many there are, not {(number, parts)}"
+        )
+    return range(study.runs)[number - 1 :: parts], f"-{number}-of-{parts}" if parts > 1 else ""
 
 
 def _tell_damage(journal: Journal, tell: Callable[[str], object]) -> None:
@@ -140,7 +108,7 @@ def _computed(
     study: Study,
     runs: Sequence[int],
     journal: Journal,
-    means: _Means,
+    workers: tuple[int | None, str | None],
     progress: Progress,
     tell: Callable[[str], object],
 ) -> dict[int, Row]:
@@ -150,7 +118,7 @@ def _computed(
         tell(f"{len(runs) - len(missing):,} of {len(runs):,} runs are in {journal.path} already")
     if not missing:
         return {}
-    with progress(len(missing)) as bar, means.of(study, len(missing), tell) as rows:
+    with progress(len(missing)) as bar, executor(study, len(missing), *workers, tell) as rows:
         return gather(rows(missing), journal, bar.update)
 
 

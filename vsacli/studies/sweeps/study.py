@@ -1,4 +1,4 @@
-"""A study as it is computed: files, what varies, and which values each run has."""
+"""A study as it is computed: files, what varies, which values each run has, and the engine of all of them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import glob
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,20 +18,53 @@ from vsacli.base.errors import InputError
 from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.variables import VARIABLES
 from vsacli.base.version import __version__
-from vsacli.documents.reading import read_document
+from vsacli.compute.engine import Settled, settle
+from vsacli.documents.reading import Changes, read_document
 from vsacli.documents.source import Source
+from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.file import ReadRobot, read_robot
 from vsacli.robot.model import Robot
-from vsacli.studies.sweeps.design import Design
-from vsacli.studies.sweeps.dimensions import Dimension
-from vsacli.studies.sweeps.engine_of_all import settled_engine
-from vsacli.studies.sweeps.entries import Entries
-from vsacli.studies.sweeps.kept import KEPT, Kept
-from vsacli.studies.sweeps.optimised import Cost
-from vsacli.studies.sweeps.over_time import OverTime, over_time
+from vsacli.studies.sweeps.columns import KEPT, Column, over_time
+from vsacli.studies.sweeps.dimensions import Design, Dimension, Entries
 from vsacli.studies.sweeps.study_file import FORMAT, StudyFile
 from vsacli.trajectory.changes import Divided, divided
 from vsacli.trajectory.file import load_trajectory
+
+
+def settled_engine(
+    name: str, robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
+) -> Settled:
+    """The engine of a study. Code is compiled for each robot, so it pays by the runs that each has.
+
+    Args:
+        name: as of `settle`.
+        robot: as in its file.
+        trajectories: paths of their files.
+        dimensions: what varies.
+        design: the points of each trajectory.
+
+    Raises:
+        InputError: there is no such engine, or no C compiler for it.
+    """
+    samples = _samples(robot, trajectories, dimensions, design) if name == "auto" else 0
+    return settle(name, InverseDynamics(robot), samples)
+
+
+def _samples(
+    robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
+) -> int:
+    """How many steps the runs of one robot have, if all are as long as the first along each trajectory."""
+    changes = divided(design.values(0)).trajectory
+    robots = design.different([each for each in dimensions if divided({each.path: None}).robot])
+    return sum(_steps(path, robot, changes) for path in trajectories) * design.points // robots
+
+
+def _steps(path: str, robot: Robot, changes: Changes) -> int:
+    """Those of the first run, or if it cannot be computed those of the file."""
+    try:
+        return load_trajectory(path, robot, changes).samples
+    except InputError:
+        return load_trajectory(path, robot).samples
 
 
 class ChangedError(InputError):
@@ -84,17 +117,17 @@ class Study:
         return len(self.trajectories) * self.design.points
 
     @property
-    def kept(self) -> tuple[Kept, ...]:
+    def kept(self) -> tuple[Column, ...]:
         """What is kept of each run."""
         return tuple(KEPT[name] for name in dict.fromkeys(self.file.keep or KEPT))
 
     @property
-    def costs(self) -> tuple[Cost, ...]:
+    def costs(self) -> tuple[Column, ...]:
         """What is kept of each run's optimum, if one is looked for."""
         return () if self.file.optimize is None else self.file.optimize.costs
 
     @property
-    def over_time(self) -> tuple[OverTime, ...]:
+    def over_time(self) -> tuple[Column, ...]:
         """What is kept of each run over time."""
         return over_time(self.file.variables or ())
 

@@ -1,11 +1,21 @@
-"""Study files: `vsacli-study/1`."""
+"""Study files, `vsacli-study/1`: what they declare, ways of varying, and what is optimized in each run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
-from vsacli.base.errors import FieldProblem
+import numpy as np
+
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import FieldProblem, InputError
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN, SINGULAR_MARGIN
+from vsacli.base.units import Quantity
+from vsacli.documents import tree
+from vsacli.documents.field_kinds import OwnKind, Refer, Schema, Share
 from vsacli.documents.fields import (
     Check,
     Choice,
@@ -19,30 +29,230 @@ from vsacli.documents.fields import (
     text,
     value,
 )
-from vsacli.documents.kinds.several import OneOrMore
-from vsacli.studies.sweeps.kept import KEPT
-from vsacli.studies.sweeps.optimised import Optimised
-from vsacli.studies.sweeps.over_time import OVER_TIME
-from vsacli.studies.sweeps.ways import Drawn, Ranged, Varied, Ways
+from vsacli.documents.nested import OneOrMore
+from vsacli.documents.reading import check_path_of_change
+from vsacli.documents.tree import INVALID, Node, Scope
+from vsacli.robot.model import Robot
+from vsacli.studies.sensitivities.tolerances import SHAPES
+from vsacli.studies.sweeps.columns import JOINT, KEPT, OVER_TIME, TIME, Column
+from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.studies.search.optimum import Optimum
+
+
+SPACED = ("linspace", "logspace")
+LINKED, FACTOR = "linked", "factor"
+FORMS = (
+    "a list of values, {linspace: [first, last, count]}, {logspace: [first, last, count]}, {normal: 5 %}, "
+    "{uniform: 5 %}, {uniform: [least, largest]} or {linked: path, factor: 2}"
+)
+
+
+class Listed(NamedTuple):
+    """Values one by one, each what the file could hold."""
+
+    values: tuple[Any, ...]
+
+
+class Spaced(NamedTuple):
+    """Numbers from the first to the last, evenly or by equal factors; texts as written."""
+
+    shape: str
+    first: str
+    last: str
+    steps: str
+
+
+class Drawn(NamedTuple):
+    """A distribution, of each number that the path fits by itself; the node is as of `distribution`."""
+
+    node: Node
+
+
+class Ranged(NamedTuple):
+    """Numbers between two, all as likely; texts as written."""
+
+    least: str
+    largest: str
+
+
+class Linked(NamedTuple):
+    """The value of another path, or a multiple of it."""
+
+    path: str
+    factor: str
+
+
+Way: TypeAlias = Listed | Spaced | Drawn | Ranged | Linked
+
+
+class Varied(NamedTuple):
+    """A path with its line in the study file, and how what it leads to varies."""
+
+    path: str
+    line: int
+    way: Way
+
+
+class Ways(OwnKind):
+    """A mapping from paths into robot or trajectory to how what they lead to varies."""
+
+    words = "mapping from paths to values"
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """A tuple of `Varied`."""
+        if not isinstance(node, tree.Mapping):
+            return scope.unexpected(node, "a mapping from paths to values", label)
+        found = []
+        for path, entry in node.entries.items():
+            try:
+                check_path_of_change(path)
+                found.append(Varied(path, node.key_lines[path], _way(entry)))
+            except InputError as error:
+                message = error.problems[0].message
+                scope.problems.add(entry.line, message if message.startswith(path) else f"{path}: {message}")
+        return tuple(found) if len(found) == len(node.entries) else INVALID
+
+    def schema(self, _refer: Refer) -> Schema:
+        """See `OwnKind.schema`."""
+        keys = (*SPACED, *SHAPES, LINKED)
+        way = {"type": "object", "anyOf": [{"required": [key]} for key in keys]}
+        return {"type": "object", "additionalProperties": {"anyOf": [{"type": "array", "minItems": 1}, way]}}
+
+    def json_value(self, content: Any, _of_record: Any) -> Any:
+        """See `OwnKind.json_value`."""
+        return {varied.path: str(varied.way) for varied in content}
+
+
+def _way(node: Node) -> Way:
+    match node:
+        case tree.Sequence(items=items) if items:
+            return Listed(tuple(map(tree.plain, items)))
+        case tree.Mapping(entries=entries) if entries:
+            return _mapped(node, dict(entries))
+    raise InputError.one(f"expected {FORMS}, found {node}")
+
+
+def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
+    """What a mapping says."""
+    key = next(iter(entries))
+    if LINKED in entries:
+        texts = {word: _text(entry, word) for word, entry in entries.items() if word in (LINKED, FACTOR)}
+        if len(texts) == len(entries):
+            return Linked(texts[LINKED], texts.get(FACTOR, "1"))
+    elif len(entries) == 1 and key in SPACED:
+        return Spaced(key, *_texts(entries[key], 3, f"{key}: [first, last, count]"))
+    elif len(entries) == 1 and key in SHAPES:
+        if key == "uniform" and isinstance(entries[key], tree.Sequence):
+            return Ranged(*_texts(entries[key], 2, "uniform: [least, largest]"))
+        return Drawn(node)
+    hint = did_you_mean(key, [*SPACED, *SHAPES, LINKED]) if len(entries) == 1 else ""
+    raise InputError.one(f"expected {FORMS}, found a mapping with {', '.join(entries)}{hint}")
+
+
+def _texts(node: Node, count: int, form: str) -> list[str]:
+    if not isinstance(node, tree.Sequence) or len(node.items) != count:
+        raise InputError.one(f"expected {form}, found {node}")
+    return [_text(item, form) for item in node.items]
+
+
+def _text(node: Node, form: str) -> str:
+    if not isinstance(node, tree.Scalar):
+        raise InputError.one(f"expected a single value in {form}, found {node}")
+    return node.text
+
+
+STIFFNESS, TIMING = "stiffness", "timing"
+MINIMIZED = ("torque", "energy", "copper", "peak", TIME)
+VARIED = (STIFFNESS, TIMING, "both")
+"""The words of `vsacli optimize`; with the optimisation itself they would take long to load."""
+
+_MARGIN = Check(
+    lambda share: SINGULAR_MARGIN < share < 1,
+    "above 0 and below 1",
+    {"exclusiveMinimum": 0, "exclusiveMaximum": 1},
+)
+_SEED = Check(lambda number: number >= 0, "zero or more", {"minimum": 0})
+
+
+@dataclass(frozen=True)
+class Optimised:
+    """What is optimised, by names and defaults of the options of `vsacli optimize`."""
+
+    minimize: str = choice(
+        MINIMIZED,
+        "rms of the motor torques, energy that the motors spend, heat of their windings, largest of the "
+        "motor torques, or duration",
+        default="torque",
+    )
+    vary: str | None = choice(
+        VARIED, "what may change: by default the stiffness, for time the timing", default=None
+    )
+    margin: float = value(
+        Share(),
+        "relative margin that every step shall keep to the ends of its corridor",
+        check=_MARGIN,
+        default=NEAR_SINGULAR_MARGIN,
+    )
+    seed: int = integer("of the starts that are drawn", check=_SEED, default=0)
+
+    def __post_init__(self) -> None:
+        check_fields(self, *self._problems())
+
+    def _problems(self) -> list[FieldProblem]:
+        if (self.minimize, self.vary) == (TIME, STIFFNESS):
+            return [FieldProblem(("vary",), "for the sake of time it is `timing` or `both` that varies")]
+        return []
+
+    @property
+    def varied(self) -> str:
+        """What varies."""
+        return self.vary or (TIMING if self.minimize == TIME else STIFFNESS)
+
+    def optimum(self, robot: Robot, trajectory: Trajectory) -> Optimum:
+        """That of a run.
+
+        Raises:
+            InputError: what is asked cannot be asked of this robot and trajectory.
+        """
+        from vsacli.studies.search import optimize
+
+        return optimize(robot, trajectory, self.minimize, self.varied, margin=self.margin, seed=self.seed)
+
+    def costs_of(self, optimum: Optimum) -> list[FloatArray]:
+        """Return the values of the costs in a run; NaN of joints for which nothing is chosen."""
+        found = map(optimum.joints.get, optimum.robot.joint_names)
+        each = list(found) if optimum.timing is None else [optimum.timing]
+        return [
+            np.array([np.nan if one is None else getattr(one, name) for one in each])
+            for name in ("before", "after")
+        ]
+
+    @property
+    def costs(self) -> tuple[Column, Column]:
+        """What the table says of it."""
+        dims, quantity, words = self._cost
+        return (
+            Column("cost_before", dims, quantity, f"{words} as commanded"),
+            Column("cost_after", dims, quantity, f"{words} of the optimum"),
+        )
+
+    @property
+    def _cost(self) -> tuple[tuple[str, ...], Quantity, str]:
+        """Dimensions after `run`, unit and words of what is minimised."""
+        if self.minimize == TIME:
+            return (), units.TIME, "duration"
+        from vsacli.studies.search.criteria import CRITERIA
+
+        return JOINT, CRITERIA[self.minimize].quantity, CRITERIA[self.minimize].words
+
 
 FORMAT = "vsacli-study/1"
 GRID = "grid"
 METHODS = (GRID, "random", "latin_hypercube")
 
 _COUNT = Check(lambda number: number >= 1, "1 or more", {"minimum": 1})
-_SEED = Check(lambda number: number >= 0, "zero or more", {"minimum": 0})
-
-
-class _ColumnName(Choice):
-    """One of the scalars of a report; they are too many for a table."""
-
-    words = "name of a column"
-
-
-class _VariableName(Choice):
-    """One of the variables of results, likewise."""
-
-    words = "name of a variable"
 
 
 @dataclass(frozen=True)
@@ -69,12 +279,12 @@ class StudyFile:
         default=None,
     )
     keep: tuple[str, ...] | None = value(
-        Items(_ColumnName(tuple(KEPT))),
+        Items(Choice(tuple(KEPT), words="name of a column")),
         "what is kept of each run beside its verdict; all by default",
         default=None,
     )
     variables: tuple[str, ...] | None = value(
-        Items(_VariableName(tuple(OVER_TIME))),
+        Items(Choice(tuple(OVER_TIME), words="name of a variable")),
         "variables of results that are kept over time",
         default=None,
     )

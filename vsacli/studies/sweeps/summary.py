@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from vsacli.base.json_records import Stored, named
-from vsacli.results.store.stored_study import StoredStudy
+from vsacli.results.store.study_table import StoredStudy
 from vsacli.studies.sweeps.rows import FAILED, IMPOSSIBLE
 
 MOST_ERRORS = 3

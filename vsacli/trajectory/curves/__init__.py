@@ -1,7 +1,7 @@
 """Profiles of signals in closed form: here the simple ones."""
 
 from vsacli.trajectory.curves.closed_form import DEGREES, VIA_DEGREES, ClosedForm, Constant
-from vsacli.trajectory.curves.rest_to_rest import RestToRest
+from vsacli.trajectory.curves.polynomial import RestToRest
 
 __all__ = [
     "DEGREES",

@@ -162,8 +162,7 @@ def describe(value: str, labels: Sequence[str], fit: Fit) -> dict[str, Any]:
 
 def _band(part: Part, member: int, fit: Fit) -> float | None:
     """Return the frequency up to which a component moves, Hz; None at rest."""
-    column = part.members.tolist().index(member)
-    spline = type(part.spline)(part.spline.t, part.spline.c[:, [column]], part.spline.k)
+    spline = part.of_columns(np.flatnonzero(part.members == member)).spline
     above = np.inf if part.noise is None else part.noise.above
     band = motion_band(spline, part.inside, fit.step, ORDERS[fit.degree] - 1, above)
     return None if np.isnan(band) else band

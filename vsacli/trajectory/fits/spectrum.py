@@ -106,21 +106,16 @@ class _Spectrum(NamedTuple):
     Attributes:
         frequency: of the lines, Hz.
         lines: complex, weighted by a Hann window, (stretches, lines).
+        power: of each line, (stretches, lines).
         weight: f^2k by which the density of the derivative exceeds that of the samples, (lines,).
         samples: of a stretch.
-        motion: power of the samples about their mean, of a stretch, as density times number of lines.
     """
 
     frequency: FloatArray
     lines: NDArray[np.complex128]
+    power: FloatArray
     weight: FloatArray
     samples: int
-    motion: float
-
-    @property
-    def power(self) -> FloatArray:
-        """The power of each line, (stretches, lines)."""
-        return np.abs(self.lines) ** 2
 
 
 class _Bands(NamedTuple):
@@ -157,13 +152,14 @@ def followed_noise(
         order: of the derivative.
         bandwidth: up to which there is motion, Hz, if it is known: what is below is no noise.
     """
-    spectrum = _spectrum(spline, inside, step, order)
+    time = _stretches(inside, step)
+    spectrum = _spectrum(spline, time, step, order)
     total = float(np.sum(spectrum.power))
     if not total or spectrum.lines.shape[1] <= 2 * (FIRST_LINE + FEWEST_LINES):
         return FollowedNoise()
     bands = _bands(spectrum)
     # of several humps that pass for noise the one from the lowest valley on has them all
-    valleys, descends = _valleys(bands, spectrum.motion)
+    valleys, descends = _valleys(bands, _power_of_motion(spline, time, order))
     for valley in np.flatnonzero(valleys).tolist():
         top = valley + int(np.argmax(bands.derivative[valley:]))
         peak = float(spectrum.frequency[bands.line[top]])
@@ -192,26 +188,35 @@ def motion_band(
         order: of the derivative.
         below: frequency from which on it is noise, Hz.
     """
-    spectrum = _spectrum(spline, inside, step, order)
+    spectrum = _spectrum(spline, _stretches(inside, step), step, order)
     power = np.where(spectrum.frequency < below, np.sum(spectrum.power, axis=0), 0.0)
     summed = np.cumsum(power)
     return float(spectrum.frequency[np.searchsorted(summed, WITHIN * summed[-1])]) if summed[-1] else np.nan
 
 
-def _spectrum(spline: BSpline[np.float64], inside: tuple[float, float], step: float, order: int) -> _Spectrum:
+def _stretches(inside: tuple[float, float], step: float) -> FloatArray:
+    """Return times of stretches all over a recording, (stretches, samples), s."""
     first, last = inside
     samples = int((last - first) / step) + 1
     count = max(2, min(samples, SEGMENT_SAMPLES))
     stretches = 1 if samples == count else min(MOST_SEGMENTS, samples // count)
     starts = np.linspace(first, last - (count - 1) * step, stretches)
-    time = starts[:, None] + step * np.arange(count)
-    window = np.hanning(count)
-    values, rows = (spline(time, nu=each)[..., 0] for each in (0, order))
-    power = np.abs(np.fft.rfft(window * (values - values.mean()))) ** 2
-    frequency = np.asarray(np.fft.rfftfreq(count, step), dtype=np.float64)
+    return np.asarray(starts[:, None] + step * np.arange(count))
+
+
+def _spectrum(spline: BSpline[np.float64], time: FloatArray, step: float, order: int) -> _Spectrum:
+    samples = time.shape[1]
+    lines = np.fft.rfft(np.hanning(samples) * spline(time, nu=order)[..., 0])
+    frequency = np.asarray(np.fft.rfftfreq(samples, step), dtype=np.float64)
     weight = np.maximum(frequency, frequency[1]) ** (2 * order)
-    motion = (2 * np.pi) ** (2 * order) * float(np.sum(power)) / stretches
-    return _Spectrum(frequency, np.fft.rfft(window * rows), weight, count, motion)
+    return _Spectrum(frequency, lines, np.abs(lines) ** 2, weight, samples)
+
+
+def _power_of_motion(spline: BSpline[np.float64], time: FloatArray, order: int) -> float:
+    """Return the power of the samples about their mean, of a stretch, as density times number of lines."""
+    values = spline(time)[..., 0]
+    power = np.abs(np.fft.rfft(np.hanning(time.shape[1]) * (values - values.mean()))) ** 2
+    return (2 * np.pi) ** (2 * order) * float(np.sum(power)) / len(time)
 
 
 def _bands(spectrum: _Spectrum) -> _Bands:

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.base.unit_expressions import conversion_factor
 from vsacli.base.units import Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, wrench_columns
-from vsacli.documents.column_mapping import REST, TIME
-from vsacli.documents.table_header import split_heading
+from vsacli.documents.column_mapping import REST
+from vsacli.documents.csv_file import split_heading
+from vsacli.documents.expression import conversion_factor
+from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
 
 Way = dict[str, dict[int, str]]

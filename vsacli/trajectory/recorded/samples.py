@@ -13,7 +13,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, Fit, FitChoice, fit_samples, mismatches
-from vsacli.trajectory.fits.bounds import Unresolved, unresolved, vibrations
+from vsacli.trajectory.fits.fit import Unresolved, unresolved, vibrations
 from vsacli.trajectory.fits.fit_text import describe, fit_notes, fit_sentences
 from vsacli.trajectory.recorded import hermite
 from vsacli.trajectory.recorded.even_stamps import elapsed_times

@@ -8,6 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import time_text
+from vsacli.documents.time_column import UNITS, unit_of_steps
 from vsacli.trajectory.recorded.even_stamps import resolution
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.thresholds import (
@@ -16,10 +17,7 @@ from vsacli.trajectory.recorded.thresholds import (
     JITTER_SHARE,
     LONGEST_STEP,
     SHORTEST_STEP,
-    USUAL_STEPS,
 )
-
-UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
@@ -60,14 +58,11 @@ def step_text(step: float) -> str:
 
 def _of_another_unit(usual: float, duration: float) -> str:
     rows = f"rows are {usual:.4g} s apart, and the recording lasts {duration:.4g} s"
-    low, high = USUAL_STEPS
-    for unit, factor in UNITS.items():
-        if low <= usual * factor <= high:
-            return (
-                f"looks like {unit}: {rows}; if rows are {step_text(usual * factor)} apart,"
-                f" write time[{unit}] in the header"
-            )
-    return f"is hardly in seconds: {rows}; write its unit in the header, e.g. time[ms]"
+    unit = unit_of_steps(usual)
+    if unit is None:
+        return f"is hardly in seconds: {rows}; write its unit in the header, e.g. time[ms]"
+    apart = step_text(usual * UNITS[unit])
+    return f"looks like {unit}: {rows}; if rows are {apart} apart, write time[{unit}] in the header"
 
 
 def _jitter(stamps: FloatArray, steps: FloatArray, usual: float) -> float:

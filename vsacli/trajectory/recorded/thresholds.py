@@ -15,9 +15,6 @@ LONGEST_STEP = 0.5
 SHORTEST_STEP = 2e-6
 """Median step, s, below which they are hardly seconds either: no joint is recorded at 500 kHz."""
 
-USUAL_STEPS = (1e-5, 0.2)
-"""Steps, s, that a recording has: 5 Hz to 100 kHz. The first unit with which steps are such is proposed."""
-
 ENOUGH_ROWS = 50
 """Rows below which steps of seconds may have been written by hand."""
 

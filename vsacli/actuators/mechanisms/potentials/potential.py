@@ -11,17 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.mechanism import Mechanism
-from vsacli.actuators.mechanisms.potentials.continuation import Branch
-from vsacli.actuators.mechanisms.potentials.level_curve import LevelCurves
+from vsacli.actuators.mechanisms.potentials.continuation import Branch, LevelCurves
 from vsacli.actuators.mechanisms.potentials.potential_energy import (
     ACCELERATIONS,
     RESERVED,
     PotentialEnergy,
+    PotentialState,
     read_energy,
 )
-from vsacli.actuators.mechanisms.potentials.potential_state import PotentialState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem

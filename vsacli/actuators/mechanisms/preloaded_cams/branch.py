@@ -1,19 +1,18 @@
 """The branch of a preloaded cam: the monotone piece of the stiffness that reaches the largest pretension.
 
-At a given torque the deflection grows while the pretension falls, as long as the stiffness is positive. The
-branch begins at the largest pretension and ends at the first of four: a fold, where the stiffness turns
-around; the peak of the torque, where it is zero; the smallest pretension; the end of the profile. Each of
-them is a fixed curve over deflection and torque, so that which one it is, and where, depends on the torque
-alone: `branch_map` finds it out once.
+A map of it over the torque, made once, says which end it has where, and gives first guesses of both.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift, LinearInTorque
+from vsacli.actuators.pairs.bracketing import bracketed_root
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.compute.control_flow import look_up
 
 PRETENSION, FOLD, PEAK, DOMAIN = range(4)
@@ -71,3 +70,225 @@ class Branch(NamedTuple):
         x = root - start
         outer, inner = (a + x * (b + x * (c + x * d)) for a, b, c, d in (cubics[:4], cubics[4:]))
         return Ends(root * outer, root * inner, end, sign)
+
+
+SHARES = np.concatenate((np.geomspace(1e-9, 0.01, 150, endpoint=False), np.linspace(0.01, 1, 800)))
+"""Shares of the domain at which curves are looked at; a fitted profile has some dozen features."""
+
+FIRST_CELLS = 32
+"""Cells of the torque on either side of rest that the map begins with."""
+
+GUESS_RTOL = 1e-5
+"""Relative error of a deflection with which a cell is content: two Newton steps leave rounding of it."""
+
+MAX_HALVINGS = 36
+"""Times that cells are halved: where the branch jumps to another end, and where a curve turns around."""
+
+MAX_SLOPE_SUM = 10.0
+"""Slopes at both ends of a cell, over its height and width, beyond which no cubic follows the curve."""
+
+AT_REST = 1e-4
+"""Share of the largest cube root of the torque at which the limit at rest is taken."""
+
+LiftOf = Callable[[FloatArray], Lift]
+
+
+def map_branch(
+    lift: LiftOf, domain: tuple[float, float], k: float, pretension: tuple[float, float]
+) -> Branch:
+    """The branch of a cam.
+
+    Args:
+        lift: over deflections from rest, which is the minimum.
+        domain: least and largest deflection from rest.
+        k: of the spring, N/m.
+        pretension: smallest and largest, m.
+    """
+    sides = _Side(lift, domain[1], k, pretension), _Side(_mirrored(lift), -domain[0], k, pretension)
+    symmetric = domain[0] == -domain[1] and all(map(np.array_equal, *(side.lift_at_nodes for side in sides)))
+    above = sides[0].nodes()
+    below = above if symmetric else sides[1].nodes()
+    parts = below.mirrored().cells(), above.cells()
+    cells = Cells(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
+    return Branch(cells, (-sides[1].largest_torque, sides[0].largest_torque))
+
+
+def _mirrored(lift: LiftOf) -> LiftOf:
+    """That of the cam turned around."""
+    return lambda phi: lift(-phi).mirrored()
+
+
+class _Nodes(NamedTuple):
+    """Ends of the branch at ascending torques, as in `Cells`, with slopes; arrays (nodes,)."""
+
+    root: FloatArray
+    outer: FloatArray
+    outer_slope: FloatArray
+    inner: FloatArray
+    inner_slope: FloatArray
+    end: FloatArray
+    sign: FloatArray
+
+    def mirrored(self) -> _Nodes:
+        """Those of the cam turned around."""
+        turned = self.take(slice(None, None, -1))
+        return turned._replace(
+            root=-turned.root, outer_slope=-turned.outer_slope, inner_slope=-turned.inner_slope
+        )
+
+    def take(self, chosen: IndexArray | slice) -> _Nodes:
+        """Some of the nodes."""
+        return _Nodes(*(values[chosen] for values in self))
+
+    def merged(self, others: _Nodes) -> _Nodes:
+        """These and others."""
+        joined = _Nodes(*map(np.concatenate, zip(self, others, strict=True)))
+        return joined.take(np.argsort(joined.root))
+
+    def misses(self, middle: _Nodes) -> BoolArray:
+        """Where the branch ends differently within a cell, or cubics miss its ends in the middle."""
+        differ: BoolArray = (np.diff(self.end) != 0) | (np.diff(self.sign) != 0)
+        width = np.diff(self.root)
+        for values, slope, wanted in (
+            (self.outer, self.outer_slope, middle.outer),
+            (self.inner, self.inner_slope, middle.inner),
+        ):
+            a, b, c, d = _hermite(width, values, slope)
+            guess = a + width / 2 * (b + width / 2 * (c + width / 2 * d))
+            differ |= ~(np.abs(guess - wanted) <= GUESS_RTOL * np.abs(wanted))
+        return differ
+
+    def cells(self) -> Cells:
+        """Cubics between the nodes; each cell has the kind of end of its node that is nearer to rest."""
+        width = np.diff(self.root)
+        outer = _hermite(width, self.outer, self.outer_slope)
+        inner = _hermite(width, self.inner, self.inner_slope)
+        nearer = slice(1, None) if self.root[0] < 0 else slice(None, -1)
+        return Cells(self.root[:-1], outer, inner, self.end[nearer], self.sign[nearer])
+
+
+def _hermite(width: FloatArray, values: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Coefficients of cubics with these values and slopes, of lines where it is too steep; (4, cells)."""
+    mean, first, last = np.diff(values) / width, slopes[:-1], slopes[1:]
+    usable = np.abs(first) + np.abs(last) <= MAX_SLOPE_SUM * np.abs(values).max() / width
+    first, last = np.where(usable, first, mean), np.where(usable, last, mean)
+    quadratic, cubic = (3 * mean - 2 * first - last) / width, (first + last - 2 * mean) / width**2
+    return np.stack((values[:-1], first, quadratic, cubic))
+
+
+class _Curve:
+    """Where a function of deflection and torque is zero."""
+
+    def __init__(self, lift: LiftOf, function: Callable[[Lift], LinearInTorque]) -> None:
+        self._lift, self._function = lift, function
+
+    def __call__(self, phi: FloatArray) -> LinearInTorque:
+        return self._function(self._lift(phi))
+
+    def root(self, low: FloatArray, high: FloatArray, tau_e: FloatArray) -> FloatArray:
+        """Deflection on the curve between two others."""
+        return bracketed_root(lambda phi, tau_e: self(phi).at(tau_e), low, high, (tau_e,))
+
+    def slope(self, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
+        """Derivative of the deflection over the torque along the curve; infinite where that turns around."""
+        here = self(phi)
+        with np.errstate(all="ignore"):
+            return -here.b / here.slope(tau_e)
+
+    def turns(self, phi: FloatArray) -> FloatArray:
+        """Deflections strictly between others at which the torque turns around along the curve."""
+
+        def turning(phi: FloatArray) -> FloatArray:
+            here = self(phi)
+            return here.a_slope * here.b - here.a * here.b_slope
+
+        sign = np.sign(turning(phi))
+        turn = np.flatnonzero(sign[:-1] * sign[1:] < 0)
+        return bracketed_root(turning, phi[turn], phi[turn + 1])
+
+
+class _Side:
+    """The cam on one side of rest: positive torques at positive deflections."""
+
+    def __init__(self, lift: LiftOf, end: float, k: float, pretension: tuple[float, float]) -> None:
+        low, high = pretension
+        self._held = _Curve(lift, lambda lift: lift.held(k, high))
+        self._turning = _Curve(lift, lambda lift: lift.turning(k))
+        self._ends = {
+            PRETENSION: _Curve(lift, lambda lift: lift.held(k, low)),
+            FOLD: self._turning,
+            PEAK: _Curve(lift, lambda lift: lift.rising(k)),
+        }
+        phi = end * SHARES
+        self.lift_at_nodes = lift(phi)
+        turns = [curve.turns(phi) for curve in (self._held, *self._ends.values())]
+        self._phi = np.unique(np.concatenate((phi, *turns)))
+        self._at_nodes = {end: curve(self._phi) for end, curve in self._ends.items()}
+        held = self._held(self._phi)
+        falling = np.flatnonzero(held.a_slope <= 0)
+        count = falling[0] + 1 if falling.size else self._phi.size
+        self._outer_phi = np.append(0.0, self._phi[:count])
+        self._outer_torque = np.maximum.accumulate(np.append(0.0, held.a[:count]))
+        self.largest_torque = float(self._outer_torque[-1])
+
+    def nodes(self) -> _Nodes:
+        """Nodes so dense that cubics between them are good first guesses."""
+        largest = np.cbrt(self.largest_torque)
+        at_rest = self._at_rest(self._at(np.array([AT_REST * largest])))
+        nodes = at_rest.merged(self._at(np.linspace(0, largest, FIRST_CELLS + 1)[1:]))
+        for _ in range(MAX_HALVINGS):
+            middle = self._at((nodes.root[:-1] + nodes.root[1:]) / 2)
+            wrong = np.flatnonzero(nodes.misses(middle))
+            if not wrong.size:
+                break
+            nodes = nodes.merged(middle.take(wrong))
+        return nodes
+
+    def _at_rest(self, near: _Nodes) -> _Nodes:
+        """The node without torque, from one next to it.
+
+        There the deflection grows as the torque, only to a fold as its cube root.
+        """
+        fold, zero = near.end == FOLD, np.zeros(1)
+        inner, slope = (np.where(fold, values, 0.0) for values in (near.inner, near.inner_slope))
+        return near._replace(root=zero, outer=zero, outer_slope=zero, inner=inner, inner_slope=slope)
+
+    def _at(self, root: FloatArray) -> _Nodes:
+        """Both ends of the branch at torques whose cube roots are given."""
+        tau_e = np.minimum(root**3, self.largest_torque)
+        node = np.clip(np.searchsorted(self._outer_torque, tau_e), 1, self._outer_phi.size - 1)
+        outer = self._held.root(self._outer_phi[node - 1], self._outer_phi[node], tau_e)
+        inner, end = self._inner_ends(tau_e, outer)
+        slope = np.zeros_like(inner)
+        for which, curve in self._ends.items():
+            slope = np.where(end == which, curve.slope(inner, tau_e), slope)
+        sign = np.where(self._turning(outer).at(tau_e) < 0, -1.0, 1.0)
+        return _Nodes(
+            root,
+            *_over_root(root, outer, self._held.slope(outer, tau_e)),
+            *_over_root(root, inner, slope),
+            end.astype(float),
+            sign,
+        )
+
+    def _inner_ends(self, tau_e: FloatArray, outer: FloatArray) -> tuple[FloatArray, IndexArray]:
+        """The first end of the branch beyond the outer one, and which it is."""
+        inner, end = np.full_like(outer, self._phi[-1]), np.full(outer.shape, DOMAIN)
+        beyond = self._phi > outer[:, None]
+        for which, curve in self._ends.items():
+            of_nodes = self._at_nodes[which]
+            positive = of_nodes.a + of_nodes.b * tau_e[:, None] > 0
+            changed = beyond & (positive != (curve(outer).at(tau_e) > 0)[:, None])
+            here = np.flatnonzero(changed.any(axis=1))
+            node = np.argmax(changed[here], axis=1)
+            before = np.maximum(self._phi[np.maximum(node - 1, 0)], outer[here])
+            found = curve.root(before, self._phi[node], tau_e[here])
+            first = found < inner[here]
+            inner[here[first]], end[here[first]] = found[first], which
+        return inner, end
+
+
+def _over_root(root: FloatArray, phi: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Deflections over the cube root of the torque, and derivatives over that, from those over the torque."""
+    ratio = phi / root
+    return ratio, (3 * root * root * slope - ratio) / root

@@ -1,23 +1,155 @@
-"""A cam whose profile is given by points: MACCEPA 2.0, DLR VS-Joint and QA-Joint."""
+"""A cam with a profile given by points, a smooth lift, one minimum: MACCEPA 2.0, DLR VS-Joint, QA-Joint."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from vsacli.actuators.laws.spline_curve import SplineCurve, spline_curve, spline_knots, times_deflection
 from vsacli.actuators.laws.table import SHAPE_TOLERANCE, misfit_warnings, worst_misfit, wrong_rows
 from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift
 from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import PreloadedCam
-from vsacli.actuators.mechanisms.preloaded_cams.profile import Profile, fit_profile
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.documents.fields import TableFile, value
 from vsacli.documents.source import Source
 from vsacli.documents.table import Table
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+
+DEGREE = 4
+PIECES = (2, 4, 6, 8, 12, 16, 24)
+"""Knot spans of g that are tried; even numbers, so that those of a symmetric profile are symmetric."""
+
+ROWS_PER_PIECE = 4
+"""Points that a span needs; by trial with noise on 40 points, the criterion takes too many shorter ones."""
+
+PIECE_PENALTY = 2.0
+"""Weight of the number of pieces, in units of the usual one. By trial with noise of a ten-thousandth on 120
+points, the usual one takes too many in one draw of ten, with thirty times the fourth derivative."""
+
+FIRST_PIECES = 6
+"""Spans with which rest is looked for at first."""
+
+LEAST_CURVATURE_SHARE = 1e-3
+"""Share of its mean below which g does not fall: without curvature at rest no pretension makes it stiff."""
+
+ROUNDING_SHARE = 1e-12
+"""Share of the range of the lift below which a misfit is rounding."""
+
+
+class Profile(NamedTuple):
+    """A fitted profile.
+
+    Attributes:
+        rest: deflection of the minimum, rad (m).
+        curve: lift over the deflection from there, but for a constant.
+        misfit: of the points, (rows,).
+    """
+
+    rest: float
+    curve: SplineCurve
+    misfit: FloatArray
+
+
+def fit_profile(deflection: FloatArray, lift: FloatArray) -> Profile:
+    """Fit lifts (rows,) at ascending deflections (rows,), the lowest neither first nor last."""
+    most = max(PIECES[0], len(lift) // ROWS_PER_PIECE)
+    if _is_symmetric(deflection, lift):
+        rest, pieces = 0.0, _pieces(deflection, lift, most)
+    else:
+        lowest = float(deflection[np.argmin(lift)])
+        near = lowest + _rest(deflection - lowest, lift, min(FIRST_PIECES, most))
+        pieces = _pieces(deflection - near, lift, most)
+        rest = near + _rest(deflection - near, lift, pieces)
+    fit = _fit(deflection - rest, lift, pieces)
+    return Profile(rest, fit.curve, fit.misfit)
+
+
+def _pieces(phi: FloatArray, lift: FloatArray, most: int) -> int:
+    """As many as the points call for, over deflections from rest."""
+    counts = [pieces for pieces in PIECES if pieces <= most]
+    return min(counts, key=lambda pieces: _fit(phi, lift, pieces).criterion)
+
+
+class _Fit(NamedTuple):
+    """A curve, and the Bayesian information criterion that weighs its misfit against its pieces."""
+
+    curve: SplineCurve
+    misfit: FloatArray
+    criterion: float
+
+
+def _fit(phi: FloatArray, lift: FloatArray, pieces: int) -> _Fit:
+    """With so many pieces, over deflections from rest."""
+    knots = spline_knots(float(phi[0]), float(phi[-1]), pieces, DEGREE)
+    count = len(knots) - DEGREE - 1
+    shapes = [spline_curve(knots, weights, DEGREE, _lift) for weights in np.eye(count)]
+    columns = np.column_stack([shape(phi, 0, 0)[0] for shape in shapes])
+    weights, _ = _weights(columns, lift, _least(phi, lift))
+    if _is_symmetric(phi, lift):
+        weights = (weights + weights[::-1]) / 2
+    curve = spline_curve(knots, weights, DEGREE, _lift)
+    misfit = lift - curve(phi, 0, 0)[0]
+    misfit -= (misfit.min() + misfit.max()) / 2
+    size = np.sum(misfit**2) / len(lift) + (ROUNDING_SHARE * np.ptp(lift)) ** 2
+    criterion = len(lift) * math.log(size) + PIECE_PENALTY * count * math.log(len(lift))
+    return _Fit(curve, misfit, criterion)
+
+
+def _lift(spline: PPoly) -> PPoly:
+    return times_deflection(spline).antiderivative()
+
+
+def _least(phi: FloatArray, lift: FloatArray) -> float:
+    """The smallest g: a share of that of a parabola as high as the lift."""
+    return LEAST_CURVATURE_SHARE * 2 * float(np.ptp(lift)) / float(np.abs(phi).max()) ** 2
+
+
+def _weights(columns: FloatArray, lift: FloatArray, least: float) -> tuple[FloatArray, float]:
+    """Weights of columns, none below the least, that with a constant come closest to a lift; and how far."""
+    from scipy.optimize import nnls
+
+    level = np.ones((len(lift), 1))
+    both = np.hstack((level, -level, columns))
+    sizes = np.maximum(np.abs(both).max(axis=0), np.finfo(float).tiny)
+    excess, distance = nnls(both / sizes, lift - least * columns.sum(axis=1) - lift.min())
+    return least + (excess / sizes)[2:], distance
+
+
+def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
+    """Deflection between the neighbours of the lowest point from which the fit is best."""
+    from scipy.interpolate import PPoly
+    from scipy.optimize import minimize_scalar
+
+    knots = spline_knots(float(phi[0]), float(phi[-1]), pieces, DEGREE)
+    bases = [PPoly.from_spline((knots, weights, DEGREE)) for weights in np.eye(len(knots) - DEGREE - 1)]
+    of_first = np.column_stack([times_deflection(basis).antiderivative()(phi) for basis in bases])
+    of_rest = np.column_stack([basis.antiderivative()(phi) for basis in bases])
+    least, lowest = _least(phi, lift), int(np.argmin(lift))
+    found = minimize_scalar(
+        lambda rest: _weights(of_first - rest * of_rest, lift, least)[1],
+        bounds=(phi[lowest - 1], phi[lowest + 1]),
+        method="bounded",
+        options={"xatol": float(np.finfo(float).eps * np.ptp(phi))},
+    )
+    return float(found.x)
+
+
+def _is_symmetric(phi: FloatArray, lift: FloatArray) -> bool:
+    """Whether lifts are those of the opposite deflections."""
+    return all(
+        np.allclose(column, other[::-1], rtol=0, atol=ROUNDING_SHARE * float(np.ptp(column)))
+        for column, other in ((phi, -phi), (lift, lift))
+    )
+
 
 LARGEST_MISFIT = 0.03
 """Share of the range of the lift by which a curve may miss a point; beyond, it is that of another cam."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.state import SpringState
+from vsacli.actuators.laws.law import SpringState
 from vsacli.base.arrays import FloatArray
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.pair import PairSolution
+from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.preloaded_cams.branch import FOLD, PEAK, PRETENSION, Branch
 from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift, LinearInTorque
 from vsacli.actuators.pairs.bracketing import bracketed_root

@@ -1,23 +1,77 @@
-"""The potential K(s) w(phi), and its closed solution where a lever stretches a spring by its turn.
-
-tau_e/sigma = g/g' gives phi whatever the setting is; then K = sigma/g' gives the setting.
-"""
+"""Levers that a spring resists by their turn, U = K(s) w(phi) in closed form: AwAS, AwAS-II, vsaUT-II."""
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.laws.state import SpringState
-from vsacli.actuators.mechanisms.mechanism import Mechanism
+from vsacli.actuators.laws.law import PairSolution, SpringState
+from vsacli.actuators.mechanisms.mechanism import Mechanism, Partials
 from vsacli.actuators.mechanisms.ratios.scales import Scale
-from vsacli.actuators.mechanisms.ratios.sine import Sine
-from vsacli.actuators.mechanisms.state import Partials
+from vsacli.base import units
 from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import FieldProblem
+from vsacli.documents.fields import NON_ZERO, POSITIVE, check_fields, interval, number
+from vsacli.documents.source import Source
+
+
+@dataclass(frozen=True)
+class Sine:
+    """tau = (k/ratio) sin(ratio phi), up to its maximum at ratio phi = pi/2: it softens."""
+
+    k: float = number(units.STIFFNESS, "stiffness at rest", check=POSITIVE)
+    ratio: float = number(
+        units.DIMENSIONLESS, "angle of the sine over the deflection", check=POSITIVE, default=2.0
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """None."""
+        return ()
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """None."""
+        return ()
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """Deflections up to the largest torque."""
+        end = math.pi / 2 / self.ratio
+        return (-end, end)
+
+    @property
+    def torque_range(self) -> tuple[float, float]:
+        """The largest torque to either side."""
+        return (-self.k / self.ratio, self.k / self.ratio)
+
+    def deflection(self, torque: FloatArray) -> FloatArray:
+        """The inverse, asin(ratio torque/k)/ratio."""
+        return np.arcsin(torque * (self.ratio / self.k)) / self.ratio
+
+    def deflection_at(self, quotient: FloatArray) -> FloatArray:
+        """Where torque over stiffness, tan(ratio phi)/ratio, has a value."""
+        return np.arctan(self.ratio * quotient) / self.ratio
+
+    def state(self, phi: FloatArray) -> SpringState:
+        """Torque and three derivatives."""
+        return self.energy_and_state(phi)[1]
+
+    def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
+        """Energy 2 k/ratio^2 sin^2(ratio phi/2), torque and three derivatives."""
+        turn, squared = self.ratio * phi, self.ratio * self.ratio
+        half = np.sin(turn / 2)
+        tau, sigma = self.k / self.ratio * np.sin(turn), self.k * np.cos(turn)
+        energy: FloatArray = 2 * self.k / squared * half * half
+        return energy, SpringState(tau, sigma, -squared * tau, -squared * sigma)
+
 
 TURN = Sine(k=2.0, ratio=2.0)
 """g = sin 2phi, of w = sin^2(phi)."""
@@ -92,3 +146,104 @@ class SineRatio(Mechanism):
             phi_1=np.arctan2(2 * tau_e, demand) / 2,
             phi_2=self.setting(np.hypot(demand, load) / 2),
         )
+
+
+@dataclass(frozen=True)
+class Awas(SineRatio):
+    """Two springs that pull an arm of length r = lead theta_2 from either side: U = k r^2 sin^2(phi).
+
+    Jafari, Tsagarakis, Vanderborght & Caldwell, IROS 2010.
+    """
+
+    k: float = number(units.LINEAR_STIFFNESS, "stiffness of either spring", check=POSITIVE)
+    arm: tuple[float, float] = interval(units.LENGTH, "shortest and longest arm, above zero")
+    lead: float = number(units.LEAD, "length that the arm gains per theta_2", check=NON_ZERO)
+
+    def __post_init__(self) -> None:
+        problems = []
+        if not 0 < self.arm[0] < self.arm[1] < np.inf:
+            problems.append(FieldProblem(("arm",), "must have two ends above zero, the shorter one first"))
+        check_fields(self, *problems)
+
+    @classmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
+        """Arms from 5 to 12 cm."""
+        return {"k": 50000, "arm": [0.05, 0.12], "lead": 0.01}
+
+    @property
+    def setting_range(self) -> tuple[float, float]:
+        """theta_2 at the ends of the arm."""
+        low, high = sorted(arm / self.lead for arm in self.arm)
+        return low, high
+
+    @property
+    def scale_range(self) -> tuple[float, float]:
+        """K at the ends of the arm."""
+        shortest, longest = self.arm
+        return self.k * shortest * shortest, self.k * longest * longest
+
+    def scale(self, s: FloatArray) -> Scale:
+        """K = k r^2."""
+        curvature = self.k * self.lead * self.lead
+        return Scale(curvature * s * s, 2 * curvature * s, np.full_like(s, 2 * curvature))
+
+    def setting(self, scale: FloatArray) -> FloatArray:
+        """The arm is sqrt(K/k)."""
+        return np.sqrt(scale / self.k) / self.lead
+
+
+@dataclass(frozen=True)
+class Lever(SineRatio):
+    """A spring at one end of a lever, the link at the other, the pivot between them at p = lead theta_2.
+
+    The lever of length L multiplies what the spring gives by p/(L - p): U = k/2 L^2 (p/(L - p))^2 sin^2(phi).
+    Jafari, Tsagarakis & Caldwell, ICRA 2011 (AwAS-II); Groothuis, Rusticelli, Zucchelli, Stramigioli &
+    Carloni, IEEE/ASME Transactions on Mechatronics 2014 (vsaUT-II).
+    """
+
+    k: float = number(units.LINEAR_STIFFNESS, "stiffness of the spring", check=POSITIVE)
+    length: float = number(units.LENGTH, "length L of the lever, from the spring to the link", check=POSITIVE)
+    pivot: tuple[float, float] = interval(
+        units.LENGTH, "range of the pivot's distance p from the spring, above zero and below the length"
+    )
+    lead: float = number(units.LEAD, "way of the pivot per theta_2", check=NON_ZERO)
+
+    def __post_init__(self) -> None:
+        problems = []
+        if not 0 < self.pivot[0] < self.pivot[1] < self.length:
+            reason = (
+                f"must have two ends between zero and the length {self.length:g} m, the smaller one first"
+            )
+            problems.append(FieldProblem(("pivot",), reason))
+        check_fields(self, *problems)
+
+    @classmethod
+    def example(cls, joint_type: str) -> dict[str, Any]:  # noqa: ARG003
+        """A pivot that moves over half of a lever of 10 cm."""
+        return {"k": 20000, "length": 0.1, "pivot": [0.03, 0.08], "lead": 0.01}
+
+    @property
+    def setting_range(self) -> tuple[float, float]:
+        """theta_2 at the ends of the pivot's way."""
+        low, high = sorted(pivot / self.lead for pivot in self.pivot)
+        return low, high
+
+    @property
+    def scale_range(self) -> tuple[float, float]:
+        """K at the ends of the pivot's way."""
+        low, high = (float(self.scale(np.array(pivot / self.lead)).value) for pivot in self.pivot)
+        return low, high
+
+    def scale(self, s: FloatArray) -> Scale:
+        """K = k/2 (L x)^2 with x = p/(L - p)."""
+        rest = self.length - self.lead * s
+        ratio, slope = self.lead * s / rest, self.length * self.lead / (rest * rest)
+        factor = self.k * self.length * self.length
+        # x'' is 2 x' lead/(L - p)
+        bent = slope * slope + 2 * self.lead * ratio * slope / rest
+        return Scale(factor / 2 * ratio * ratio, factor * ratio * slope, factor * bent)
+
+    def setting(self, scale: FloatArray) -> FloatArray:
+        """The pivot is at L x/(1 + x)."""
+        ratio = np.sqrt(2 * scale / self.k) / self.length
+        return self.length * ratio / (1 + ratio) / self.lead

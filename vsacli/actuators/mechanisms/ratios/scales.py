@@ -1,23 +1,70 @@
-"""How much a setting scales the springs: K(s) > 0 with two derivatives, monotone over the settings."""
+"""Scales of springs by a setting: K(s) > 0 with two derivatives, monotone, in closed form or measured."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.mechanisms.ratios.increasing_root import increasing_root
 from vsacli.base import units
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.lazy import LazyRegistry
-from vsacli.compute.control_flow import Values
-from vsacli.documents.fields import NON_ZERO, check_fields, number
+from vsacli.compute.control_flow import Values, look_up, repeat
+from vsacli.compute.rounding import OfRounding
+from vsacli.documents.fields import NON_ZERO, TableFile, check_fields, number, value
 from vsacli.documents.source import Source
+from vsacli.documents.table import Table
+
+Function = Callable[..., Values]
+"""Value, slope and curvature at (x, *constants), arrays of one shape."""
+
+MAX_STEPS = 100
+"""Halvings leave no digit after 60; between them Halley's method takes a handful of steps."""
+
+SHORT_STEP = OfRounding(1e-5, power=1 / 3)
+"""Step, relative to x, after which the third power of it is rounding."""
+
+LEFT_ERROR = OfRounding(1e-17)
+"""Error after a step, relative to x, that is below rounding: Newton's step times Halley's correction squared.
+Where the slope vanishes, as next to a fold, steps that are short enough elsewhere are not."""
+
+
+def increasing_root(
+    function: Function, low: FloatArray, high: FloatArray, start: FloatArray, constants: Values
+) -> FloatArray:
+    """The x between `low` and `high` at which a function is zero, to rounding; an end if it has no zero.
+
+    Args:
+        function: what increases between both.
+        low: the smaller ends, (samples,).
+        high: the larger ends.
+        start: first guesses; the middle is taken where they do not lie between both.
+        constants: what else the function takes, arrays (samples,).
+    """
+
+    def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+        x, low, high = state
+        value, slope, curvature = function(x, *constants)
+        newton = value / slope
+        correction = newton * curvature / (2 * slope)
+        target = x - newton / np.minimum(np.maximum(1 - correction, 0.5), 2)
+        low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
+        inside = (low <= target) & (target <= high)
+        following = np.where(inside, target, (low + high) / 2)
+        size = np.abs(following)
+        error = np.abs(newton) * (correction * correction)
+        short = (np.abs(newton) <= SHORT_STEP * size) & (error <= LEFT_ERROR * size)
+        return (following, low, high), inside & short | ~(low < high)
+
+    with np.errstate(all="ignore"):  # without slope, a step leads nowhere
+        first = np.where((low < start) & (start < high), start, (low + high) / 2)
+        return repeat(step, (first, low, high), constants, MAX_STEPS)[0]
+
 
 SETTINGS = 2001
 """Points of the range at which the scale is looked at; neither a power nor four of them turns faster."""
@@ -122,7 +169,51 @@ SCALES = LazyRegistry(
     {
         "power": "vsacli.actuators.mechanisms.ratios.scales:Power",
         "polynomial": "vsacli.actuators.mechanisms.ratios.scales:PolynomialScale",
-        "table": "vsacli.actuators.mechanisms.ratios.measured_scale:MeasuredScale",
+        "table": "vsacli.actuators.mechanisms.ratios.scales:MeasuredScale",
     }
 )
 """Scales by the name they have in a robot file."""
+
+
+MIN_ROWS = 4
+"""A cubic needs four."""
+
+
+@dataclass(frozen=True)
+class MeasuredScale(ScaleLaw):
+    """The cubic spline through settings and scales; it must rise or fall throughout, noise must not show."""
+
+    file: Table = value(
+        TableFile(("setting", "scale")),
+        "CSV file with the header setting,scale, theta_2 in rad (m), path relative to the robot file",
+    )
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """The table."""
+        return (self.file.source,)
+
+    @cached_property
+    def _pieces(self) -> tuple[FloatArray, ...]:
+        """Where each cubic begins, and its coefficients from the constant on, arrays (pieces,)."""
+        from scipy.interpolate import CubicSpline
+
+        settings, scales = self.file.values.T
+        return (settings[:-1], *CubicSpline(settings, scales).c[::-1])
+
+    def at(self, s: FloatArray) -> Scale:
+        """The spline with its derivatives."""
+        piece = np.searchsorted(self._pieces[0][1:], s, side="right")
+        start, a, b, c, d = look_up(self._pieces, piece)
+        x = s - start
+        return Scale(a + x * (b + x * (c + x * d)), b + x * (2 * c + x * (3 * d)), 2 * c + 6 * d * x)
+
+    def problems(self, settings: tuple[float, float]) -> Iterator[str]:
+        """A table that is too short or does not reach so far, too."""
+        rows = self.file.values[:, 0]
+        if len(rows) < MIN_ROWS or not (np.diff(rows) > 0).all():
+            yield f"the table needs {MIN_ROWS} rows or more, whose settings increase"
+        elif settings[0] < rows[0] or rows[-1] < settings[1]:
+            yield f"the table goes from {rows[0]:g} to {rows[-1]:g}, `setting` farther"
+        else:
+            yield from super().problems(settings)

@@ -9,13 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws import LAWS, SpringLaw
-from vsacli.actuators.laws.pair import PairSolution
-from vsacli.actuators.mechanisms.mechanism import Mechanism
-from vsacli.actuators.mechanisms.ratios.increasing_root import increasing_root
-from vsacli.actuators.mechanisms.ratios.ratio import ratio_partials
-from vsacli.actuators.mechanisms.ratios.scales import SCALES, ScaleLaw
-from vsacli.actuators.mechanisms.ratios.sine import Sine
-from vsacli.actuators.mechanisms.state import Partials
+from vsacli.actuators.laws.law import PairSolution
+from vsacli.actuators.mechanisms.mechanism import Mechanism, Partials
+from vsacli.actuators.mechanisms.ratios.ratio import Sine, ratio_partials
+from vsacli.actuators.mechanisms.ratios.scales import SCALES, ScaleLaw, increasing_root
 from vsacli.actuators.pairs.bracketing import bracketed_root
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -25,7 +22,7 @@ from vsacli.compute.control_flow import Values
 from vsacli.documents.fields import OneOf, check_fields, interval, value
 from vsacli.documents.source import Source
 
-TORQUES = LazyRegistry({**LAWS.homes, "sine": "vsacli.actuators.mechanisms.ratios.sine:Sine"})
+TORQUES = LazyRegistry({**LAWS.homes, "sine": "vsacli.actuators.mechanisms.ratios.ratio:Sine"})
 """Torques by the name they have in a robot file: the laws of springs, and one that softens."""
 
 DEFLECTIONS = np.geomspace(1e-6, 1.0, 4000)

@@ -1,32 +1,111 @@
-"""A plan of an experiment: the excitation by which the numbers of a robot can be told best."""
+"""A plan of an experiment: the excitation by which the numbers of a robot can be told best.
+
+The search takes the best of random members of all families, then improves it by an evolution strategy.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vsacli.analysis.clearances import clearances
+from vsacli.analysis.minima import clearances
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.variables import Block
 from vsacli.documents.fields import LARGEST
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.excitation.allowed import MARGIN, Allowed, allowed
-from vsacli.studies.identification.excitation.design import Design
-from vsacli.studies.identification.excitation.feasible import Feasible, feasible, obstacle, watched
-from vsacli.studies.identification.excitation.information import Information
-from vsacli.studies.identification.excitation.plan_report import ActiveLimit, Excitation, Usefulness
-from vsacli.studies.identification.excitation.predicted_errors import (
+from vsacli.studies.identification.excitation.family import (
+    MARGIN,
+    Allowed,
+    Design,
+    Member,
+    allowed,
+    feasible,
+    obstacle,
+    watched,
+)
+from vsacli.studies.identification.excitation.fisher import (
     USUAL_NOISE,
+    Information,
     Noise,
     executed,
     predicted_errors,
 )
-from vsacli.studies.identification.excitation.search import STARTS, STEPS, Found, search
-from vsacli.studies.remedies.acceptance import ImpossibleError
+from vsacli.studies.identification.excitation.plan_report import ActiveLimit, Excitation, Usefulness
+from vsacli.studies.search.acceptance import ImpossibleError
 from vsacli.trajectory.trajectory import Trajectory
+
+STARTS = 60
+"""Random members, in turn of each family."""
+
+STEPS = 540
+"""Of the strategy. On the paper's arm these made standard errors 30 % smaller than those of the best start,
+on average; 240 steps left them 10 % larger, and searches with other seeds differ by 5 %."""
+
+FIRST_STEP = 0.5
+"""Standard deviation of the first change, of numbers whose own is 1."""
+
+GROWTH = 1.5
+"""Factor of the next change after a success; after a failure its fourth root less: the one-fifth rule."""
+
+LEAST_STEP = 0.02
+"""Below, changes are lost; the strategy begins anew with large ones."""
+
+
+def search(
+    designs: Sequence[Design],
+    value: Callable[[Member], float],
+    seed: int,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Member | None:
+    """The best member of some families that is found; None if no member is feasible.
+
+    The (1+1) evolution strategy with the one-fifth success rule (H.-G. Beyer, H.-P. Schwefel, "Evolution
+    strategies", Natural Computing 1 (2002)), each step of one signal of one joint. With as many trials from
+    the same starts, `scipy.optimize.differential_evolution` left standard errors 25 % larger with the paper's
+    arm and 6 % with one joint, the same with two; `dual_annealing` hardly improved the starts.
+
+    Args:
+        designs: the families.
+        value: of a member, the larger the better.
+        seed: of the random numbers; the same one finds the same.
+        progress: is told how many further members were tried.
+    """
+    random = np.random.default_rng(seed)
+    best: Member | None = None
+    for start in range(STARTS):
+        design = designs[start % len(designs)]
+        best = _better(best, design, random.standard_normal(design.shape), value) or best
+        progress(1)
+    if best is None:
+        return None
+    step, places = FIRST_STEP, np.argwhere(best.design.counts)
+    for _ in range(STEPS):
+        numbers = best.numbers.copy()
+        signal, joint = random.choice(places)
+        numbers[signal, joint] += step * random.standard_normal(numbers.shape[-1])
+        better = _better(best, best.design, numbers, value)
+        step *= GROWTH if better else GROWTH**-0.25
+        step = step if step > LEAST_STEP else FIRST_STEP
+        best = better or best
+        progress(1)
+    return best
+
+
+def _better(
+    best: Member | None, design: Design, numbers: FloatArray, value: Callable[[Member], float]
+) -> Member | None:
+    """The member with these numbers; None if it is not feasible, or no better than the best."""
+    member = feasible(design, numbers)
+    if member is None:
+        return None
+    worth = value(member)
+    if best is not None and not worth > best.value:
+        return None
+    return member._replace(value=worth)
+
 
 FREQUENCIES = (0.05, 0.1, 0.2)
 """Of the lowest harmonics that are tried, Hz: at five harmonics motions are of 1 Hz at most, well within what
@@ -78,7 +157,11 @@ def plan_excitation(
         raise InputError.one(f"an excitation lasts at least {SHORTEST:g} s, not {duration:g} s")
     if not all(each is None or 0 <= each <= LARGEST for each in noise):
         raise InputError.one(f"the noise of sensors must lie between 0 and {LARGEST:g}")
-    bounds = allowed(robot, None if own is None else _middle(executed(robot, own).q))
+    middle = None
+    if own is not None:
+        q = executed(robot, own).q
+        middle = np.asarray((q.min(axis=0) + q.max(axis=0)) / 2)
+    bounds = allowed(robot, middle)
     designs = [Design(robot, bounds, duration, each) for each in FREQUENCIES if each * duration >= 1]
     information = Information(robot, [each.block for each in _examples(designs, seed)])
     found = search(designs, lambda member: information.worth(member.block), seed, progress)
@@ -86,24 +169,18 @@ def plan_excitation(
     return _excitation(found, information, own, bounds, Noise(*noise), seed)
 
 
-def _middle(q: FloatArray) -> FloatArray:
-    """Of the range of each joint, (joints,)."""
-    middle: FloatArray = (q.min(axis=0) + q.max(axis=0)) / 2
-    return middle
-
-
 TRIALS = STARTS + STEPS
 """Motions that a plan tries."""
 
 
-def _examples(designs: list[Design], seed: int) -> list[Feasible]:
+def _examples(designs: list[Design], seed: int) -> list[Member]:
     """Members of the families.
 
     Raises:
         ImpossibleError: none is feasible.
     """
     random = np.random.default_rng(seed)
-    found: list[Feasible] = []
+    found: list[Member] = []
     obstacles = set()
     for design in designs * DRAWN:
         numbers = random.standard_normal(design.shape)
@@ -120,7 +197,7 @@ def _examples(designs: list[Design], seed: int) -> list[Feasible]:
 
 
 def _excitation(
-    found: Found,
+    found: Member,
     information: Information,
     own: Trajectory | None,
     bounds: Allowed,
@@ -128,7 +205,7 @@ def _excitation(
     seed: int,
 ) -> Excitation:
     """What was found, checked by a run of its own."""
-    design, trajectory, block = found.design, found.feasible.trajectory, found.feasible.block
+    design, trajectory, block = found.design, found.trajectory, found.block
     run = Run(design.robot, trajectory)
     for _ in run:
         pass

@@ -1,22 +1,28 @@
-"""A planned excitation and what is known of it, as text and as JSON."""
+"""A planned excitation and what is known of it, as text, as JSON and as a trajectory file with comments."""
 
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from vsacli.analysis.clearances import MARGIN as CORRIDOR
 from vsacli.analysis.joint_report import Worst
+from vsacli.analysis.minima import MARGIN as CORRIDOR
 from vsacli.analysis.report import Report
 from vsacli.base.flags import Flag
 from vsacli.base.json_records import Published, named
+from vsacli.base.signals import COMMANDED, POSITION
 from vsacli.base.tables import aligned
-from vsacli.base.texts import sentence
+from vsacli.base.texts import one_line, sentence
+from vsacli.base.version import __version__
+from vsacli.documents.commented import WIDTH, commented_document
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.excitation.allowed import MARGIN
-from vsacli.studies.identification.excitation.predicted_errors import Told
+from vsacli.studies.identification.excitation.family import MARGIN, RATE
+from vsacli.studies.identification.excitation.fisher import Told
+from vsacli.studies.search.fixed_text import formula
+from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -150,3 +156,36 @@ def _share(number: Told) -> str:
         return "-"
     share = number.standard_error / abs(number.value)
     return f"{100 * share:.2g} %" if share < 1 else "> 100 %"
+
+
+def excitation_text(excitation: Excitation) -> str:
+    """The trajectory file of a planned excitation, as text."""
+    trajectory = excitation.trajectory
+    profiles = {POSITION.key: trajectory.position}
+    profiles |= {
+        key: profile
+        for key, profile in trajectory.commanded.items()
+        if trajectory.chosen(key).any() and COMMANDED[key].device is None
+    }
+    values: dict[str, Any] = {
+        "name": trajectory.name,
+        "duration": trajectory.duration,
+        "rate": RATE,
+    }
+    values |= {key: formula(profile) for key, profile in profiles.items()}
+    head = [part for line in _head(excitation) for part in textwrap.wrap(one_line(line), WIDTH - 2)]
+    return commented_document(trajectory_file.FORMAT, trajectory_file.OF_ANY_ROBOT, values, head)
+
+
+def _head(excitation: Excitation) -> Iterator[str]:
+    """What reads the file should know."""
+    names = ", ".join(excitation.robot.joint_names)
+    yield (
+        f"Excitation to identify {excitation.robot.name} by; planned by vsacli {__version__}, seed "
+        f"{excitation.seed}. Lists have an entry for each joint: {names}."
+    )
+    yield (
+        "The plan knows the limits of the robot and nothing of what stands about it: look at the motion, and "
+        "try it slowly, before the robot moves."
+    )
+    yield from excitation.assumptions

@@ -1,0 +1,81 @@
+"""Units in headers, against sizes worked out by hand."""
+
+import math
+
+import pytest
+
+from vsacli.base.errors import InputError
+from vsacli.base.variables import VARIABLES
+from vsacli.documents.expression import conversion_factor
+
+DEG = math.pi / 180
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "factor"),
+    [
+        ("rad", "rad", 1),
+        ("deg", "rad", DEG),
+        ("°", "rad", DEG),
+        ("deg/s^2", "rad/s^2", DEG),
+        ("deg/s²", "rad/s^2", DEG),
+        ("deg/s2", "rad/s^2", DEG),
+        ("deg/s/s", "rad/s^2", DEG),
+        ("rev/min", "rad/s", 2 * math.pi / 60),
+        ("rpm", "rad/s", 2 * math.pi / 60),
+        ("g cm^2", "kg m^2", 1e-7),
+        ("g·cm²", "kg m^2", 1e-7),
+        ("N m s^2", "kg m^2", 1),
+        ("mNm/A", "N m/A", 1e-3),
+        ("mΩ", "ohm", 1e-3),
+        ("Ω", "ohm", 1),
+        ("V/A", "ohm", 1),
+        ("ms", "s", 1e-3),
+        ("mm", "m", 1e-3),
+        ("mm/ms^2", "m/s^2", 1e3),
+        ("N m/rad", "N m/rad", 1),
+        ("Nm/rad", "N m/rad", 1),
+        ("N.m/rad", "N m/rad", 1),
+        ("N*m/rad", "N m/rad", 1),
+        ("N·m/(rad·s)", "N m/(rad s)", 1),
+        ("N m/rad/s", "N m/(rad s)", 1),
+        ("N m/deg", "N m/rad", 1 / DEG),
+        ("Nmm/deg", "N m/rad", 1e-3 / DEG),
+        ("N/mm", "N/m", 1e3),
+        ("(N m)/(rad s^2)", "N m/(rad s^2)", 1),
+    ],
+)
+def test_factor(text, expected, factor):
+    assert conversion_factor(text, expected) == pytest.approx(factor, rel=1e-15)
+
+
+@pytest.mark.parametrize("name", ["time", "q", "d4q", "stiffness", "ddstiffness", "wrench", "ddwrench"])
+@pytest.mark.parametrize("joint", ["revolute", "prismatic"])
+def test_every_unit_of_the_tool_is_understood(name, joint):
+    quantity = VARIABLES[name].quantity
+    unit = quantity.revolute if joint == "revolute" else quantity.prismatic
+    assert conversion_factor(unit, unit) == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", " ", "-", "grad", "rad/", "/rad", "(rad", "rad)", "rad^", "rad^-1", "rad^9", "rad**2"),
+        *("N m/rad s", "2 rad", "(" * 1000 + "rad", "rad rad " * 10000),
+    ],
+)
+def test_what_is_no_unit_is_refused_with_those_that_are(text):
+    with pytest.raises(
+        InputError, match=r"is not understood; expected rad or the like, made of rad, deg, rev, rpm, m,"
+    ):
+        conversion_factor(text, "rad")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"), [("m", "rad"), ("N m", "N m/rad"), ("rad/s", "rad"), ("s", "rad")]
+)
+def test_another_kind_of_unit_is_refused(text, expected):
+    with pytest.raises(
+        InputError, match=rf"the unit \[{text}\] is one of something else; expected {expected}"
+    ):
+        conversion_factor(text, expected)

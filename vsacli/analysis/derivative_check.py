@@ -1,0 +1,407 @@
+"""The self-check of a run: results are compared with their equations, derivatives with finite differences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.reach import margin
+from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, evenly, of_joint
+from vsacli.base.flags import Flag, has
+from vsacli.base.json_records import Stored, named
+from vsacli.base.signals import COMMANDED
+from vsacli.base.variables import VARIABLES, Block
+from vsacli.compute.engine import NUMPY, Engine
+from vsacli.dynamics.balances import (
+    BALANCED,
+    BalancedDynamics,
+    balances,
+    damped_joints,
+    link_energy,
+    link_powers,
+    shaft_energy,
+    shaft_powers,
+)
+from vsacli.dynamics.inverse import block_of, usual_block
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from vsacli.dynamics.internal_motion import InternalMotions
+
+
+LADDER_BOUND = 1e-8
+"""Bound on derivative errors relative to their peak: a hundred times what rounding leaves, a millionth of
+1 %. Where differences must be taken over short steps rounding leaves more, see `ROUNDING_GAIN`."""
+
+ROUNDING_GAIN = 30.0
+"""What rounding may leave of a difference over the step h, relative to the derivative, in eps T/h.
+
+A time up to T is rounded by eps T/2, a value v by some eps v, so that a difference is off by
+eps (T v' + v)/h, which relative to the peak of v' is eps T/h, or a few times that, since v is hardly above
+T v'. For motions that are declared T/h is 4000 and the bound above is larger. Recordings have a knot a
+sample, and h must stay between knots: with 1e6 samples T/h is 5e7 and the bound 3e-7. On 34 recordings of 2
+to 30 s at 5 to 50 kHz, of arms of 2 to 7 joints, at most 2 eps T/h were seen, and once 21, where the rounding
+of stamps since 1970 was interpolated.
+"""
+
+
+class Rung(NamedTuple):
+    """A variable, its derivative, and the variable of which that is the derivative of an order."""
+
+    value: str
+    derivative: str
+    whole: str
+    order: int
+
+
+RUNGS = (
+    Rung("tau_e", "dtau_e", "tau_e", 1),
+    Rung("dtau_e", "ddtau_e", "tau_e", 2),
+    Rung("phi", "dphi", "phi", 1),
+    Rung("theta", "dtheta", "theta", 1),
+    Rung("dtheta", "ddtheta", "theta", 2),
+    Rung("stiffness", "dstiffness", "stiffness", 1),
+    Rung("dstiffness", "ddstiffness", "stiffness", 2),
+)
+"""What is compared; the deflections by themselves, since the motion of the joint can hide them in theta, the
+stiffness where it is not commanded."""
+
+PROBES = 200
+"""About how many times are probed, and steps at which the laws of springs are evaluated apart."""
+
+STEP_SCALES = np.array([8.0**-power for power in range(5)])
+"""Difference steps tried at each time; the best counts, since a wrong derivative is wrong at every step.
+
+The smallest are for motions that leave the corridor within a thousandth of their duration.
+"""
+
+FIRST_SCALES = STEP_SCALES[:2]
+"""Those that are tried first: for most motions the smaller ones only add rounding."""
+
+CLEAR = 1e-10
+"""Error at which smaller steps are not tried any more, a hundredth of the bound."""
+
+OFFSETS = np.arange(-3, 4)
+"""Steps from the time that is probed to those at which its differences are taken."""
+
+MIDDLE = len(OFFSETS) // 2
+"""The place of that time among them."""
+
+WEIGHTS = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60
+"""Central first difference of sixth order over these offsets."""
+
+SIXTH_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / math.sqrt(924)
+"""The sixth difference over them, scaled so that independent errors are passed on with their size."""
+
+NEIGHBORS = 5
+"""Probes to either side from which the noise at one is taken: one sixth difference may be small by
+chance, of 11 that are drawn from a normal distribution the largest is below a third of its width once in 10^7
+times."""
+
+NOISE_GAIN = 12.0
+"""Errors beyond so many times that noise fail. Of 10^6 that are drawn from a normal distribution the largest
+lies at 5 of its widths, and the largest of 11 sixth differences may be a third of the noise."""
+
+SMALL_JOINT = 1e-3
+"""Share of the largest joint's peak against which smaller joints are measured: what is below may be nothing
+but rounding of the larger torques."""
+
+
+def ladder(
+    robot: Robot,
+    trajectory: Trajectory,
+    engine: Engine = NUMPY,
+    internal: InternalMotions | None = None,
+) -> tuple[float, float]:
+    """Largest error of a derivative of `RUNGS`, or of a power, relative to its peak; its bound.
+
+    Differences are taken at about 200 times with steps of their own, over which the trajectory is analytic.
+    Motor motion is compared where it is smooth over the difference. Of the errors that is the largest which
+    is nearest to, or farthest beyond, what rounding admits with its step. The engine is that
+    of the run, and so is what moves inside damped transmissions.
+    """
+    trajectory = trajectory.from_zero()
+    times, reach = trajectory.check_points(PROBES)
+    steps = np.minimum(reach / 3, trajectory.duration / 500)
+
+    frame = None if trajectory.wrench is None else trajectory.wrench.frame
+    damped = () if internal is None else internal.joints
+    kernel = BalancedDynamics(robot, frame, internal=damped)  # as that of the run, which is compiled
+
+    def compute(time: FloatArray) -> Block:
+        inside = {} if internal is None else internal.at(time)
+        return block_of(kernel, trajectory.at(time), engine, internal=inside)
+
+    errors, bounds, everywhere = _ladder(kernel, trajectory, compute, times, FIRST_SCALES[:, None] * steps)
+    if not (everywhere and errors.max() <= CLEAR):
+        errors, bounds, _ = _ladder(kernel, trajectory, compute, times, STEP_SCALES[:, None] * steps)
+    rounding = ROUNDING_GAIN * np.finfo(float).eps * trajectory.duration / (FIRST_SCALES[-1] * steps)
+    bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding))
+    worst = np.unravel_index(np.argmax(errors / bounds), errors.shape)
+    return float(errors[worst]), float(bounds[worst])
+
+
+def _ladder(
+    kernel: BalancedDynamics,
+    trajectory: Trajectory,
+    compute: Callable[[FloatArray], Block],
+    times: FloatArray,
+    steps: FloatArray,
+) -> tuple[FloatArray, FloatArray, bool]:
+    """Errors (derivatives, times) by the best of some steps, what noise admits, and whether all was compared.
+
+    So many times are computed together as fill a block, since a run has the memory for one.
+
+    Args:
+        kernel: of the robot.
+        trajectory: what it is asked to do.
+        compute: gives everything at times.
+        times: (times,), s.
+        steps: (scales, times), s.
+    """
+    robot, everywhere = kernel.robot, True
+    found = [_RungErrors(steps) for _ in (*RUNGS, "energy")]
+    together = max(1, usual_block(len(robot.joints)) // (len(steps) * len(OFFSETS)))
+    for start in range(0, len(times), together):
+        part = slice(start, start + together)
+        grid = times[part] + steps[:, None, part] * OFFSETS[:, None]
+        block = compute(grid.ravel())
+        smooth = _motors_move_smoothly(block, grid.shape)
+        everywhere = everywhere and bool(smooth.any(axis=0).all())
+        for rung, of_rung in zip(RUNGS, found, strict=False):
+            value, derivative, whole = (
+                _on_grid(robot, block, name, grid.shape) for name in (rung.value, rung.derivative, rung.whole)
+            )
+            compared = np.ones_like(smooth) if rung.value.endswith("tau_e") else smooth
+            slowest = np.abs(whole[0, MIDDLE]) / trajectory.duration**rung.order
+            of_rung.add(value, derivative, compared, np.maximum(np.abs(derivative[0, MIDDLE]), slowest))
+        energy, power, size, grain = (
+            each.reshape(*grid.shape, -1, 1) for each in _energy_balances(kernel, block)
+        )
+        compared = np.concatenate((smooth, np.ones_like(smooth[..., :1])), axis=-1)
+        slowest = np.abs(energy[0, MIDDLE]) / trajectory.duration
+        found[-1].add(energy, power, compared, np.maximum(size[0, MIDDLE], slowest), grain[:, MIDDLE])
+    relative = [each.relative() for each in found]
+    return np.stack([error for error, _ in relative]), np.stack([bound for _, bound in relative]), everywhere
+
+
+def _energy_balances(kernel: BalancedDynamics, block: Block) -> Iterator[FloatArray]:
+    """Energy, the power that changes it, the size of its terms, and the grain; each (samples, joints + 1).
+
+    Rotors and springs of each joint, then all links together. The grain is what rounding may leave of the
+    energy in springs, which formulas compute as differences of terms as large as stiffness times a radian
+    squared, say K (1 - cos(2 phi)). The result then changes by leaps, between which it shows no noise.
+    """
+    robot = kernel.robot
+    of_joints = [block.of_joint(index) for index in range(len(robot.joints))]
+    pairs = list(zip(robot.joints, of_joints, strict=True))
+    powers = [shaft_powers(*pair) for pair in pairs] + [link_powers(robot, block, kernel.frame)]
+    yield np.stack([*(shaft_energy(*pair) for pair in pairs), link_energy(robot, block)], axis=-1)
+    yield np.stack([np.sum(terms, axis=0) for terms in powers], axis=-1)
+    yield np.stack([np.sum(np.abs(terms), axis=0) for terms in powers], axis=-1)
+    grains = [np.finfo(float).eps * np.nan_to_num(of_joint["stiffness"]) for of_joint in of_joints]
+    turns = [1.0 if joint.is_revolute else of_joint["q"] ** 2 for joint, of_joint in pairs]
+    yield np.stack([*map(np.multiply, grains, turns), 0 * block.time], axis=-1)
+
+
+def _on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> FloatArray:
+    """A variable of a block of the shape (scales, offsets, times), (*shape, joints, motors or 1)."""
+    values: FloatArray = getattr(block, name).reshape(*shape, len(robot.joints), -1)
+    return np.where([_compared(joint.actuator, name) for joint in robot.joints], values, 0.0)
+
+
+def _compared(actuator: Actuator, name: str) -> list[bool]:
+    """Which columns of a variable of joints or motors are computed, not commanded, at such an actuator."""
+    commanded = {name for key in actuator.commanded for name in COMMANDED[key].names}
+    return [False] if name in commanded else actuator.has(VARIABLES[name])
+
+
+def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
+    """Over which differences, (scales, times, joints), of a block of the shape (scales, offsets, times).
+
+    No step is infeasible, singular or near-singular, and the margin changes by less than a tenth: the motors'
+    motion has features as short as the way to the end of the corridor.
+    """
+    troubled = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
+    gap = margin(block.stiffness, block.stiffness_lower, block.stiffness_upper).reshape(*shape, -1)
+    hasty = np.ptp(gap, axis=1) > gap[:, MIDDLE] / 10
+    smooth: BoolArray = ~(np.any(troubled, axis=1) | hasty)
+    return smooth
+
+
+class _RungErrors:
+    """Errors of a derivative over its peak; `add` times in order, then ask for the errors at all of them.
+
+    Args:
+        steps: (scales, times), s, of all times.
+    """
+
+    def __init__(self, steps: FloatArray) -> None:
+        self._steps = steps
+        self._found: list[tuple[AnyArray, ...]] = []
+        self._peak: FloatArray | float = 0.0
+
+    def add(
+        self,
+        values: FloatArray,
+        derivatives: FloatArray,
+        compared: BoolArray,
+        size: FloatArray,
+        grain: FloatArray | float = 0.0,
+    ) -> None:
+        """Merge some times.
+
+        Args:
+            values: of what is derived, (scales, offsets, times, joints, motors).
+            derivatives: that are to be checked, likewise.
+            compared: (scales, times, joints).
+            size: what errors are measured against, if it is the largest; (times, joints, motors).
+            grain: least noise of the values, (scales, times, joints, motors).
+        """
+        difference, *noise = (
+            _combined(weights, each)
+            for weights, each in (
+                (WEIGHTS, values),
+                (SIXTH_DIFFERENCE, values),
+                (SIXTH_DIFFERENCE, derivatives),
+            )
+        )
+        there = np.broadcast_to(compared[..., None], difference.shape)
+        of_value, of_derivative = (np.where(there, np.abs(each), 0.0) for each in noise)
+        found = difference, derivatives[:, MIDDLE], np.maximum(of_value, grain), of_derivative, there
+        self._found.append(found)
+        valid: BoolArray = np.any(there, axis=0)
+        self._peak = np.maximum(self._peak, np.max(size, axis=0, where=valid, initial=0.0))
+
+    def relative(self) -> tuple[FloatArray, FloatArray]:
+        """The error nearest to its bound of any joint at each time, and that bound, (times,) each.
+
+        Of the steps that counts at which error and noise are least: noise grows as steps shrink, and a
+        wrong derivative is wrong at each of them.
+        """
+        difference, derivative, *noise, there = map(
+            partial(np.concatenate, axis=1), zip(*self._found, strict=True)
+        )
+        steps = self._steps[..., None, None]
+        of_value, of_derivative = map(_largest_near, noise)
+        admitted = NOISE_GAIN * (of_value / steps + of_derivative)
+        error = np.abs(difference / steps - derivative)
+        best = np.argmin(np.where(there, error + admitted, np.inf), axis=0)[None]
+        valid = there.any(axis=0)
+        error, admitted = (
+            np.where(valid, np.take_along_axis(each, best, axis=0)[0], 0.0) for each in (error, admitted)
+        )
+        scale = np.maximum(self._peak, SMALL_JOINT * np.max(self._peak))
+        error, bound = (
+            np.divide(each, scale, out=np.zeros_like(each), where=scale != 0).reshape(len(each), -1)
+            for each in (error, admitted)
+        )
+        worst = np.argmax(error / np.maximum(bound, LADDER_BOUND), axis=1)[:, None]
+        error, bound = (np.take_along_axis(each, worst, axis=1)[:, 0] for each in (error, bound))
+        return error, bound
+
+
+def _combined(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """A weighted sum over the offsets of values (scales, offsets, ...)."""
+    scales, offsets, *rest = values.shape
+    return (weights @ values.reshape(scales, offsets, -1)).reshape(scales, *rest)
+
+
+def _largest_near(noise: FloatArray) -> FloatArray:
+    """The largest of each time (axis 1) and its neighbors."""
+    largest = noise.copy()
+    for shift in range(1, min(NEIGHBORS + 1, noise.shape[1])):
+        np.maximum(largest[:, shift:], noise[:, :-shift], out=largest[:, shift:])
+        np.maximum(largest[:, :-shift], noise[:, shift:], out=largest[:, :-shift])
+    return largest
+
+
+SPRING_BOUND = 1e-11
+"""Bound on the scaled residual of (14); solutions reach 1e-15, and 1e-12 is asked of them."""
+
+SHAFT_BOUND = 1e-11
+"""The same of the balances of motors and windings, whose terms are sums of a few products: 2e-15 is seen."""
+
+DRIFT_BOUND = 1e-6
+"""The same where the deflections are followed by integration: below what spring constants are known to."""
+
+
+@dataclass(frozen=True)
+class SelfCheck(Stored):
+    """Outcome of the self-check.
+
+    Attributes:
+        spring_residual: largest scaled residual of (14); NaN, like `ladder`, if a number is missing.
+        ladder: largest relative error of a derivative against differences of what it derives.
+        spring_bound: bound on the residual of (14).
+        ladder_bound: bound on the error of a derivative, where it is nearest to its bound.
+        shaft_residual: largest scaled residual of the balances of motors and windings, NaN likewise; 0 in
+            results of before these were balanced.
+    """
+
+    spring_residual: float
+    ladder: float
+    spring_bound: float = SPRING_BOUND
+    ladder_bound: float = LADDER_BOUND
+    shaft_residual: float = 0.0
+
+    shape: ClassVar = {
+        **named("passed", "spring_residual", "shaft_residual", "ladder"),
+        "bound": "ladder_bound",
+    }
+
+    @property
+    def passed(self) -> bool:
+        """Whether all are within their bounds."""
+        springs_and_shafts = self.spring_residual <= self.spring_bound and self.shaft_residual <= SHAFT_BOUND
+        return springs_and_shafts and self.ladder <= self.ladder_bound
+
+
+class BalanceCheck:
+    """The residuals of (14) and of the shafts over a run; `add` its blocks in order.
+
+    The program that computes a step also computes its residuals, which covers all steps, but would be wrong
+    with the program. So at `PROBES` steps they are computed apart from it, by NumPy, from the variables
+    that it found. A program has no path that depends on values, but for its branches, loops and tables. If
+    one of these, or all of it, is wrong, so is a stretch of the run, and one that takes more than a 199th of
+    the steps is met.
+    """
+
+    def __init__(self, robot: Robot, samples: int) -> None:
+        self._joints = robot.joints
+        self._probed = evenly(samples, PROBES)
+        self._excerpts: list[dict[str, AnyArray]] = []
+        self._samples = 0
+        self._error, self._shaft_error = 0.0, 0.0
+        self._damped_error, self._damped_size = np.zeros((2, len(damped_joints(robot.joints))))
+
+    def add(self, block: Block) -> None:
+        """Merge a block of `BalancedDynamics`."""
+        first, last = np.searchsorted(self._probed, (self._samples, self._samples + len(block.time)))
+        probed = self._probed[first:last] - self._samples
+        self._excerpts.append(
+            {name: array[probed] for name, array in block.arrays().items() if name in BALANCED}
+        )
+        self._samples += len(block.time)
+        self._error = np.maximum(self._error, block.spring_error.max())
+        self._shaft_error = np.maximum(self._shaft_error, block.shaft_error.max())
+        self._damped_error = np.maximum(self._damped_error, block.damped_error.max(axis=0))
+        self._damped_size = np.maximum(self._damped_size, block.damped_size.max(axis=0))
+
+    def residuals(self) -> tuple[float, float]:
+        """The largest of springs and of shafts, scaled; NaN if a number is missing at a regular step."""
+        probed = {name: np.concatenate([each[name] for each in self._excerpts]) for name in self._excerpts[0]}
+        of_joints = [of_joint(probed, index) for index in range(len(self._joints))]
+        apart = balances(self._joints, of_joints)
+        error = np.max(apart["spring_error"], initial=self._error)
+        damped_error = np.max([self._damped_error, *np.transpose(apart["damped_error"])], axis=0)
+        size = np.maximum(self._damped_size, np.finfo(float).tiny)
+        of_springs = float(np.max(damped_error / size, initial=error))
+        return of_springs, float(np.max(apart["shaft_error"], initial=self._shaft_error))

@@ -1,0 +1,30 @@
+"""Work ahead of the caller, in one thread of its own.
+
+Signals never reach that thread: whoever is ended while it computes waits for what it is at.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+
+
+def ahead(function: Callable[[_Item], _Result], items: Iterable[_Item]) -> Iterator[_Result]:
+    """Yield results of a function, each computed in a thread while the caller has the one before.
+
+    The items themselves are taken in the caller's thread: two that are both busy in the interpreter would
+    wait for one another. What the function raises comes here, in its place.
+    """
+    coming: deque[Future[_Result]] = deque()
+    with ThreadPoolExecutor(1, "vsacli-ahead") as thread:
+        for item in items:
+            coming.append(thread.submit(function, item))
+            if len(coming) > 1:
+                yield coming.popleft().result()
+        while coming:
+            yield coming.popleft().result()

@@ -1,0 +1,278 @@
+"""Programs of nothing but calls, as long chains have them: the passes that make them, and where values lie.
+
+Outlining makes calls of what a program does between its calls, of bodies of bounded size: the time of a
+compiler grows with the square of a function's length. Sharing makes one body of those that differ in nothing
+but constants, which become arguments. A `Workspace` says where values lie while they are live, as a compiler
+allocates registers.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from itertools import count
+from typing import Any, NamedTuple
+
+from vsacli.compute.tracing.program import NESTED, Call, Kind, Program, Symbol, kinds_of_operands
+
+MOST_OUTLINED = 500
+"""Operations in a row that become one body: the time of a compiler grows with the square of a function's."""
+
+
+class _Run(NamedTuple):
+    """Operations in a row."""
+
+    operations: list[Symbol]
+
+
+def with_outlined_runs(program: Program) -> Program:
+    """The program with nothing but calls and items of these."""
+    parts = list(_calls_and_runs(program.operations))
+    last_part = {
+        operand.index: number
+        for number, part in enumerate(parts)
+        for symbol in (part.operations if isinstance(part, _Run) else [part])
+        for operand in symbol.operands
+        if isinstance(operand, Symbol)
+    }
+    last_part |= {output.index: len(parts) for output in program.outputs if isinstance(output, Symbol)}
+    free = count(1 + max((symbol.index for symbol in program.operations), default=0))
+    operations: list[Symbol] = []
+    for number, part in enumerate(parts):
+        if isinstance(part, _Run):
+            results = [symbol for symbol in part.operations if last_part.get(symbol.index, 0) > number]
+            operations += _called(part.operations, results, next(free))
+        else:
+            operations.append(part)
+    return program._replace(operations=tuple(operations))
+
+
+def _calls_and_runs(operations: Sequence[Symbol]) -> Iterator[Symbol | _Run]:
+    """Calls and their items as they are, and what lies between in runs."""
+    run: list[Symbol] = []
+    for symbol in operations:
+        of_call = symbol.operation == "call" or _is_item_of_call(symbol)
+        if run and (of_call or (len(run) >= MOST_OUTLINED and symbol.operation != "item")):
+            yield _Run(run)
+            run = []
+        if of_call:
+            yield symbol
+        else:
+            run.append(symbol)
+    if run:
+        yield _Run(run)
+
+
+def _is_item_of_call(symbol: Symbol) -> bool:
+    return symbol.operation == "item" and symbol.operands[0].operation == "call"
+
+
+def _called(operations: Sequence[Symbol], results: Sequence[Symbol], index: int) -> list[Symbol]:
+    """A call of operations, and the results that are read beyond, which keep their numbers."""
+    own = {symbol.index for symbol in operations}
+    given = {
+        operand.index: operand
+        for symbol in operations
+        for operand in symbol.operands
+        if isinstance(operand, Symbol) and operand.index not in own
+    }
+    inputs = {
+        number: Symbol(operand.tape, number, "input", (), operand.kind) for number, operand in given.items()
+    }
+    inner = [
+        symbol.with_operands(
+            [
+                inputs.get(operand.index, operand) if isinstance(operand, Symbol) else operand
+                for operand in symbol.operands
+            ]
+        )
+        for symbol in operations
+    ]
+    body = Program(tuple(inputs.values()), tuple(inner), tuple(results))
+    first = operations[0]
+    call = Symbol(
+        first.tape, index, "call", (Call(body, tuple(range(len(results)))), *given.values()), first.kind
+    )
+    items = [
+        Symbol(first.tape, symbol.index, "item", (call, number), symbol.kind)
+        for number, symbol in enumerate(results)
+    ]
+    return [call, *items]
+
+
+Place = tuple[int, ...]
+"""Where a constant stands in a program: numbers of the operation and of the operand; or, in a loop or branch,
+number of that operation, and the place in its body."""
+
+Constants = dict[Place, float]
+
+
+class _Body(NamedTuple):
+    """The body of a call: all of it but its real constants, and these."""
+
+    shape: Hashable
+    constants: Constants
+
+
+class _Common(NamedTuple):
+    """One body for several calls, and where in theirs the constants stand that it is given."""
+
+    body: Program
+    places: list[Place]
+
+
+def with_shared_bodies(program: Program) -> Program:
+    """The program with calls of fewer bodies: constants in which alike ones differ become arguments."""
+    calls: list[Call] = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
+    programs = {id(call.body): call.body for call in calls}
+    bodies = {identity: _read(body) for identity, body in programs.items()}
+    alike: dict[Hashable, list[int]] = defaultdict(list)
+    for identity, body in bodies.items():
+        alike[body.shape].append(identity)
+    common = {
+        shape: _common(programs[group[0]], [bodies[identity].constants for identity in group])
+        for shape, group in alike.items()
+    }
+
+    def shared(symbol: Symbol) -> Symbol:
+        if symbol.operation != "call":
+            return symbol
+        (body, numbers), *given = symbol.operands
+        shape, constants = bodies[id(body)]
+        new, places = common[shape]
+        return symbol.with_operands([Call(new, numbers), *given, *(constants[place] for place in places)])
+
+    return program._replace(operations=tuple(map(shared, program.operations)))
+
+
+def _read(program: Program) -> _Body:
+    number = {symbol.index: at for at, symbol in enumerate((*program.inputs, *program.operations))}
+    constants: Constants = {}
+    operations = tuple(
+        (symbol.operation, symbol.kind, *_operand_shapes(symbol, at, number, constants))
+        for at, symbol in enumerate(program.operations)
+    )
+    outputs = tuple(_operand_shape(output, number) for output in program.outputs)
+    return _Body((tuple(symbol.kind for symbol in program.inputs), operations, outputs), constants)
+
+
+def _operand_shapes(
+    symbol: Symbol, at: int, number: Mapping[int, int], constants: Constants
+) -> Iterator[Hashable]:
+    """Yield what the operands of an operation are but for real constants, which are noted."""
+    for place, (operand, kind) in enumerate(zip(symbol.operands, kinds_of_operands(symbol), strict=True)):
+        if place == 0 and symbol.operation in NESTED:
+            inner = _read(operand.body)
+            constants.update({(at, *deeper): constant for deeper, constant in inner.constants.items()})
+            yield inner.shape, operand[1:]
+        elif kind is Kind.REAL and isinstance(operand, float | int):
+            constants[at, place] = float(operand)
+            yield None
+        else:
+            yield _operand_shape(operand, number)
+
+
+def _operand_shape(operand: Any, number: Mapping[int, int]) -> Hashable:
+    """The number of a value; else what is fixed, numbers to the digit."""
+    if isinstance(operand, Symbol):
+        return number[operand.index]
+    return (type(operand), repr(operand)) if isinstance(operand, float | int) else operand
+
+
+def _common(program: Program, of_bodies: Sequence[Constants]) -> _Common:
+    """The body for several that are as this one but for constants; which stay where all have the same."""
+    first: dict[tuple[str, ...], Place] = {}
+    same: dict[Place, Place] = {}
+    for place in of_bodies[0]:
+        values = tuple(repr(constants[place]) for constants in of_bodies)
+        if len(set(values)) > 1:
+            same[place] = first.setdefault(values, place)
+    number = {place: at for at, place in enumerate(first.values())}
+    return _Common(_opened(program, {place: number[other] for place, other in same.items()}), list(number))
+
+
+def _opened(program: Program, parameters: Mapping[Place, int]) -> Program:
+    """A program that is given the constants in some places: those of the same number in one input."""
+    if not parameters:
+        return program
+    values = [*program.inputs, *program.operations]
+    free = 1 + max(symbol.index for symbol in values)
+    inputs = {
+        number: Symbol(values[0].tape, free + at, "input", (), Kind.REAL)
+        for at, number in enumerate(sorted(set(parameters.values())))
+    }
+    of_operations: dict[int, dict[Place, int]] = defaultdict(dict)
+    for (at, *place), number in parameters.items():
+        of_operations[at][tuple(place)] = number
+    operations = list(program.operations)
+    for at, places in of_operations.items():
+        operations[at] = _given(operations[at], places, inputs)
+    return Program((*program.inputs, *inputs.values()), tuple(operations), program.outputs)
+
+
+def _given(symbol: Symbol, places: Mapping[Place, int], inputs: Mapping[int, Symbol]) -> Symbol:
+    """An operation with values in place of constants among its operands, or in its body."""
+    operands: list[Any] = list(symbol.operands)
+    deeper = {place: number for place, number in places.items() if len(place) > 1}
+    for place, number in places.items():
+        if len(place) == 1:
+            operands[place[0]] = inputs[number]
+    if deeper:
+        operands[0] = operands[0]._replace(body=_opened(operands[0].body, deeper))
+        operands += [inputs[number] for number in sorted(set(deeper.values()))]
+    return symbol.with_operands(operands)
+
+
+class Workspace:
+    """Places of values; those that a call gives never lie where those do that it takes.
+
+    Args:
+        program: one of nothing but calls and their items.
+        by_kind: whether values of each kind have places of their own, else all have real ones.
+
+    Attributes:
+        slot: place of each value among those of its kind, by index; inputs come first, in their order.
+        counts: how many places there are for each kind.
+    """
+
+    def __init__(self, program: Program, *, by_kind: bool = False) -> None:
+        self._by_kind = by_kind
+        self.slot = {symbol.index: place for place, symbol in enumerate(program.inputs)}
+        self.counts: dict[Kind, int] = defaultdict(int, {Kind.REAL: len(program.inputs)})
+        self._free: dict[Kind, list[int]] = defaultdict(list)
+        self._items: dict[int, list[Symbol]] = defaultdict(list)
+        self._last_use: dict[int, int] = {}
+        for symbol in program.operations:
+            if symbol.operation == "item":
+                self._items[symbol.operands[0].index].append(symbol)
+            else:
+                self._last_use |= {value.index: symbol.index for value in values_of(symbol)}
+        for kept in (*program.inputs, *program.outputs):
+            if isinstance(kept, Symbol):
+                self._last_use.pop(kept.index, None)
+
+    def results(self, call: Symbol) -> list[Symbol]:
+        """What the next call gives, in the order of the outputs of its body, with places from now on."""
+        order = {number: place for place, number in enumerate(call.operands[0].numbers)}
+        items = sorted(self._items[call.index], key=lambda item: order[item.operands[1]])
+        for item in items:
+            self._allocate(item)
+        for value in {value.index: value for value in values_of(call)}.values():
+            if self._last_use.get(value.index) == call.index:
+                self._free[self._pool(value)].append(self.slot[value.index])
+        return items
+
+    def _allocate(self, value: Symbol) -> None:
+        pool = self._pool(value)
+        if not self._free[pool]:
+            self._free[pool].append(self.counts[pool])
+            self.counts[pool] += 1
+        self.slot[value.index] = self._free[pool].pop()
+
+    def _pool(self, value: Symbol) -> Kind:
+        return value.kind if self._by_kind else Kind.REAL
+
+
+def values_of(symbol: Symbol) -> Iterator[Symbol]:
+    """The operands of an operation that are no constants."""
+    return (operand for operand in symbol.operands if isinstance(operand, Symbol))

@@ -1,0 +1,196 @@
+"""Compiled equations of motion, and steps of SciPy's DOP853 whose stages they compute together."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from ctypes import POINTER, Structure, byref, c_double, c_int64, c_void_p
+from functools import cache, partial
+from pathlib import Path
+from types import FunctionType, MethodType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.compute.aligned_rows import address
+from vsacli.compute.engine.compiler import CompilerError
+from vsacli.control.simulation.loop_code import Recording
+from vsacli.control.simulation.tabulated import Table
+
+
+class Stages(NamedTuple):
+    """Stages of an explicit Runge-Kutta method.
+
+    Attributes:
+        first, last: those to compute.
+        weights: of the rates at the stages before each stage, (stages, stages).
+        times: of the stages in shares of the step, (stages,).
+    """
+
+    first: int
+    last: int
+    weights: FloatArray
+    times: FloatArray
+
+
+@cache
+def dop853_with_stages() -> Any:
+    """SciPy's DOP853, its control of steps and errors, where stages are computed by one call.
+
+    An instance takes a further argument, `stages`, a function as `Equations.stages`: where that gives None,
+    SciPy evaluates one stage after the other. SciPy has no hook for that, so its text of a step is carried
+    out with another `rk_step` among its names; were there none of that name, nothing but time would be lost.
+    """
+    from scipy.integrate import DOP853
+
+    scipy: Any = DOP853  # whose stubs leave out what it takes to derive a method
+    weights, times = _tableau(scipy)
+    end = scipy.n_stages
+    step, dense = Stages(1, end, weights, times), Stages(end + 1, len(times) - 1, weights, times)
+    text = scipy._step_impl
+    one_by_one = text.__globals__.get("rk_step")
+
+    class WithStages(scipy):  # type: ignore[misc]
+        def __init__(self, *arguments: Any, stages: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            self._stages = stages
+            names = {**text.__globals__, "rk_step": self._rk_step}
+            self._step_impl = MethodType(FunctionType(text.__code__, names), self)
+
+        def _rk_step(self, fun: Any, t: Any, y: Any, f: Any, h: Any, *tableau: Any) -> Any:
+            """The state at the end of a trial step, and its rates; those at the stages are left in K."""
+            self.K[0] = f
+            state = self._stages(t, h, y, step, self.K_extended)
+            return one_by_one(fun, t, y, f, h, *tableau) if state is None else (state, self.K[-1].copy())
+
+        def _dense_output_impl(self) -> Any:
+            found = self._stages(self.t_old, self.h_previous, self.y_old, dense, self.K_extended)
+            self.A_EXTRA = scipy.A_EXTRA if found is None else scipy.A_EXTRA[:0]  # what is left to SciPy
+            return super()._dense_output_impl()
+
+    return WithStages
+
+
+def _tableau(method: Any) -> tuple[FloatArray, FloatArray]:
+    """Weights and times of all stages: of the step, of its end, and of dense output."""
+    end = method.n_stages
+    weights = np.zeros((end + 1 + len(method.A_EXTRA),) * 2)
+    weights[:end, :end], weights[end, :end], weights[end + 1 :] = method.A, method.B, method.A_EXTRA
+    return weights, np.array([*method.C, 1.0, *method.C_EXTRA])
+
+
+_ARGUMENTS: dict[str, list[Any]] = {
+    "derivatives": [c_double, c_int64, c_void_p, c_void_p],
+    "demand": [c_double, c_void_p, c_void_p],
+    "to_boundaries": [c_void_p, c_void_p],
+    "stages": [
+        c_double,
+        c_double,
+        c_void_p,
+        c_int64,
+        c_int64,
+        c_int64,
+        c_void_p,
+        c_void_p,
+        c_void_p,
+        c_void_p,
+    ],
+}
+"""Of the functions of loop.c, behind the loop itself."""
+
+
+class _Table(Structure):
+    _fields_ = (
+        *((name, c_int64) for name in ("cells", "powers", "columns")),
+        *((name, c_void_p) for name in ("ends", "coefficients")),
+    )
+
+    @classmethod
+    def of(cls, table: Table) -> _Table:
+        return cls(*table.coefficients.shape, address(table.ends), address(table.coefficients))
+
+
+class _Loop(Structure):
+    _fields_ = (("numbers", c_void_p), ("tables", c_int64), ("table", POINTER(_Table)))
+
+    @classmethod
+    def of(cls, numbers: FloatArray, tables: Sequence[Table]) -> _Loop:
+        row = _Table * len(tables)
+        return cls(address(numbers), len(tables), row(*map(_Table.of, tables)))
+
+
+def open_loop(path: Path) -> dict[str, Any]:
+    """The functions of a compiled closed loop by name.
+
+    Raises:
+        CompilerError: they cannot be loaded.
+    """
+    try:
+        library = ctypes.CDLL(str(path))
+        functions = {name: getattr(library, name) for name in _ARGUMENTS}
+    except (OSError, AttributeError) as error:
+        raise CompilerError(f"what the C compiler made cannot be loaded: {error}") from None
+    for name, function in functions.items():
+        function.argtypes = [c_void_p, *_ARGUMENTS[name]]
+        function.restype = None
+    return functions
+
+
+class CompiledLoop:
+    """Compiled equations of motion of a closed loop.
+
+    Args:
+        functions: as `open_loop` gives them.
+        numbers: of robot and controller, as the code counts them.
+        recording: what was compiled.
+    """
+
+    def __init__(self, functions: dict[str, Any], numbers: FloatArray, recording: Recording) -> None:
+        loops = [_Loop.of(numbers, each.tables) for each in recording]
+        self._kept = (numbers, recording, loops)  # what the code has addresses of
+        rates, torques, distances = map(byref, loops)
+        self._derivatives = partial(functions["derivatives"], rates)
+        self._stages = partial(functions["stages"], rates)
+        self._demand = partial(functions["demand"], torques)
+        self._to_boundaries = partial(functions["to_boundaries"], distances)
+        self._motors = len(recording.torques.program.outputs)
+        self._distances = np.empty(len(recording.distances.program.outputs))
+
+    def derivatives(self, time: float, vectors: FloatArray) -> FloatArray:
+        """Time derivatives of state vectors (..., entries) at a time."""
+        given = np.ascontiguousarray(vectors)
+        rates = np.empty_like(given)
+        self._derivatives(time, given.size // given.shape[-1], address(given), address(rates))
+        return rates
+
+    def torques(self, time: float, vector: FloatArray) -> FloatArray:
+        """What a controller that holds its torques asks for, (motors,), in a state."""
+        given, asked = np.ascontiguousarray(vector), np.empty(self._motors)
+        self._demand(time, address(given), address(asked))
+        return asked
+
+    def distance(self, vector: FloatArray) -> float:
+        """To the nearest boundary, at most 1."""
+        given = np.ascontiguousarray(vector)
+        self._to_boundaries(address(given), address(self._distances))
+        return float(self._distances.min(initial=1.0))
+
+    def stages(
+        self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
+    ) -> FloatArray:
+        """Stages of an explicit step from a state on; returns the state at the last one.
+
+        Args:
+            time: from which on, s.
+            step: its length, s.
+            vector: the state there.
+            which: those to compute.
+            rates: at the stages, (stages, entries), of which those before are known; contiguous.
+        """
+        given, state = np.ascontiguousarray(vector), np.empty_like(vector)
+        self._stages(
+            time, step, address(given), which.first, which.last, len(which.weights), address(which.weights),
+            address(which.times), address(rates), address(state),
+        )  # fmt: skip
+        return state

@@ -1,0 +1,122 @@
+"""A closed loop recorded as programs, and C for these with the parameters of robot and controller as data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.compute.engine.compiled_engine import operation_count
+from vsacli.compute.engine.libraries import Code
+from vsacli.compute.tracing import MOST_RECORDED, Program, Tape, TracedArray, cells_of
+from vsacli.compute.tracing.c_code import Tables, Writer, digits, table_declarations
+from vsacli.control.codegen.scalar import HELPERS, helper_text, scalar_dialect
+from vsacli.control.simulation.boundaries import Boundary
+from vsacli.control.simulation.closed_loop import ClosedLoop
+from vsacli.control.simulation.tabulated import Instant, Table
+
+
+class Recorded(NamedTuple):
+    """A program of a state vector and of what tables have at a time, its inputs in this order."""
+
+    program: Program
+    tables: tuple[Table, ...]
+
+
+class Recording(NamedTuple):
+    """What a closed loop does at an instant.
+
+    Attributes:
+        rates: time derivative of the state vector.
+        torques: that a controller which holds them asks for; none of others.
+        distances: to each boundary.
+    """
+
+    rates: Recorded
+    torques: Recorded
+    distances: Recorded
+
+    @property
+    def entries(self) -> int:
+        """Of a state vector."""
+        return len(self.rates.program.outputs)
+
+
+def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
+    """Record a closed loop.
+
+    Args:
+        loop: a robot under its controller; torques that it holds are a table.
+        boundaries: where its runs end.
+
+    Raises:
+        NotImplementedError: it has no such program, or one of too many operations.
+    """
+    if loop.slip is not None:
+        raise NotImplementedError("motors with sharp friction stick and slide")
+
+    def torques(time: Any, vector: FloatArray) -> FloatArray:
+        return vector[:0] if loop.held is None else loop.controller_torque(time, vector)
+
+    def distances(_time: Any, vector: FloatArray) -> FloatArray:
+        return np.concatenate([vector[:0], *(each.distance(vector).reshape(1) for each in boundaries)])
+
+    try:
+        parts = (_recorded(each, loop.packing.entries) for each in (loop.derivative, torques, distances))
+        return Recording(*parts)
+    except (AttributeError, IndexError, TypeError, ValueError) as error:  # as of a law of the user's own
+        raise NotImplementedError(f"it takes more than NumPy's functions of arrays: {error}") from error
+
+
+def _recorded(function: Callable[[Any, Any], Any], entries: int) -> Recorded:
+    """A function of a time and a state vector."""
+    tape = Tape(MOST_RECORDED)
+
+    def inputs(count: int) -> Any:
+        return TracedArray(tape, tape.inputs(count))
+
+    vector, instant = inputs(entries), Instant(inputs)
+    program = tape.program(cells_of(function(instant, vector)).tolist())
+    return Recorded(program, tuple(instant.tables))
+
+
+def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
+    """Return what to compile for a recording, and the constants that the code is to be given.
+
+    Constants are entries of an array, in the order in which they are written, so that robots that differ in
+    parameters alone have the same text; tables stay in the text.
+    """
+    constants: list[float] = []
+
+    def real(number: float) -> str:
+        constants.append(number)
+        return f"p[{len(constants) - 1}]"
+
+    dialect = scalar_dialect("double")._replace(real=real, literal=digits)
+    tables = Tables((each.program for each in recording), dialect.array_type)
+    writer = Writer(dialect, tables)
+    lines = [
+        f"#define ENTRIES {recording.entries}",
+        f"#define COLUMNS {max(sum(table.columns for table in each.tables) for each in recording)}",
+        files("vsacli.control.simulation").joinpath("loop.c").read_text(encoding="utf-8"),
+        *(helper_text(name, "double") for name in HELPERS),
+        *table_declarations(tables, dialect),
+    ]
+    for name, each in recording._asdict().items():
+        lines += _function(name, each.program, recording.entries, writer)
+    functions = tuple(operation_count(each.program) for each in recording)
+    return Code("\n".join([*lines, ""]), sum(functions), functions), np.array(constants)
+
+
+def _function(name: str, program: Program, entries: int, writer: Writer) -> Iterator[str]:
+    """A function of a program, whose inputs are the entries of a state, then columns of tables."""
+    places = (
+        f"y[{number}]" if number < entries else f"s[{number - entries}]"
+        for number in range(len(program.inputs))
+    )
+    names = {symbol.index: place for symbol, place in zip(program.inputs, places, strict=True)}
+    head = f"static void {name}(const double *p, const double *y, const double *s, double *result)"
+    return writer.definition(head, program, names, "result")

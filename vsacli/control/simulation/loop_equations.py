@@ -1,0 +1,263 @@
+"""The equations of motion of a closed loop, evaluated by what is fastest for the length of a run.
+
+`Equations` evaluates their text with NumPy, which takes any controller. `RecordedEquations` passes from the
+text to a program on plain numbers, and from that to compiled code, once a run is long enough.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.compute.engine.choice import check_engine, compiled_as_asked
+from vsacli.compute.engine.compiler import CompilerError, system_compiler
+from vsacli.compute.engine.engines import Tell, unheard
+from vsacli.compute.engine.libraries import Code, Worthwhile, load
+from vsacli.compute.tracing.python_functions import number_function
+from vsacli.control.simulation.boundaries import Boundary
+from vsacli.control.simulation.closed_loop import ClosedLoop
+from vsacli.control.simulation.compiled_loop import CompiledLoop, Stages, open_loop
+from vsacli.control.simulation.ending import Budget, Ending
+from vsacli.control.simulation.loop_code import Recorded, Recording, loop_code, record
+
+
+class Equations:
+    """What is integrated, and where that ends.
+
+    Args:
+        loop: a robot under its controller.
+        boundaries: at which a run ends.
+        budget: of the run.
+    """
+
+    def __init__(self, loop: ClosedLoop, boundaries: Sequence[Boundary], budget: Budget) -> None:
+        self.loop, self.boundaries, self.budget = loop, tuple(boundaries), budget
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """What to remember of what computes: `engine`, as it may be asked for, `compiler`, `threads`."""
+        return {"engine": "numpy", "compiler": "", "threads": "1"}
+
+    def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
+        """Time derivatives of state vectors (..., entries) at a time; each state counts."""
+        self.budget.used += vectors.size // vectors.shape[-1]
+        return self.loop.derivative(time, vectors)
+
+    def torques(self, time: float, vector: FloatArray) -> FloatArray:
+        """What a controller that holds its torques asks for, (motors,), in a state that it takes for true."""
+        return self.loop.controller_torque(time, vector)
+
+    def stages(
+        self, _time: float, _step: float, _vector: FloatArray, _which: Stages, _rates: FloatArray
+    ) -> FloatArray | None:
+        """Several stages of a step; see `CompiledLoop.stages`. None if they must be computed one by one."""
+        return None
+
+    def distance(self, vector: FloatArray) -> float:
+        """From a state to the nearest boundary, at most 1."""
+        return min((float(each.distance(vector)) for each in self.boundaries), default=1.0)
+
+
+class Edge:
+    """The event of `solve_ivp` at the first boundary.
+
+    Args:
+        equations: what is integrated.
+    """
+
+    terminal = True
+    direction = -1.0
+
+    def __init__(self, equations: Equations) -> None:
+        self._equations = equations
+
+    def __call__(self, _time: float, vector: FloatArray) -> float:
+        """Distance to the nearest boundary."""
+        return self._equations.distance(vector)
+
+    def ending(self, time: float, vector: FloatArray) -> Ending:
+        """The end of a run there."""
+        reached = min(self._equations.boundaries, key=lambda each: float(each.distance(vector)))
+        return reached.ending(time, vector)
+
+
+class NumberProgram:
+    """A program of states and tables as a Python function: without a compiler, and before one is worth it.
+
+    Raises:
+        NotImplementedError: it has loops or branches.
+    """
+
+    def __init__(self, recorded: Recorded) -> None:
+        self._function, self._tables = number_function(recorded.program), recorded.tables
+
+    def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
+        """Results (..., results) for state vectors (..., entries) at a time.
+
+        Raises:
+            ArithmeticError, ValueError: where NumPy would find NaN or infinity.
+        """
+        columns = [number for table in self._tables for number in table(time).tolist()]
+        states = vectors.reshape(-1, vectors.shape[-1]).tolist()
+        results = [self._function([*state, *columns]) for state in states]
+        return np.array(results).reshape(*vectors.shape[:-1], -1)
+
+
+RECORD_FROM = 50
+"""Evaluations for each joint from which on a program saves more time than recording it takes: 3 to 30 ms with
+three joints, 30 to 130 ms with seven, where an evaluation of the text takes 0.1 to 0.3 ms."""
+
+NUMBER_SECONDS = 4e-8
+"""What Python takes for an operation on plain numbers."""
+
+TEXT_SECONDS = 2e-4
+"""What NumPy takes for the text of an evaluation."""
+
+LOOK_SECONDS = 0.02
+"""What it takes to see whether there is compiled code."""
+
+
+class Computing(NamedTuple):
+    """What evaluates equations of motion.
+
+    Attributes:
+        engine: "numpy" compiles nothing, "c" at once, "auto" where that saves time.
+        tell: learns what goes wrong with compiled code, and what will take long, before it does.
+        runs: how many share what is compiled.
+    """
+
+    engine: str
+    tell: Tell = unheard
+    runs: int = 1
+
+
+class RecordedEquations(Equations):
+    """Equations whose evaluations pass from the text to a program on numbers, and from that to compiled code.
+
+    Each comes when those before have taken about as long as it takes to make it, so a run never takes much
+    more than twice what the best choice would have taken, however long it becomes. When that is goes by the
+    number of evaluations, so that a run can be repeated to the last bit unless the cache has new code.
+
+    Args:
+        loop: a robot under its controller.
+        boundaries: at which a run ends.
+        budget: of the run.
+        computing: what evaluates.
+
+    Raises:
+        InputError: there is no engine of that name; at the first evaluation, it is "c" and there is no
+            compiler that works, or nothing that it could compile.
+    """
+
+    def __init__(
+        self, loop: ClosedLoop, boundaries: Sequence[Boundary], budget: Budget, computing: Computing
+    ) -> None:
+        super().__init__(loop, boundaries, budget)
+        check_engine(computing.engine)
+        self._computing = computing
+        self._program: NumberProgram | None = None
+        self._law: NumberProgram | None = None
+        self._compiled: CompiledLoop | None = None
+        self._compiler = ""
+        self._later = self._compiling() if computing.engine == "c" else self._improving()
+        self._due = next(self._later)
+
+    @property
+    def provenance(self) -> dict[str, str]:
+        """As of `Equations`: what computed last."""
+        if self._compiled is None:
+            return super().provenance
+        return {"engine": "c", "compiler": self._compiler, "threads": "1"}
+
+    def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
+        """As of `Equations`; where a number is not finite the text has its say."""
+        self._improve()
+        rates = _finite(self._compiled.derivatives if self._compiled else self._program, time, vectors)
+        if rates is None:
+            return super().__call__(time, vectors)
+        self.budget.used += vectors.size // vectors.shape[-1]
+        return rates
+
+    def torques(self, time: float, vector: FloatArray) -> FloatArray:
+        """As of `Equations`."""
+        asked = _finite(self._compiled.torques if self._compiled else self._law, time, vector)
+        return super().torques(time, vector) if asked is None else asked
+
+    def stages(
+        self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
+    ) -> FloatArray | None:
+        """As of `Equations`."""
+        self._improve()
+        if self._compiled is None:
+            return None
+        state = self._compiled.stages(time, step, vector, which, rates)
+        if not math.isfinite(rates[which.last].sum()):
+            return None
+        self.budget.used += which.last - which.first + 1
+        return state
+
+    def distance(self, vector: FloatArray) -> float:
+        """As of `Equations`."""
+        return super().distance(vector) if self._compiled is None else self._compiled.distance(vector)
+
+    def _improve(self) -> None:
+        """Take what is faster if it is due."""
+        if self.budget.used >= self._due:
+            self._due = next(self._later, math.inf)
+
+    def _improving(self) -> Iterator[float]:
+        """Go on to what is faster; yields after how many evaluations to be asked again."""
+        yield RECORD_FROM * len(self.loop.plant.drivetrain.present)
+        with suppress(NotImplementedError, CompilerError):
+            recording = record(self.loop, self.boundaries)
+            with suppress(NotImplementedError):  # of loops
+                self._program = NumberProgram(recording.rates)
+                self._law = NumberProgram(recording.torques)
+            begin, seconds = self.budget.used, self._seconds(recording) * self._computing.runs
+            if self._computing.engine == "auto":
+                yield begin + LOOK_SECONDS / seconds
+                code, numbers = loop_code(recording)
+                self._load(recording, code, numbers, lambda _code: False)
+                if self._compiled is None:
+                    yield begin + code.compiling_seconds / seconds
+                    self._load(recording, code, numbers, lambda _code: True)
+
+    def _seconds(self, recording: Recording) -> float:
+        """What an evaluation takes before there is compiled code."""
+        operations = len(recording.rates.program.operations)
+        return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
+
+    def _compiling(self) -> Iterator[float]:
+        """The same for the engine "c"; that it cannot be had is an InputError."""
+        yield 0.0
+        with compiled_as_asked():
+            recording = record(self.loop, self.boundaries)
+            self._load(recording, *loop_code(recording), lambda _code: True)
+
+    def _load(self, recording: Recording, code: Code, numbers: FloatArray, worthwhile: Worthwhile) -> None:
+        """Load compiled code; compile it if that is worthwhile.
+
+        Raises:
+            CompilerError: it cannot be had.
+        """
+        compiler = system_compiler()
+        loaded = load(code, open_loop, compiler, self._computing.tell, worthwhile)
+        if loaded is not None:
+            self._compiled, self._compiler = CompiledLoop(loaded.library, numbers, recording), compiler.name
+
+
+def _finite(
+    function: Callable[[float, FloatArray], FloatArray] | None, time: float, vectors: FloatArray
+) -> FloatArray | None:
+    """What a function finds in states at a time; None if there is none, or a number is not finite."""
+    if function is not None:
+        with suppress(ArithmeticError, ValueError):  # of Python, instead of NaN and infinity
+            found = function(time, vectors)
+            if math.isfinite(found.sum()):
+                return found
+    return None

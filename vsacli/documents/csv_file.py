@@ -1,0 +1,370 @@
+"""CSV files: the header, and the rows as texts or numbers. Knows columns by place, not what they mean.
+
+A tab, semicolon or comma in the header separates the cells; where that is no comma, numbers may have decimal
+commas. Cells may be in double quotes, and a comment goes from `#` to the end of a line. Numbers are read by
+NumPy; each line is looked at only where something is unusual, and to say what is wrong.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from io import TextIOWrapper
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.storage import place_of
+from vsacli.documents.source import check_input_file
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+MAX_BYTES = 10_000_000_000
+MAX_HEADER = 100_000
+"""Characters in the header line, or in one before it; binary data often has none or a longer one."""
+SEPARATORS = ("\t", ";", ",")
+"""In the order in which they are looked for in the header line, outside quotes."""
+COMMENT = "#"
+QUOTE = '"'
+NOT_UTF8 = "\ufffd"
+"""What bytes that are not UTF-8 are read as."""
+CHUNK = 1_000_000
+"""Bytes looked at together."""
+MAX_KINDS = 10
+"""Kinds of problems that are told."""
+MAX_ALIKE = 1000
+"""Problems of one kind after which reading is given up."""
+NOTHING = ("", "nan")
+"""What stands in a cell for no number, where that is admitted."""
+_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
+_HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
+_INDEX = re.compile(r"\d+")
+"""In brackets an index, as in `position[2]`, and no unit."""
+_QUOTED = re.compile(r'"[^"]*"')
+
+
+class Header(NamedTuple):
+    """The header of a table.
+
+    Attributes:
+        line: its line, from 1; 0 if the table has none and the first line is a row.
+        separator: what stands between the cells of a line.
+        columns: names of the columns as written, without quotes; empty texts if there is no header.
+    """
+
+    line: int
+    separator: str
+    columns: tuple[str, ...]
+
+
+def split_heading(text: str) -> tuple[str, str | None]:
+    """Return the name of a column, and the unit in brackets that follows it, if one does."""
+    match = _HEADING.fullmatch(text)
+    if match is None or _INDEX.fullmatch(match["unit"] or ""):
+        return text, None
+    return match["name"], match["unit"]
+
+
+def read_header(path: str | os.PathLike[str], numbered: Sequence[int] = ()) -> Header:
+    """Return the header of a CSV file, whatever its columns are called; `numbered` as of `header_of`.
+
+    Raises:
+        InputError: the file cannot be read, or does not begin as a table does.
+    """
+    name = os.fspath(path)
+    check_input_file(name, MAX_BYTES)
+    try:
+        with open(place_of(name), "rb") as content:
+            return header_of(content, name, strict=False, numbered=numbered)
+    except OSError as error:
+        raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
+
+
+def header_of(content: BinaryIO, name: str, *, strict: bool = True, numbered: Sequence[int] = ()) -> Header:
+    """Return the header of a table.
+
+    Args:
+        content: the file, read from its beginning.
+        name: its path, for messages.
+        strict: whether each column must have a name of its own.
+        numbered: numbers of columns, from 1, that need no name: if all hold numbers, the line is a row.
+
+    Raises:
+        InputError: with everything that is wrong with the line.
+    """
+    file = TextIOWrapper(content, encoding="utf-8-sig", errors="replace")
+    number, line, comment = 0, "\n", 0
+    while (line == "\n" or line.startswith(COMMENT)) and len(line) < MAX_HEADER:
+        comment = number if line != "\n" else comment
+        number, line = number + 1, file.readline(MAX_HEADER)
+    file.detach()
+    text = line.partition(COMMENT)[0]
+    bare = _QUOTED.sub("", text)
+    separator = next((mark for mark in SEPARATORS if mark in bare), SEPARATORS[-1])
+    columns = tuple(cell.strip() for cell in cells_of(text.rstrip("\r\n"), separator))
+    numbers = [is_number(cell.replace(",", "," if separator == "," else ".")) for cell in columns]
+    if numbered and all(numbers[place - 1] for place in numbered if place <= len(columns)):
+        return Header(0, separator, ("",) * len(columns))
+    number = number if line else 1
+    found = _header_problems(line, columns, comment, strict)
+    problems = [Problem(name, number, message) for message in found]
+    if problems:
+        raise InputError(problems)
+    return Header(number, separator, columns)
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, without quotes."""
+    return next(csv.reader([line], delimiter=separator), [""]) if QUOTE in line else line.split(separator)
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a finite number in ASCII."""
+    try:
+        return math.isfinite(float(cell)) and cell.isascii() and "_" not in cell
+    except ValueError:
+        return False
+
+
+def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: bool) -> Iterator[str]:
+    if not line.strip():
+        yield "expected a header line with the names of the columns, found nothing"
+    elif NOT_UTF8 in line or "\0" in line:
+        yield "expected a header line in UTF-8, found other bytes"
+    elif len(line) == MAX_HEADER:
+        yield f"expected a header line, found more than {MAX_HEADER} characters without a line break"
+    elif all(is_number(column) for column in columns):
+        yield f"expected a header line with the names of the columns, found numbers{_remedy(comment)}"
+    elif len(columns) == 1 and len(line.partition("[")[0].split()) > 1:
+        yield "expected commas, semicolons or tabs between the columns, found blanks"
+    elif strict:
+        yield from (f"column {i} has no name" for i, column in enumerate(columns, 1) if not column)
+        repeated = Counter(column for column in columns if column)
+        yield from (f"column {column!r} appears {n} times" for column, n in repeated.items() if n > 1)
+
+
+def _remedy(comment: int) -> str:
+    if comment:
+        return f"; if line {comment} is meant, remove its {COMMENT!r}"
+    return "; without one, columns are given by their numbers, as in columns: {time: 1, elbow.q: 2}"
+
+
+class Rows(NamedTuple):
+    """What is to be read of a file.
+
+    Attributes:
+        path: the file.
+        header: its header.
+        used: places of the columns to read, ascending, from 0.
+        empty_cells: whether cells of these may be empty, or hold `nan`.
+    """
+
+    path: str
+    header: Header
+    used: Sequence[int]
+    empty_cells: bool
+
+    @property
+    def all_used(self) -> bool:
+        """Whether no column is left out."""
+        return len(self.used) == len(self.header.columns)
+
+    def name(self, place: int) -> str:
+        """What messages call a column."""
+        return repr(self.header.columns[place] or place + 1)
+
+    def texts(self) -> Iterator[tuple[int, list[str]]]:
+        """Yield line number and cells of each row, without quotes.
+
+        Raises:
+            InputError: a row has other cells than the header.
+        """
+        count = len(self.header.columns)
+        for number, line in self.lines():
+            cells = cells_of(line, self.header.separator)
+            if len(cells) != count:
+                message = f"expected {count} values as in the header, found {len(cells)}"
+                raise InputError.one(message, self.path, number)
+            yield number, cells
+
+    def lines(self) -> Iterator[tuple[int, str]]:
+        """Yield number and content of each line below the header that has any."""
+        with open(place_of(self.path), encoding="utf-8-sig", errors="replace") as file:
+            yield from filled_lines(file, self.header.line)
+
+
+def filled_lines(file: Iterable[str], header_line: int) -> Iterator[tuple[int, str]]:
+    """Yield number and content of each line below the header that has any."""
+    for number, line in enumerate(file, 1):
+        content = line.rstrip("\n").partition(COMMENT)[0]
+        if number > header_line and content:
+            yield number, content
+
+
+def read_numbers(rows: Rows) -> FloatArray:
+    """Return the numbers of the columns that are used, (rows, columns).
+
+    NumPy's C reader; only if it fails, or has met anything unusual, each line is looked at.
+
+    Raises:
+        InputError: with file and line of what is no number, or no row of this table.
+    """
+    values, reason = np.empty((0, 0)), None
+    if rows.all_used or _is_regular(rows):
+        values, reason = _loaded(rows, float)
+    if not values.size:
+        values, reason = _loaded(rows, float, _cleaned(rows))
+    odd = np.isinf(values) if rows.empty_cells else ~np.isfinite(values)
+    if values.shape[1] == len(rows.used) and not odd.any():
+        return values
+    raise InputError(_row_problems(rows) or [Problem(rows.path, 0, f"cannot be read: {reason}")])
+
+
+def read_integers(rows: Rows) -> npt.NDArray[np.int64] | None:
+    """Return the same as whole numbers of 64 bits, each with all its digits; None if they are none."""
+    integers, _ = _loaded(rows, np.int64, _cleaned(rows))
+    return integers if integers.size else None
+
+
+def _loaded(
+    rows: Rows, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
+) -> tuple[npt.NDArray[Any], object]:
+    """The rows, and why there are none; from the file as it is, or from cells that were cleaned."""
+    header, used = rows.header, None if rows.all_used else rows.used
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # NumPy's way to say that there are no rows, or no whole numbers
+        try:
+            values = np.loadtxt(
+                os.path.abspath(place_of(rows.path)) if cleaned is None else cleaned,
+                dtype=kind,
+                delimiter=header.separator if cleaned is None else "\t",
+                comments=COMMENT,
+                encoding="latin-1",  # comments may be anything; numbers are ASCII
+                skiprows=header.line if cleaned is None else 0,
+                usecols=used if cleaned is None else None,
+                ndmin=2,
+            )
+        except (ValueError, Warning, _IrregularError) as error:
+            return np.empty((0, 0)), error
+    return values, "its rows are not those of a table"
+
+
+def _is_regular(rows: Rows) -> bool:
+    """Whether each line has as many cells as the header, so that columns may be picked by their places.
+
+    NumPy's reader does not count what it leaves out. Quotes and comments are left to a look at each line.
+    """
+    expected, separator = len(rows.header.columns) - 1, ord(rows.header.separator)
+    rest = b""
+    with open(place_of(rows.path), "rb") as file:
+        for _ in range(rows.header.line):
+            file.readline()
+        while chunk := file.read(CHUNK):
+            text, _, rest = (rest + chunk).rpartition(b"\n")
+            if not _cells_count(text + b"\n" if text else b"", expected, separator):
+                return False
+    return not rest or _cells_count(rest + b"\n", expected, separator)
+
+
+def _cells_count(text: bytes, expected: int, separator: int) -> bool:
+    if QUOTE.encode() in text or COMMENT.encode() in text or b"\r" in text.replace(b"\r\n", b""):
+        return False
+    letters = np.frombuffer(text, dtype=np.uint8)
+    ends = np.flatnonzero(letters == ord("\n"))
+    upto = np.searchsorted(np.flatnonzero(letters == separator), ends)
+    return bool(np.all(np.diff(upto, prepend=0) == expected))
+
+
+class _IrregularError(Exception):
+    """A row that is none of the table."""
+
+
+def _cleaned(rows: Rows) -> Iterator[str]:
+    """Rows of the cells that are used, with points for decimal commas, and `nan` in empty cells."""
+    header, decimals = rows.header, _Decimals(rows.header.separator)
+    for _, line in rows.lines():
+        cells = cells_of(line, header.separator)
+        if len(cells) != len(header.columns):
+            raise _IrregularError(line)
+        used = [cells[place].strip() for place in rows.used]  # of tabs, too, which separate what is returned
+        if rows.empty_cells:
+            used = [cell or "nan" for cell in used]
+        yield "\t".join(map(decimals.with_points, used))
+
+
+class _Decimals:
+    """The decimal sign of a table, which is the same throughout; a comma only where it separates no cells."""
+
+    def __init__(self, separator: str) -> None:
+        self._admitted = separator != ","
+        self._sign = ""
+
+    def with_points(self, cell: str) -> str:
+        """A cell with a decimal point."""
+        if "," not in cell and "." not in cell:
+            return cell
+        sign = "," if "," in cell else "."
+        if sign != (self._sign or sign) or (sign == "," and not self._admitted):
+            raise _IrregularError(cell)
+        self._sign = sign
+        return cell.replace(",", ".")
+
+
+def _row_problems(rows: Rows) -> list[Problem]:
+    """Return the first problem of each kind, saying how many there are like it."""
+    alike: dict[str, list[Problem]] = {}
+    empty, decimals = True, _Decimals(rows.header.separator)
+    for number, line in rows.lines():
+        empty = False
+        for kind, message in _cell_problems(rows, line, decimals.with_points):
+            alike.setdefault(kind, []).append(Problem(rows.path, number, message))
+        if len(alike) > MAX_KINDS or any(len(found) >= MAX_ALIKE for found in alike.values()):
+            break
+    if empty:
+        return [Problem(rows.path, 0, "there are no rows below the header")]
+    problems = [_summary(found) for found in list(alike.values())[:MAX_KINDS]]
+    if len(alike) > MAX_KINDS:
+        problems.append(
+            Problem(rows.path, 0, f"more than {MAX_KINDS} kinds of problems; reading stopped there")
+        )
+    return problems
+
+
+def _summary(found: list[Problem]) -> Problem:
+    first, count = found[0], len(found)
+    if count == 1:
+        return first
+    number = f"{count}" if count < MAX_ALIKE else f"{count} or more"
+    return Problem(first.file, first.line, f"{first.message} (the first of {number} such lines)")
+
+
+def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> Iterator[tuple[str, str]]:
+    """Yield kind and sentence of what is wrong with a row."""
+    separator, count = rows.header.separator, len(rows.header.columns)
+    cells = cells_of(line, separator)
+    if len(cells) != count:
+        doubled = separator == "," and len(cells) == 2 * count
+        hint = "; with decimal commas, semicolons or tabs stand between the columns" if doubled else ""
+        yield "count", f"expected {count} values as in the header, found {len(cells)}{hint}"
+        return
+    for place in rows.used:
+        name, cell = rows.name(place), cells[place]
+        if rows.empty_cells and cell.strip().lower() in NOTHING:
+            continue
+        try:
+            number = with_point(cell)
+        except _IrregularError:
+            number, hint = "", "; the decimal sign is a comma in some cells and a point in others"
+            hint = hint if separator != "," and _DECIMAL_COMMA.fullmatch(cell.replace(".", ",")) else ""
+        else:
+            hint = ""
+        if not is_number(number):
+            yield name, f"column {name}: expected a finite number, found {cell.strip()[:40]!r}{hint}"

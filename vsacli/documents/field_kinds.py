@@ -1,0 +1,418 @@
+"""Kinds of declared values: numbers with units, texts, words, files, and several numbers.
+
+A kind is the data of a declared value (unit, length, options) and the way a node of a document is read into
+it. Each further job is one function for all kinds: JSON Schema in `json_schema`, lines of a template in
+`commented`, arrays, JSON values and numbers in `record_values`. Lists and records are in `nested`.
+
+A record class is a frozen, keyword-only dataclass whose attributes are made by the functions of `fields`. It
+may have these class attributes: `not_yet` names keys that belong to the format but that this version does not
+act on; `unit_variant` names the choice on which the units in the record, and in records inside it, depend;
+`unit_variant_with` is a key and the choice that counts for them if the key is there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple, TypeAlias
+
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import FieldProblem, InputError, InvalidRecordError
+from vsacli.base.texts import MOST_LETTERS
+from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, Quantity
+from vsacli.documents import tree
+from vsacli.documents.expression import BOOLEANS, ExpressionError, evaluate
+from vsacli.documents.tree import INVALID, Node, Scalar, Scope, all_valid, quoted
+
+REQUIRED = dataclasses.MISSING
+LARGEST = 1e30
+"""Size of a finite number, in SI units, beyond which it is refused: products of a few still are numbers."""
+
+SMALLEST = 1e-30
+"""Size below which a number is refused if it cannot be zero: one may divide by it."""
+
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+TRUTHS = ("true", "false")
+
+PER_CENT = re.compile(r"(?P<number>.*\S)\s*%")
+"""A share in per cent."""
+
+FieldPath: TypeAlias = tuple[str | int, ...]
+Schema: TypeAlias = dict[str, Any]
+Refer: TypeAlias = Callable[[type, str | None], Schema]
+"""Gives the JSON Schema that refers to a record class, as the variant of a word if it is one."""
+
+
+class Check(NamedTuple):
+    """A condition on a single number and the words for it, as in "must be positive".
+
+    `keywords` say it in JSON Schema, as far as that can.
+    """
+
+    holds: Callable[[float], bool]
+    requirement: str
+    keywords: Mapping[str, Any] = MappingProxyType({})
+
+    def problem(self, number: float) -> str | None:
+        """Return why a number is refused, by the condition or for its size; None if it is not."""
+        if not self.holds(number):
+            return f"must be {self.requirement}, not {number:g}"
+        if LARGEST < abs(number) < math.inf:
+            return f"must be at most {LARGEST:g} in size, not {number:g}"
+        if 0 < abs(number) < SMALLEST and not self.holds(0.0):
+            return f"must be at least {SMALLEST:g} in size, not {number:g}"
+        return None
+
+
+_ANY = Check(lambda _: True, "any number")
+
+
+class Kind(ABC):
+    """The kind of a declared value.
+
+    Attributes:
+        unit: what its numbers measure; None if it is none, or each has a unit of its own.
+        item: the kind of the entries, if a value has several.
+        records: classes of the records in a value, by the word that selects each, "" for the only one.
+        per_joint: whether the last index of the path to a problem is that of a joint.
+        dims: dimensions of a value as one array; None if it has no such form.
+    """
+
+    unit: Quantity | None = None
+    item: Kind | None = None
+    records: Mapping[str, type] = MappingProxyType({})
+    per_joint = False
+    dims: tuple[str, ...] | None = None
+
+    @abstractmethod
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the value of a node, which messages call `label`; INVALID if its problem was noted."""
+
+    def fault(self, _content: Any) -> str | None:
+        """Return what is wrong with a value as a whole, besides the condition on its numbers."""
+        return None
+
+    def problems(self, path: FieldPath, check: Check | None, content: Any) -> Iterator[FieldProblem]:
+        """Yield what is wrong with a value at a path, whose numbers must meet a condition."""
+        fault = self.fault(content)
+        if fault is not None:
+            yield FieldProblem(path, fault)
+        elif isinstance(content, tuple):
+            for index, entry in enumerate(content):
+                yield from (self.item or self).problems((*path, index), check, entry)
+        elif content is not None and (check or (self.unit and isinstance(content, float | int))):
+            problem = (check or _ANY).problem(content)
+            if problem:
+                yield FieldProblem(path, problem)
+
+
+class OwnKind(Kind):
+    """A kind that one module declares for itself; `words` are for the documentation."""
+
+    words: str
+
+    @abstractmethod
+    def schema(self, refer: Refer) -> Schema:
+        """Return the JSON Schema of values."""
+
+    def json_value(self, content: Any, _of_record: Callable[[Any], Any]) -> Any:
+        """Return a value as JSON could hold it."""
+        return content
+
+
+def on_one_line(value: Any) -> str:
+    """Return a value as YAML on one line."""
+    match value:
+        case Mapping():
+            return f"{{{', '.join(f'{key}: {on_one_line(entry)}' for key, entry in value.items())}}}"
+        case list() | tuple():
+            return f"[{', '.join(map(on_one_line, value))}]"
+        case bool():
+            return "true" if value else "false"
+        case None:
+            return "null"
+        case float():
+            return f"{value:.10g}"
+    return str(value)
+
+
+class Field(NamedTuple):
+    """A declared field: the kind of its value, one sentence about it, and the condition on each number."""
+
+    kind: Kind
+    doc: str
+    check: Check | None = None
+
+    @property
+    def quantity(self) -> Quantity:
+        """Return what its numbers measure."""
+        return self.kind.unit or DIMENSIONLESS
+
+    def problems(self, name: str, content: Any) -> Iterator[FieldProblem]:
+        """Yield what is wrong with the content of the field, whose name is given."""
+        return self.kind.problems((name,), self.check, content)
+
+
+def declared(cls: type) -> dict[str, tuple[Field, Any]]:
+    """Return the fields of a record class in file order, each with its default (REQUIRED if it has none)."""
+    return {
+        attribute.name: (attribute.metadata["field"], attribute.default)
+        for attribute in dataclasses.fields(cls)
+        if "field" in attribute.metadata
+    }
+
+
+def check_fields(record: Any, *further: FieldProblem) -> None:
+    """Check every declared field of a record; for `__post_init__`.
+
+    Args:
+        record: an instance of a record class.
+        further: problems the record found by itself, reported together with these.
+
+    Raises:
+        InvalidRecordError: naming each field whose value it cannot have.
+    """
+    problems = [
+        problem
+        for name, (field, default) in declared(type(record)).items()
+        if not (default is None and getattr(record, name) is None)
+        for problem in field.problems(name, getattr(record, name))
+    ]
+    if problems or further:
+        raise InvalidRecordError(type(record).__name__, [*problems, *further])
+
+
+class Number(Kind):
+    """A number with a unit."""
+
+    unit: Quantity
+    dims = ()
+
+    def __init__(self, unit: Quantity) -> None:
+        self.unit = unit
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the number in SI units."""
+        return read_number(node, scope.unit(self.unit), label, scope)
+
+
+def read_number(node: Node, unit: str, label: str, scope: Scope) -> Any:
+    """Return the number of a node with a unit; see `Kind.read`."""
+    expected = "a number" if unit == str(DIMENSIONLESS) else f"a number in {unit}"
+    if not isinstance(node, Scalar) or node.is_null:
+        return scope.unexpected(node, expected, label)
+    try:
+        return evaluate(node.text, unit)
+    except ExpressionError as error:
+        return scope.unexpected(node, expected, label, f": {error}")
+
+
+class Share(Number):
+    """A share such as `3 %` or `0.03`."""
+
+    def __init__(self) -> None:
+        super().__init__(DIMENSIONLESS)
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the share as a number."""
+        share = PER_CENT.fullmatch(node.text) if isinstance(node, Scalar) else None
+        if share is None:
+            return super().read(node, label, scope)
+        number = super().read(Scalar(node.line, share["number"], plain=True), label, scope)
+        return number if number is INVALID else number / 100
+
+
+class Integer(Kind):
+    """A whole number."""
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the number as `int`."""
+        value = read_number(node, str(DIMENSIONLESS), label, scope)
+        if value is INVALID or value.is_integer():
+            return value if value is INVALID else int(value)
+        return scope.unexpected(node, "a whole number", label)
+
+
+class Boolean(Kind):
+    """True or false, by these words alone."""
+
+    dims = ()
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the value as `bool`."""
+        if isinstance(node, Scalar) and node.plain and node.text in TRUTHS:
+            return node.text == "true"
+        return scope.unexpected(node, "true or false", label)
+
+    def fault(self, content: Any) -> str | None:
+        """See `Kind.fault`."""
+        return None if isinstance(content, bool) else f"must be true or false, not {content!r}"
+
+
+class Text(Kind):
+    """A text; `identifier` restricts it to letters, digits, `_` and `-`, starting with a letter or `_`."""
+
+    dims = ()
+
+    def __init__(self, identifier: bool = False) -> None:
+        self.identifier = identifier
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the text as written, unless YAML takes it for something else."""
+        if not isinstance(node, Scalar) or node.is_null:
+            return scope.unexpected(node, "a text", label)
+        if node.plain and node.text.lower() in BOOLEANS:
+            return scope.unexpected(node, "a text", label, ", a boolean in YAML; put it in quotes")
+        return node.text
+
+    def fault(self, content: Any) -> str | None:
+        """See `Kind.fault`."""
+        if self.identifier and not IDENTIFIER.fullmatch(content):
+            requirement = "letters, digits, _ and -, beginning with a letter or _"
+            return f"must be made of {requirement}, not {quoted(content)}"
+        return _unprintable(content, allowed="\n")
+
+
+class Name(Text):
+    """A name, which stands in titles, messages and comments of code: one line that can be printed."""
+
+    def fault(self, content: Any) -> str | None:
+        """See `Kind.fault`."""
+        if not 1 <= len(content) <= MOST_LETTERS:
+            return f"must have 1 to {MOST_LETTERS} letters, not {len(content)}"
+        return _unprintable(content)
+
+
+def _unprintable(content: str, allowed: str = "") -> str | None:
+    """Return that a text has control characters, or those that turn the direction of writing."""
+    for letter in content:
+        if not (letter.isprintable() or letter in allowed):
+            what = "has a line break" if letter == "\n" else f"has the character {letter!r}"
+            return f"{what}, which cannot be printed in one line; remove it"
+    return None
+
+
+class Choice(Kind):
+    """One of a few words, for the documentation called `words` if they are many.
+
+    `not_yet` are words of the format that this version does not act on.
+    """
+
+    dims = ()
+
+    def __init__(self, options: tuple[str, ...], not_yet: tuple[str, ...] = (), words: str = "") -> None:
+        self.options, self.not_yet, self.words = options, not_yet, words
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the word, which may still be none of the options."""
+        if isinstance(node, Scalar) and not node.is_null:
+            return node.text
+        return scope.unexpected(node, f"one of {', '.join(self.options)}", label)
+
+    def fault(self, content: Any) -> str | None:
+        """See `Kind.fault`."""
+        return None if content in self.options else unknown_word(content, self.options, self.not_yet)
+
+
+def unknown_word(word: str, options: Iterable[str], not_yet: tuple[str, ...]) -> str:
+    """Return why a word is none of the options."""
+    if word in not_yet:
+        return f"{word!r} is not supported yet"
+    return f"unknown word {quoted(word)}{did_you_mean(word, options)}"
+
+
+class TableFile(Kind):
+    """Path of a CSV file relative to the document, read as a `Table` of these columns."""
+
+    dims = ()
+
+    def __init__(self, columns: tuple[str, ...]) -> None:
+        self.columns = columns
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the table in the file; what is wrong with that is noted under its own name."""
+        name = Text().read(node, label, scope)
+        if name is INVALID:
+            return INVALID
+        from vsacli.documents.table import read_table
+
+        try:
+            table = read_table(Path(scope.problems.file).parent / name)
+            if table.columns != self.columns:
+                expected, found = ",".join(self.columns), ",".join(table.columns)
+                message = f"expected the header {expected}, found {found}"
+                raise InputError.one(message, table.source.path, 1)
+        except InputError as error:
+            scope.problems.include(error)
+            return INVALID
+        return table
+
+
+class Vector(Kind):
+    """A list of `length` numbers, read as a tuple."""
+
+    dims = ("axis",)
+
+    def __init__(self, length: int, unit: Quantity) -> None:
+        self.length, self.unit = length, unit
+        self.item: Number = Number(unit)
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the numbers, which may still be too many or too few."""
+        if not isinstance(node, tree.Sequence):
+            return scope.unexpected(node, f"a list of {self.length} numbers", label)
+        return all_valid(self.item.read(item, label, scope) for item in node.items)
+
+    def fault(self, content: Any) -> str | None:
+        """See `Kind.fault`."""
+        right = len(content) == self.length
+        return None if right else f"expected {self.length} numbers, found {len(content)}"
+
+
+class Interval(Kind):
+    """`[lower, upper]`, read as a pair; a scalar x means [-x, x], or [lowest, x] with a `lowest`."""
+
+    dims = ("bound",)
+
+    def __init__(self, unit: Quantity, lowest: float | None = None) -> None:
+        self.unit, self.lowest = unit, lowest
+        self.item: Number = Number(unit)
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return both bounds."""
+        if isinstance(node, tree.Scalar):
+            upper = self.item.read(node, label, scope)
+            return upper if upper is INVALID else (-upper if self.lowest is None else self.lowest, upper)
+        if isinstance(node, tree.Sequence) and len(node.items) == 2:
+            return all_valid(self.item.read(item, label, scope) for item in node.items)
+        return scope.unexpected(node, "[lower, upper] or one number", label)
+
+    def fault(self, content: Any) -> str | None:
+        """See `Kind.fault`."""
+        if content[0] <= content[1]:
+            return None
+        return f"the lower bound {content[0]:g} exceeds the upper bound {content[1]:g}"
+
+
+class NamedNumbers(Kind):
+    """A mapping from names of one's own to numbers in SI units, read as pairs; angles may be in degrees."""
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return pairs of a name and a number."""
+        if not isinstance(node, tree.Mapping):
+            return scope.unexpected(node, "a mapping from names to numbers", label)
+        numbers = all_valid(
+            read_number(entry, str(ANY_SI_UNIT), f"{label}.{name}", scope)
+            for name, entry in node.entries.items()
+        )
+        return numbers if numbers is INVALID else tuple(zip(node.entries, numbers, strict=True))
+
+    def problems(self, path: FieldPath, check: Check | None, content: Any) -> Iterator[FieldProblem]:
+        """See `Kind.problems`."""
+        for name, entry in content:
+            yield from Number(ANY_SI_UNIT).problems((*path, name), check, entry)

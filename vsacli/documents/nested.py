@@ -1,0 +1,315 @@
+"""Kinds of nested values: lists, pairs of sides, values by joint, and records, with the reading of a record.
+
+A record is read field by field. What a field cannot hold is noted with its line, and reading goes on, so that
+all problems of a file are reported together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import Any
+
+from vsacli.base.did_you_mean import did_you_mean, nearest
+from vsacli.base.errors import FieldProblem, InputError, InvalidRecordError
+from vsacli.base.units import Quantity
+from vsacli.documents import tree
+from vsacli.documents.field_kinds import (
+    REQUIRED,
+    Check,
+    Choice,
+    Field,
+    FieldPath,
+    Kind,
+    Number,
+    declared,
+    read_number,
+    unknown_word,
+)
+from vsacli.documents.tree import INVALID, Node, Scope, all_valid, quoted
+
+
+class Items(Kind):
+    """A list of one or more values of a kind, read as a tuple; all differ in the text field `unique`."""
+
+    item: Kind
+
+    def __init__(self, item: Kind, unique: str | None = None) -> None:
+        self.item, self.unique = item, unique
+        self.records, self.per_joint = item.records, item.per_joint
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the entries, all different."""
+        if not isinstance(node, tree.Sequence) or not node.items:
+            return scope.unexpected(node, "a list of one or more", label)
+        values = all_valid([self.item.read(item, label, scope) for item in node.items])
+        return INVALID if self._note_repeated(node, label, scope) else values
+
+    def _note_repeated(self, node: tree.Sequence, label: str, scope: Scope) -> bool:
+        if self.unique is None:
+            return False
+        keys = [_scalar_entry(item, self.unique) for item in node.items]
+        found = list(_repeated(key.text if key else None for key in keys))
+        for index, message in found:
+            line = line_of((index, self.unique), node, scope)
+            scope.problems.add(line, f"{label}.{self.unique}: {message}")
+        return bool(found)
+
+    def problems(self, path: FieldPath, check: Check | None, content: Any) -> Iterator[FieldProblem]:
+        """See `Kind.problems`; entries that must differ are records, which checked themselves."""
+        if self.unique is None:
+            yield from super().problems(path, check, tuple(content))
+        else:
+            for index, message in _repeated(getattr(item, self.unique) for item in content):
+                yield FieldProblem((*path, index, self.unique), message)
+
+
+def _repeated(words: Iterable[str | None]) -> Iterator[tuple[int, str]]:
+    """Yield index of, and message about, each word that stood before; None never counts."""
+    seen: set[str] = set()
+    for index, word in enumerate(words):
+        if word is not None and word in seen:
+            yield index, f"{quoted(word)} is taken by another entry; each needs its own"
+        elif word is not None:
+            seen.add(word)
+
+
+def _scalar_entry(node: Node, key: str) -> tree.Scalar | None:
+    entry = node.entries.get(key) if isinstance(node, tree.Mapping) else None
+    return entry if isinstance(entry, tree.Scalar) else None
+
+
+class OneOrMore(Items):
+    """One value of a kind, or a list of one or more, read as a tuple."""
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the values."""
+        if isinstance(node, tree.Sequence):
+            return super().read(node, label, scope)
+        one = self.item.read(node, label, scope)
+        return one if one is INVALID else (one,)
+
+
+class Pair(Kind):
+    """One value for both of two, the sides of a joint say, or a list of two, read as a pair.
+
+    `dim` is what the arrays of both lie along.
+    """
+
+    __match_args__ = ("item", "dim")
+    item: Kind
+
+    def __init__(self, item: Kind, dim: str = "motor") -> None:
+        self.item, self.dim = item, dim
+        self.records, self.unit = item.records, item.unit
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return both values, which are one if one was written."""
+        if isinstance(node, tree.Mapping) and self._names_sides(node):
+            keys = ", ".join(map(quoted, node.entries))
+            expected = "one mapping for both sides or a list of two"
+            scope.problems.add(node.line, f"{label}: expected {expected}, found the keys {keys}")
+            return INVALID
+        if not isinstance(node, tree.Sequence):
+            both = self.item.read(node, label, scope)
+            return both if both is INVALID else (both, both)
+        if len(node.items) != 2:
+            return scope.unexpected(node, "one value for both sides or a list of 2", label)
+        return all_valid([self.item.read(item, label, scope) for item in node.items])
+
+    def problems(self, path: FieldPath, check: Check | None, content: Any) -> Iterator[FieldProblem]:
+        """See `Kind.problems`."""
+        return super().problems(path, check, tuple(content))
+
+    def _names_sides(self, node: tree.Mapping) -> bool:
+        """Whether mappings stand under keys of their own, as in `{flexor: {...}, extensor: {...}}`."""
+        if not node.entries or not all(isinstance(value, tree.Mapping) for value in node.entries.values()):
+            return False
+        known = {"type", *(name for cls in self.records.values() for name in declared(cls))}
+        return known.isdisjoint(node.entries)
+
+
+class PerJoint(Kind):
+    """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint.
+
+    Joints that are exempt from `purpose` are named in no mapping and null in a list; their entry is None.
+    """
+
+    unit: Quantity
+    per_joint = True
+
+    def __init__(self, unit: Quantity, purpose: str = "") -> None:
+        self.unit, self.purpose, self.item = unit, purpose, Number(unit)
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return a number for each joint in its own unit, None if it is exempt; or extend a survey."""
+        if scope.survey is not None:
+            scope.survey.append((self.unit, node))
+            return INVALID
+        exempt = scope.exempt.get(self.purpose, {})
+        nodes = _by_joint(node, label, scope, exempt)
+        if nodes is None:
+            return INVALID
+        return all_valid(
+            _no_number(nodes.get(name), name, exempt[name], label, scope)
+            if name in exempt
+            else read_number(nodes[name], self.unit.unit(variant), label, scope)
+            for name, variant in scope.members.items()
+        )
+
+
+def _no_number(node: Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:
+    """Return None, for a joint that must not have a number."""
+    if node is None or (isinstance(node, tree.Scalar) and node.is_null):
+        return None
+    return scope.unexpected(node, f"no value for {name}", label, f": {reason}")
+
+
+def _by_joint(node: Node, label: str, scope: Scope, exempt: Mapping[str, str]) -> Mapping[str, Node] | None:
+    """Return what is written for each joint, a scalar for all but exempt ones; None if joints are wrong."""
+    names = scope.members
+    match node:
+        case tree.Scalar():
+            return {name: node for name in names if name not in exempt}
+        case tree.Sequence(items=items) if len(items) != len(names):
+            scope.unexpected(node, f"{len(names)} numbers, one for each joint", label)
+            return None
+        case tree.Sequence(items=items):
+            return dict(zip(names, items, strict=True))
+        case tree.Mapping(entries=entries):
+            return entries if _check_names(node, label, scope, exempt) else None
+
+
+def _check_names(node: tree.Mapping, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
+    """Note names that are no joint's, and joints without a value."""
+    names = scope.members
+    unknown = [name for name in node.entries if name not in names]
+    for name in unknown:
+        message = f"{label}: no joint is called {quoted(name)}{did_you_mean(name, names)}"
+        scope.problems.add(node.key_lines[name], message)
+    missing = [name for name in names if name not in node.entries and name not in exempt]
+    if missing:
+        scope.problems.add(node.line, f"{label}: no value for {', '.join(missing)}; each joint needs one")
+    return not unknown and not missing
+
+
+class Record(Kind):
+    """A mapping read into the record class `cls`."""
+
+    __match_args__ = ("cls",)
+
+    def __init__(self, cls: type) -> None:
+        self.cls, self.records = cls, {"": cls}
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return an instance of the class."""
+        if isinstance(node, tree.Mapping):
+            return read_record(self.cls, node, label, scope)
+        return scope.unexpected(node, "a mapping", label)
+
+
+class OneOf(Kind):
+    """A mapping whose key `type` selects the record class; `not_yet` as for Choice."""
+
+    __match_args__ = ("records",)
+
+    def __init__(self, variants: Mapping[str, type], not_yet: tuple[str, ...] = ()) -> None:
+        self.records, self.not_yet = variants, not_yet
+
+    def word_of(self, record: Any) -> str:
+        """Return the word that selects the class of a record."""
+        return next(word for word, variant in self.records.items() if type(record) is variant)
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return an instance of the class that `type` selects."""
+        if not isinstance(node, tree.Mapping):
+            return scope.unexpected(node, "a mapping with the key 'type'", label)
+        selector = node.entries.get("type")
+        if selector is None:
+            scope.problems.add(node.line, f"{label}: missing key 'type', one of {', '.join(self.records)}")
+            return INVALID
+        if not isinstance(selector, tree.Scalar):
+            return scope.unexpected(selector, f"one of {', '.join(self.records)}", f"{label}.type")
+        if selector.text not in self.records:
+            reason = unknown_word(selector.text, self.records, self.not_yet)
+            scope.problems.add(selector.line, f"{label}.type: {reason}")
+            return INVALID
+        return read_record(self.records[selector.text], node, label, scope, beside=("type",))
+
+
+def read_record(cls: type, node: tree.Mapping, label: str, scope: Scope, beside: tuple[str, ...] = ()) -> Any:
+    """Read a mapping into a record class; the keys `beside` those of the class are the caller's."""
+    prefix = f"{label}: " if label else ""
+    scope = scope_inside(scope, cls, node)
+    fields = declared(cls)
+    mistyped = _refuse_unknown_keys(cls, node, (*fields, *beside), scope)
+    values = {
+        name: _read_field(name, field, node, prefix, scope)
+        for name, (field, default) in fields.items()
+        if name in node.entries or (default is REQUIRED and name not in mistyped)
+    }
+    if INVALID in values.values() or not mistyped.isdisjoint(fields):
+        return INVALID
+    try:
+        return cls(**values)
+    except InvalidRecordError as error:
+        for problem in error.fields:
+            message = problem.in_file(list(scope.members))
+            scope.problems.add(line_of(problem.path, node, scope), f"{prefix}{message}")
+        return INVALID
+    except InputError as error:
+        scope.problems.include(error)
+        return INVALID
+
+
+def scope_inside(scope: Scope, cls: type, node: tree.Mapping) -> Scope:
+    """Return the scope of the values in a record."""
+    key, variant = getattr(cls, "unit_variant_with", (None, None))
+    if key in node.entries:
+        return scope._replace(variant=variant)
+    selector = getattr(cls, "unit_variant", None)
+    if selector is None:
+        return scope
+    match declared(cls)[selector][0].kind, node.entries.get(selector):
+        case Choice(options=options), tree.Scalar(text=word) if word in options:
+            return scope._replace(variant=word)
+    return scope._replace(variant=None)
+
+
+def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], scope: Scope) -> set[str]:
+    """Note unknown keys; returns the known ones that were probably meant, which are then not missing."""
+    meant: set[str] = set()
+    for key, line in node.key_lines.items():
+        if key in getattr(cls, "not_yet", ()):
+            scope.problems.add(line, f"{key!r} is not supported yet")
+        elif key not in known:
+            scope.problems.add(line, f"unknown key {quoted(key)}{did_you_mean(key, known)}")
+            meant.update(filter(None, [nearest(key, known)]))
+    return meant - node.entries.keys()
+
+
+def _read_field(name: str, field: Field, node: tree.Mapping, prefix: str, scope: Scope) -> Any:
+    content = node.entries.get(name)
+    if content is None:
+        scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc})")
+        return INVALID
+    value = field.kind.read(content, name, scope)
+    if value is INVALID:
+        return INVALID
+    problems = list(field.problems(name, value))
+    for problem in problems:
+        place = f" of joint {list(scope.members)[int(problem.path[-1])]}" if field.kind.per_joint else ""
+        scope.problems.add(line_of(problem.path, node, scope), f"{name}{place}: {problem.message}")
+    return INVALID if problems else value
+
+
+def line_of(path: FieldPath, node: Node, scope: Scope) -> int:
+    """Return the line of the deepest node along a path; a scalar stands for all entries of its value."""
+    for step in path:
+        if isinstance(node, tree.Mapping):
+            key = list(scope.members)[step] if isinstance(step, int) else step
+            if key not in node.entries:
+                break
+            node = node.entries[key]
+        elif isinstance(node, tree.Sequence) and isinstance(step, int):
+            node = node.items[step]
+    return node.line

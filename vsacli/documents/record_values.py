@@ -1,0 +1,197 @@
+"""Values of records for other forms: arrays of a result, JSON values, and single numbers with their paths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from vsacli.base.units import ANY_SI_UNIT, Quantity
+from vsacli.documents import field_kinds
+from vsacli.documents.field_kinds import (
+    Kind,
+    NamedNumbers,
+    OwnKind,
+    TableFile,
+    Text,
+    declared,
+    on_one_line,
+)
+from vsacli.documents.nested import Items, OneOf, Pair, PerJoint, Record
+
+
+class ResolvedField(NamedTuple):
+    """The values of one declared field.
+
+    Attributes:
+        path: keys that lead to it in a file, e.g. ("joints", "link", "mass").
+        dims: one name an axis of `values`: joint, motor, axis, bound or direction.
+        quantity: unit at revolute and prismatic joints, None for text.
+        doc: the declared sentence.
+        values: float64 or str objects; NaN or "" at entries that do not have the field.
+    """
+
+    path: tuple[str, ...]
+    dims: tuple[str, ...]
+    quantity: Quantity | None
+    doc: str
+    values: np.ndarray[Any, np.dtype[Any]]
+
+
+def arrays(
+    kind: Kind, content: Any, of_record: Callable[[Any], Iterable[ResolvedField]]
+) -> Iterator[ResolvedField]:
+    """Yield a value of a kind as arrays; `of_record` gives those of a record in it.
+
+    Raises:
+        TypeError: there are none of this kind.
+    """
+    match kind:
+        case Record():
+            yield from of_record(content)
+        case OneOf():
+            yield _single(Text(), kind.word_of(content))._replace(path=("type",))
+            yield from of_record(content)
+        case NamedNumbers():
+            for name, entry in content:
+                yield _single(field_kinds.Number(ANY_SI_UNIT), entry)._replace(path=(name,))
+        case Pair(item, dim):
+            yield from _stacked(dim, (arrays(item, side, of_record) for side in content))
+        case Items(item=item, records=records) if records:
+            yield from _stacked("joint", (arrays(item, joint, of_record) for joint in content))
+        case _:
+            yield _single(kind, content)
+
+
+def _single(kind: Kind, content: Any) -> ResolvedField:
+    """Return one text, one number, or numbers along dimensions; path and sentence are still to come."""
+    if kind.dims is None:
+        raise TypeError(f"a field of the kind {type(kind).__name__} has no array form")
+    if kind.unit is None:  # some readers of HDF5 know no boolean
+        text = content.source.path if isinstance(kind, TableFile) else on_one_line(content)
+        return ResolvedField((), kind.dims, None, "", np.array(text, dtype=object))
+    return ResolvedField((), kind.dims, kind.unit, "", np.array(content, dtype=np.float64))
+
+
+def _stacked(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[ResolvedField]:
+    """Join the fields of all joints, or of both sides of a joint, along a new first axis.
+
+    Of each field the one with most dimensions is decisive: a joint may have one motor or spring, or two.
+    """
+    parts = [list(member) for member in members]
+    tables = [{part.path: part.values for part in member} for member in parts]
+    prototypes: dict[tuple[str, ...], ResolvedField] = {}
+    for part in (part for member in reversed(parts) for part in member):
+        if part.path not in prototypes or len(part.dims) >= len(prototypes[part.path].dims):
+            prototypes[part.path] = part
+    for path, part in prototypes.items():
+        absent = np.full_like(part.values, "" if part.quantity is None else np.nan)
+        values = np.stack([_fitted(table.get(path, absent), absent) for table in tables])
+        yield part._replace(dims=(dim, *part.dims), values=values)
+
+
+def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return the values in the shape of those of two sides; if they are of one, as of the first."""
+    if values.shape == absent.shape:
+        return values
+    fitted = absent.copy()
+    fitted[0] = values[()]
+    return fitted
+
+
+def json_fields(record: Any) -> dict[str, Any]:
+    """Return the declared fields of a record as JSON could hold them, but for numbers that are not finite."""
+    return {
+        name: None if (content := getattr(record, name)) is None else json_value(field.kind, content)
+        for name, (field, _) in declared(type(record)).items()
+    }
+
+
+def json_value(kind: Kind, content: Any, of_record: Callable[[Any], Any] = json_fields) -> Any:
+    """Return a value of a kind as JSON could hold it, but for numbers that are not finite."""
+    match kind:
+        case OwnKind():
+            return kind.json_value(content, of_record)
+        case Record():
+            return of_record(content)
+        case OneOf():
+            return {"type": kind.word_of(content), **of_record(content)}
+        case NamedNumbers():
+            return dict(content)
+        case TableFile():
+            return content.source.path
+        case Kind(item=Kind() as item):
+            return [json_value(item, entry, of_record) for entry in content]
+    return content
+
+
+class Entry(NamedTuple):
+    """A step into a list, or into values by joint: number from 0, and the name if it has one."""
+
+    number: int
+    name: str = ""
+
+    def __str__(self) -> str:
+        return self.name or str(self.number)
+
+
+NumberPath: TypeAlias = tuple[str | Entry, ...]
+"""Leads to a number of a file; joined by dots as users write it."""
+
+
+class Number(NamedTuple):
+    """A number of a record.
+
+    Attributes:
+        path: to it.
+        quantity: what it measures.
+        value: in SI units.
+        requirement: what it must be, as in "must be positive"; "" if it may be any number.
+    """
+
+    path: NumberPath
+    quantity: Quantity
+    value: float
+    requirement: str
+
+
+def numbers(
+    record: Any, members: Mapping[str, str] = MappingProxyType({}), path: NumberPath = ()
+) -> Iterator[Number]:
+    """Yield every finite number in the declared fields of a record, and in the records in it.
+
+    Args:
+        record: whose fields are declared.
+        members: name and unit variant of every joint, where the record has values by joint.
+        path: to the record.
+    """
+    for name, (field, _) in declared(type(record)).items():
+        requirement = "" if field.check is None else field.check.requirement
+        yield from _numbers(field.kind, getattr(record, name), requirement, members, (*path, name))
+
+
+def _numbers(
+    kind: Kind, content: Any, requirement: str, members: Mapping[str, str], path: NumberPath
+) -> Iterator[Number]:
+    if content is None:
+        return
+    if isinstance(kind, Pair) and content[0] is content[1]:
+        yield from _numbers(kind.item, content[0], requirement, members, path)
+    elif kind.item is not None:
+        names = entry_names(kind, content, members)
+        for number, (name, entry) in enumerate(zip(names, content, strict=True)):
+            yield from _numbers(kind.item, entry, requirement, members, (*path, Entry(number, name)))
+    elif kind.records:
+        yield from numbers(content, members, path)
+    elif kind.unit is not None and math.isfinite(content):
+        yield Number(path, kind.unit, float(content), requirement)
+
+
+def entry_names(kind: Kind, content: Any, members: Mapping[str, str]) -> list[str]:
+    """Return names of the entries of a value, "" where one has none; `members` are the joints, if known."""
+    if isinstance(kind, PerJoint) and members:
+        return list(members)
+    return [getattr(entry, "name", "") if isinstance(kind, Items) else "" for entry in content]

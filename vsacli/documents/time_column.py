@@ -1,0 +1,218 @@
+"""The meaning of a column of times: its names and units, clock formats, counters and absolute stamps.
+
+A clock text is a time of day, as `22:30:01.720429` or `22:30:01:720429`, or a date with one, as ISO 8601
+writes it. Stamps are read in whole nanoseconds where floating-point numbers would lose digits, as since 1970.
+A further format is a case here; readers and descriptions of tables follow.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from datetime import date
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.documents.csv_file import NOTHING, Rows, is_number, read_integers
+
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+TIME = "time"
+"""What the column of the stamps is called here."""
+
+UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""Units that stamps without one may be in, and their size in seconds."""
+
+USUAL_STEPS = (1e-5, 0.2)
+"""Steps, s, that a recording has: 5 Hz to 100 kHz. The first unit with which steps are such is proposed."""
+
+UNIT_WORDS_OF_TIMES = {
+    **dict.fromkeys(("ms", "msec", "millis"), "ms"),
+    **dict.fromkeys(("us", "usec", "micros"), "us"),
+    **dict.fromkeys(("ns", "nsec", "nanosec", "nanoseconds"), "ns"),
+}
+"""Units by words at the end of a name, in small letters."""
+
+NAMES = (
+    *("time", "__time", "field.header.stamp", "header.stamp", "%time", "rosbagtimestamp"),
+    *("timestamp", "stamp", "t", "seconds", "zeit", "clock", "datetime"),
+)
+"""What stamps are called, the best first: those of sensors before those of loggers."""
+
+SECONDS = ("sec", "secs")
+REST = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
+"""How names of stamps end that fill two columns, as in messages of ROS."""
+
+UNITS_IN_NAMES = ("s", "sec", "secs", "ms", "msec", "us", "usec", "ns", "nsec", "nanosec")
+"""Words behind a name that say what it counts."""
+
+SINCE_1970 = {1e8: "s", 1e11: "ms", 1e14: "us", 1e17: "ns"}
+"""From which number on a stamp counts so from 1970: since 1973, for the least."""
+
+NANOSECONDS = 10**9
+"""In a second."""
+
+HOUR, DAY = 3600 * NANOSECONDS, 86400 * NANOSECONDS
+
+DIGITS = 9
+"""Of a fraction of a second in nanoseconds; further ones are cut off."""
+
+EXPECTED = "a number, a time of day such as 22:30:01.72, or a date and time such as 2024-05-01T22:30:01.72Z"
+"""What a cell of a column of times may hold, for messages."""
+
+LARGEST_EXACT = 2.0**53
+"""Whole numbers beyond are not told apart in floating point; ns since 1970 are 200 times as large."""
+
+_CLOCK = re.compile(
+    r"((?P<year>\d{4})[-/](?P<month>\d\d?)[-/](?P<day>\d\d?)[T ] *)?"
+    r"(?P<hours>\d\d?):(?P<minutes>[0-5]\d):(?P<seconds>[0-5]\d)"
+    r"([.,](?P<fraction>\d+)|:(?P<after_colon>\d{3}|\d{6}|\d{9}))?"  # after a colon only whole groups are one
+    r" *(?P<half>[AP]M)?(?P<zone>Z|[+-]\d\d:?\d\d)?",
+    re.ASCII | re.IGNORECASE,
+)
+
+
+class Clock(NamedTuple):
+    """A time that a text tells.
+
+    Attributes:
+        nanoseconds: since midnight, or since 1970.
+        dated: whether the text has a date.
+    """
+
+    nanoseconds: int
+    dated: bool
+
+
+def read_clock(text: str) -> Clock | None:
+    """Return the time that a text tells; None if it tells none in a form that is known here."""
+    found = _CLOCK.fullmatch(text.strip())
+    if found is None:
+        return None
+    hours = int(found["hours"])
+    if hours > (12 if found["half"] else 23):
+        return None
+    if found["half"]:
+        hours = hours % 12 + 12 * (found["half"].upper() == "PM")
+    fraction = (found["fraction"] or found["after_colon"] or "").ljust(DIGITS, "0")[:DIGITS]
+    whole = hours * 3600 + int(found["minutes"]) * 60 + int(found["seconds"]) - _offset(found["zone"])
+    if found["year"] is not None:
+        try:
+            day = date(int(found["year"]), int(found["month"]), int(found["day"]))
+        except ValueError:
+            return None
+        whole += (day.toordinal() - date(1970, 1, 1).toordinal()) * 86400
+    return Clock(whole * NANOSECONDS + int(fraction), found["year"] is not None)
+
+
+def _offset(zone: str | None) -> int:
+    """Return the offset of a time zone from UTC, s."""
+    if zone is None or zone.upper() == "Z":
+        return 0
+    minutes = int(zone[1:3]) * 60 + int(zone[-2:])
+    return -60 * minutes if zone[0] == "-" else 60 * minutes
+
+
+def elapsed(clocks: Sequence[Clock]) -> npt.NDArray[np.int64]:
+    """Return by how much each time is later than the first one, ns.
+
+    A time of day that falls by more than twelve hours is one of the next day.
+    """
+    since = np.array([each.nanoseconds for each in clocks], dtype=np.int64)
+    if not clocks[0].dated:
+        since[1:] += DAY * np.cumsum(np.diff(since) < -12 * HOUR)
+    return np.asarray(since - since[0])
+
+
+def unit_of_steps(step: float) -> str | None:
+    """Return the first unit other than the second in which a step would be a usual one."""
+    low, high = USUAL_STEPS
+    return next((unit for unit, size in UNITS.items() if low <= step * size <= high), None)
+
+
+def guessed_unit(stamps: Sequence[float]) -> tuple[str | None, str]:
+    """Return the unit of stamps that have none in the header, None for seconds; and why, a clause."""
+    since = [unit for least, unit in SINCE_1970.items() if stamps[0] >= least]
+    if since:
+        return (None if since[-1] == "s" else since[-1]), f"counts {since[-1]} since 1970"
+    step = float(np.median(np.diff(np.array(stamps))))
+    unit = unit_of_steps(step) if step > USUAL_STEPS[1] else None
+    return unit, f"steps of {step:.4g} are hardly seconds" if unit else ""
+
+
+def are_seconds_and_nanoseconds(seconds: Sequence[float], rest: Sequence[float], least: float) -> bool:
+    """Return whether these are whole seconds from `least` on, and nanoseconds that start again in each."""
+    return (
+        len(seconds) == len(rest) > 0
+        and all(second == int(second) and least <= second < 1e11 for second in seconds)
+        and all(part == int(part) and 0 <= part < NANOSECONDS for part in rest)
+        and max(rest) > 1
+    )
+
+
+def shows_a_clock(times: Rows) -> bool:
+    """Return whether the column of times, the only one of these rows, begins with a clock text.
+
+    Raises:
+        InputError: it begins with a text that is neither that nor a number.
+    """
+    line, cell = next(_cells(times), (0, ""))
+    if is_number(cell.replace(",", ".")) or cell.lower() in NOTHING:
+        return False
+    if read_clock(cell) is None:
+        message = f"column {times.name(times.used[0])}: expected {EXPECTED}, found {cell[:40]!r}"
+        raise InputError.one(message, times.path, line)
+    return True
+
+
+def read_clocks(times: Rows) -> tuple[str, FloatArray]:
+    """Return the first clock text of the only column of these rows, and by how many ns each is later.
+
+    Raises:
+        InputError: a cell is no clock text, or one with a date below others without.
+    """
+    cells, clocks = list(_cells(times)), list[Clock]()
+    for line, cell in cells:
+        clock = read_clock(cell)
+        if clock is None or clock.dated != (clocks or [clock])[0].dated:
+            message = f"expected a time as in the rows above, found {cell[:40]!r}"
+            raise InputError.one(message, times.path, line)
+        clocks.append(clock)
+    return cells[0][1], elapsed(clocks).astype(float)
+
+
+def _cells(times: Rows) -> Iterator[tuple[int, str]]:
+    return ((line, cells[times.used[0]].strip()) for line, cells in times.texts())
+
+
+def read_stamps(
+    times: Rows, time: int, nanoseconds: int | None, stamps: FloatArray
+) -> tuple[int | None, FloatArray]:
+    """Return times from the first on without a digit lost, and the first; None and the stamps if small.
+
+    Args:
+        times: the table.
+        time: place of the column of times.
+        nanoseconds: place of that of the nanoseconds next to whole seconds, if there is one.
+        stamps: the times as floating-point numbers.
+
+    Raises:
+        InputError: there are nanoseconds, but both columns are not whole numbers.
+    """
+    if nanoseconds is None and not np.abs(stamps).max() > LARGEST_EXACT:  # NaN if cells are empty
+        return None, stamps
+    places = sorted({time, time if nanoseconds is None else nanoseconds})
+    whole = read_integers(times._replace(used=places, empty_cells=False))
+    if whole is None:
+        if nanoseconds is not None:
+            message = "whole seconds and nanoseconds are expected in the columns of the time"
+            raise InputError.one(message, times.path)
+        return int(stamps[0]), stamps - stamps[0]
+    exact = whole[:, places.index(time)]
+    if nanoseconds is not None:
+        exact = exact * NANOSECONDS + whole[:, places.index(nanoseconds)]
+    return int(exact[0]), (exact - exact[0]).astype(float)

@@ -1,0 +1,91 @@
+"""Dry friction: smooth between two links, and sharp in motors, which stick and slide."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.friction import Friction, FrictionLaws, direction_of
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.compute.vector import Scalar, exact, mul, sub
+from vsacli.dynamics.chain import TorqueDerivatives
+
+
+def joint_friction(
+    friction: Friction | None, rates: tuple[Scalar, Scalar, Scalar, Scalar]
+) -> TorqueDerivatives:
+    """F tanh(q'/w) + F_o and its derivatives, of which tanh' = 1 - tanh^2.
+
+    Args:
+        friction: of the joint; None if there is none.
+        rates: q', q'', q''', q''''; scalars of any kind that has a tanh, integers where they are exact.
+    """
+    if friction is None:
+        return TorqueDerivatives(0, 0, 0)
+    dq, ddq, d3q, _ = rates
+    size, steepness = exact(friction.coulomb[0]), 1 / friction.width if friction.width else 0
+    at_rest = type(dq) is int and dq == 0
+    tanh = 0 if at_rest else np.tanh(dq * steepness)
+    once, twice = mul(steepness, ddq), mul(steepness, d3q)
+    slope = mul(size, sub(1, mul(tanh, tanh)))
+    return TorqueDerivatives(
+        tau=mul(size, tanh) + friction.offset,
+        dtau=mul(slope, once),
+        ddtau=mul(slope, sub(twice, mul(mul(2, tanh), mul(once, once)))),
+    )
+
+
+class Response(NamedTuple):
+    """What follows from motor torques.
+
+    Attributes:
+        ddq: acceleration of the joints, (..., joints).
+        ddtheta: of the motors with springs, (..., springs).
+        friction: dry friction of all motors, (..., motors); None if none has any.
+    """
+
+    ddq: FloatArray
+    ddtheta: FloatArray
+    friction: FloatArray | None
+
+
+Balance = Callable[[FloatArray, BoolArray | None], tuple[FloatArray, FloatArray, FloatArray]]
+"""From the torques of all motors (..., motors), and which are held, None if none can be, to the accelerations
+of joints and of motors with springs, and what the held ones must be held with, (..., motors), 0 of others."""
+
+
+def response_with_friction(
+    laws: FrictionLaws,
+    torque: FloatArray,
+    velocity: FloatArray,
+    slip: FloatArray | None,
+    balance: Balance,
+) -> Response:
+    """Accelerations under motor torques and dry friction.
+
+    Args:
+        laws: dry friction of all motors.
+        torque: of all motors, (..., motors).
+        velocity: of all motors, (..., motors).
+        slip: where friction is sharp the direction in which a motor slides, 0 while it is held, (motors,). If
+            None, a motor that rests is held as long as its friction can.
+        balance: accelerations without friction.
+    """
+
+    def under(direction: FloatArray) -> tuple[Response, FloatArray]:
+        friction = laws.torque(velocity, direction)
+        ddq, ddtheta, holding = balance(torque - friction, laws.sharp & (direction == 0))
+        return Response(ddq, ddtheta, friction + holding), laws.beyond(friction + holding)
+
+    if not laws.sharp.any():
+        friction = laws.torque(velocity)
+        ddq, ddtheta, _ = balance(torque - friction, None)
+        return Response(ddq, ddtheta, friction)
+    if slip is not None:
+        return under(np.broadcast_to(slip, velocity.shape))[0]
+    direction = direction_of(velocity)
+    found, beyond = under(direction)
+    released = np.where(direction == 0, beyond, 0.0)
+    return under(direction + released)[0] if released.any() else found

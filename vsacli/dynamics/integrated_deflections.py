@@ -1,0 +1,313 @@
+"""Deflections that follow the root of the first step: (19)-(20) integrated, instead of (14) solved anew.
+
+Buondonno & De Luca (2016), III-B, who warn of the drift. The pieces between breakpoints of the trajectory are
+integrated by SciPy's DOP853, up to the first joint that cannot be integrated further.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.drivetrain import SIDES
+from vsacli.actuators.laws.law import PairSolution
+from vsacli.actuators.reach import reach_flags
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import Flag, has
+from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from scipy.integrate import DOP853, DenseOutput, OdeSolution
+
+
+REASONS = (
+    "",
+    "its decoupling matrix becomes singular",
+    "its stiffness leaves the range that its springs can reach",
+    "the integration cannot go on",
+)
+FOLLOWED, SINGULAR, UNREACHABLE, STALLED = range(len(REASONS))
+
+
+def integrable(joint: Joint) -> bool:
+    """Whether deflections of a joint can be integrated by (19); with a damper beside they are already."""
+    return joint.actuator.integrable and joint.damper_at("transmission") is None
+
+
+class Task:
+    """A robot and what it is asked to do; deflections are (joints, 2, samples).
+
+    Attributes:
+        trajectory: what it is asked to do.
+        joints: those whose deflections can be integrated.
+    """
+
+    def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
+        self.trajectory = trajectory
+        self._robot = robot
+        self._actuators = {
+            index: joint.actuator for index, joint in enumerate(robot.joints) if integrable(joint)
+        }
+        self.joints = tuple(self._actuators)
+
+    def roots(self, joints: tuple[int, ...], time: FloatArray) -> FloatArray:
+        """Roots of (14) of some joints."""
+        return np.stack(
+            [_root(actuator, command).deflections for actuator, command in self._commands(joints, time)]
+        )
+
+    def rates(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> FloatArray:
+        """Rates of the deflections of some joints, (19)."""
+        return np.stack(
+            [
+                actuator.deflection_rates(of_joint, command)
+                for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
+            ]
+        )
+
+    def hindrances(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> npt.NDArray[np.intp]:
+        """Why the deflections of some joints cannot be integrated there: indices into `REASONS`."""
+        return np.stack(
+            [
+                _hindrances(actuator, command, of_joint)
+                for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
+            ]
+        )
+
+    def _commands(self, joints: tuple[int, ...], time: FloatArray) -> Iterator[tuple[Actuator, Command]]:
+        """What is asked of some joints, from one pass of the recursion."""
+        motion = self.trajectory.at(time)
+        commanded = {**motion.variables(), **elastic_torques(self._robot, motion)}
+        for joint in joints:
+            yield self._actuators[joint], command_of(joint, commanded)
+
+
+def _root(actuator: Actuator, command: Command) -> PairSolution:
+    return actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
+
+
+def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
+    """Singular is, too, where det A has another sign than on the joint's branch: it was zero on the way."""
+    solution = _root(actuator, command)
+    flags = reach_flags(command.commanded["stiffness"], solution)
+    here, on_branch = (np.sign(actuator.determinant(each, command.q)) for each in (phi, solution.deflections))
+    singular = has(flags, Flag.SINGULAR) | (here != on_branch)
+    return np.where(has(flags, Flag.INFEASIBLE), UNREACHABLE, np.where(singular, SINGULAR, FOLLOWED))
+
+
+MOST_PIECES = 500
+"""Pieces into which a trajectory is divided at its breakpoints; recordings have more of them."""
+
+ROUGH_TOLERANCE = 1e-6
+"""Smallest tolerance of pieces with breakpoints inside. A tighter one would fight in vain the rounding of the
+spline's third derivative, 1e-16 over the cube of the sample distance. Pieces are so short that the drift of
+smooth recordings is far smaller."""
+
+CHECKS = 64
+"""Times at which each step is checked, and into which the search for the end of the way divides it."""
+
+
+class Pieces(NamedTuple):
+    """The pieces of a trajectory that are integrated one after the other.
+
+    Attributes:
+        ends: ascending, s.
+        tolerance: relative error admitted in an integration step.
+    """
+
+    ends: FloatArray
+    tolerance: float
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, tolerance: float) -> Pieces:
+        """Between all breakpoints if they are not too many, else between some of them."""
+        ends = trajectory.breakpoints[1:]
+        if len(ends) <= MOST_PIECES:
+            return cls(ends, tolerance)
+        chosen = np.linspace(0, len(ends) - 1, MOST_PIECES + 1).round().astype(np.intp)[1:]
+        return cls(ends[chosen], max(tolerance, ROUGH_TOLERANCE))
+
+
+class Integration:
+    """The deflections of some joints from a start on.
+
+    Args:
+        task: what they are asked to do.
+        joints: their indices.
+        pieces: of the whole trajectory.
+        start: time of the deflections, s.
+        phi: deflections, (joints, 2).
+
+    Attributes:
+        joints: as given.
+        times: ends of the steps.
+        stopped: why each joint that ended the integration cannot be integrated beyond the last of `times`.
+    """
+
+    def __init__(
+        self, task: Task, joints: tuple[int, ...], pieces: Pieces, start: float, phi: FloatArray
+    ) -> None:
+        self.joints = joints
+        self.times = [start]
+        self.stopped: dict[int, str] = {}
+        self._task = task
+        self._steps: list[DenseOutput] = []
+        self._tolerance = pieces.tolerance
+        self._smallest = float(np.abs(phi).max(axis=1).min())
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # in steps that are refused
+            self._run(pieces.ends[pieces.ends > start].tolist(), phi.ravel())
+
+    def solution(self) -> OdeSolution:
+        """The deflections as a function of time, (2 joints, samples)."""
+        from scipy.integrate import OdeSolution
+
+        return OdeSolution(self.times, self._steps)
+
+    def _rates(self, time: float, state: Any) -> Any:
+        return self._task.rates(self.joints, np.array([time]), by_joint(state[:, None])).ravel()
+
+    def _run(self, ends: list[float], state: FloatArray) -> None:
+        from scipy.integrate import DOP853
+
+        for end in ends:
+            start = self.times[-1]
+            integrator = DOP853(
+                self._rates,
+                start,
+                state,
+                end,
+                first_step=end - start
+                if len(ends) > 1
+                else None,  # pieces are short, a whole trajectory is not
+                rtol=self._tolerance,
+                atol=self._tolerance * self._smallest,
+            )
+            self._go_through(integrator)
+            if self.stopped:
+                return
+            state = integrator.y
+
+    def _go_through(self, integrator: DOP853[np.float64]) -> None:
+        while integrator.status == "running" and not self.stopped:
+            if integrator.step() is not None:
+                self.stopped = {self._fastest(integrator): REASONS[STALLED]}
+            else:
+                step = integrator.dense_output()
+                self._steps.append(step)
+                self.times.append(self._end_of(step, self.times[-1], float(integrator.t)))
+
+    def _end_of(self, step: DenseOutput, left: float, right: float) -> float:
+        """The end of a step, or the first time in it, to rounding, at which a joint cannot be integrated."""
+        while right - left > 4 * np.spacing(abs(right)):
+            nodes = np.linspace(left, right, CHECKS + 1)
+            hindrances = self._task.hindrances(self.joints, nodes[1:], by_joint(step(nodes[1:])))
+            hits = np.flatnonzero(hindrances.any(axis=0))
+            if not hits.size:
+                break
+            left, right = float(nodes[hits[0]]), float(nodes[hits[0] + 1])
+            found = zip(self.joints, hindrances[:, hits[0]].tolist(), strict=True)
+            self.stopped = {joint: REASONS[reason] for joint, reason in found if reason}
+        return right
+
+    def _fastest(self, integrator: DOP853[np.float64]) -> int:
+        """The joint whose deflections change fastest for their size: the one that makes the steps short."""
+        phi = integrator.y
+        speed = np.abs(self._rates(float(integrator.t), phi)) / np.abs(phi)
+        return self.joints[int(np.nan_to_num(speed, nan=np.inf).argmax()) // 2]
+
+
+def by_joint(state: FloatArray) -> FloatArray:
+    """The integrator's state (2 joints, samples) as (joints, 2, samples)."""
+    return state.reshape(-1, 2, state.shape[1])
+
+
+TOLERANCE = 1e-12
+"""Relative error admitted in an integration step; the drift is about as large."""
+
+
+@dataclass(frozen=True)
+class _Way:
+    """Deflections of some joints over a part of the trajectory."""
+
+    joints: list[int]
+    solution: OdeSolution
+
+    def deflections(self, time: FloatArray) -> FloatArray:
+        """(joints, 2, samples)."""
+        return by_joint(self.solution(time))
+
+
+@dataclass(frozen=True)
+class IntegratedDeflections:
+    """Deflections along a trajectory, as `integrate_deflections` found them.
+
+    Attributes:
+        stops: for each joint, where its way ends before the trajectory does.
+    """
+
+    stops: tuple[Stop | None, ...]
+    _ways: tuple[_Way, ...] = field(repr=False)
+    _start: float
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Deflections of all joints at any times of the span, (joints, 2, samples).
+
+        NaN from a stop on, and at joints whose stiffness is not commanded.
+        """
+        phi = np.full((len(self.stops), 2, len(time)), np.nan)
+        elapsed = time - self._start
+        for way in self._ways:
+            here = (way.solution.t_min <= elapsed) & (elapsed <= way.solution.t_max)
+            if here.any():
+                for joint, deflections in zip(way.joints, way.deflections(elapsed[here]), strict=True):
+                    phi[joint][:, here] = deflections
+        for joint, stop in enumerate(self.stops):
+            if stop is not None:
+                phi[joint, :, time >= stop.time] = np.nan
+        return phi
+
+
+def integrate_deflections(
+    robot: Robot, trajectory: Trajectory, tolerance: float = TOLERANCE
+) -> IntegratedDeflections:
+    """Integrate phi' = A(phi)^-1 (tau_e', sigma') (19) from the root of (14) at the first step.
+
+    The smooth functions of the trajectory count; derivatives given with samples play no part. The integration
+    of a joint ends where A becomes singular or its stiffness cannot be reached; the other joints go on. Only
+    kinds of actuator that are `integrable` have deflections to integrate.
+
+    Args:
+        robot: the robot.
+        trajectory: what it is asked to do.
+        tolerance: relative error admitted in an integration step, at least 1e-13.
+    """
+    first, trajectory = trajectory.start, trajectory.from_zero()
+    task = Task(robot, trajectory)
+    if not task.joints:
+        return IntegratedDeflections((None,) * trajectory.joints, (), first)
+    time, end = trajectory.times.span
+    pieces = Pieces.of(trajectory, tolerance)
+    phi = np.full((trajectory.joints, SIDES, 1), np.nan)
+    phi[list(task.joints)] = task.roots(task.joints, np.array([time]))
+    hindrances = task.hindrances(task.joints, np.array([time]), phi[list(task.joints)])[:, 0]
+    found = zip(task.joints, hindrances.tolist(), strict=True)
+    stops = {joint: Stop(first + time, REASONS[reason]) for joint, reason in found if reason}
+    ways = []
+    while time < end and len(stops) < len(task.joints):
+        going = [joint for joint in task.joints if joint not in stops]
+        integration = Integration(task, tuple(going), pieces, time, phi[going, :, 0])
+        if integration.times[-1] > time:
+            time = integration.times[-1]
+            ways.append(_Way(going, integration.solution()))
+            phi[going] = ways[-1].deflections(np.array([time]))
+        stops |= {joint: Stop(first + time, reason) for joint, reason in integration.stopped.items()}
+    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(ways), first)

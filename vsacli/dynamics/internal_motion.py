@@ -1,0 +1,440 @@
+"""Internal motion of transmissions with a damper: states of the inverse, integrated along a trajectory.
+
+Collocation at Radau's points solves the implicit differential equation in cells of time. Radau IIA methods
+are L-stable and stiffly accurate (Hairer & Wanner, Solving Ordinary Differential Equations II, IV.5), so that
+a fast motion that has died away does not shorten the cells; their polynomial is the dense output.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.damped_springs import DampedSprings, InternalMotion
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.signals import DAMPING
+from vsacli.dynamics.integrated_deflections import Pieces
+from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+STAGES = 12
+"""With so many, a motion of half a second from rest to rest is exact to rounding in some forty cells."""
+
+
+class _Rule(NamedTuple):
+    """Collocation in the cell [-1, 1].
+
+    Attributes:
+        nodes: (stages,), the last at 1.
+        to_coefficients: of Chebyshev's polynomials, from values at -1 and at the nodes.
+        through_nodes: the same from values at the nodes alone.
+        slopes: derivatives at the nodes from values at -1 and at the nodes.
+    """
+
+    nodes: FloatArray
+    to_coefficients: FloatArray
+    through_nodes: FloatArray
+    slopes: FloatArray
+
+
+def _rule(stages: int) -> _Rule:
+    from numpy.polynomial import chebyshev
+    from scipy.special import roots_jacobi
+
+    nodes = np.append(roots_jacobi(stages - 1, 1, 0)[0], 1.0)
+    to_coefficients = np.linalg.inv(chebyshev.chebvander(np.append(-1.0, nodes), stages))
+    slopes: FloatArray = chebyshev.chebvander(nodes, stages - 1) @ chebyshev.chebder(to_coefficients)
+    through_nodes = np.linalg.inv(chebyshev.chebvander(nodes, stages - 1))
+    return _Rule(nodes, to_coefficients, through_nodes, slopes)
+
+
+class Collocation:
+    """The rule, ready for use."""
+
+    def __init__(self, stages: int = STAGES) -> None:
+        self._rule = _rule(stages)
+
+    def times(self, start: float, end: float) -> FloatArray:
+        """The nodes of a cell, (stages,), s."""
+        return start + (end - start) / 2 * (1 + self._rule.nodes)
+
+    def slopes(self, start: float, end: float) -> FloatArray:
+        """Rates at the nodes from values at the start and at the nodes, (stages, stages + 1), 1/s."""
+        return self._rule.slopes * (2 / (end - start))
+
+    def coefficients(self, values: FloatArray) -> FloatArray:
+        """Of the polynomial with these values at the start and at the nodes, (..., stages + 1)."""
+        return values @ self._rule.to_coefficients.T
+
+    def coefficients_of_rates(self, values: FloatArray) -> FloatArray:
+        """Of the polynomial with these values at the nodes, (..., stages)."""
+        return values @ self._rule.through_nodes.T
+
+
+class Piecewise:
+    """A function in cells, each with the coefficients of Chebyshev's polynomials.
+
+    Args:
+        ends: of the cells, ascending, (cells + 1,), s.
+        coefficients: (cells, rows, degree + 1).
+    """
+
+    def __init__(self, ends: FloatArray, coefficients: FloatArray) -> None:
+        self.ends, self._coefficients = ends, coefficients
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Its values, (rows, samples); beyond the ends those of the nearest cell."""
+        from numpy.polynomial import chebyshev
+
+        cell = np.clip(np.searchsorted(self.ends, time, side="right") - 1, 0, len(self.ends) - 2)
+        left, right = self.ends[cell], self.ends[cell + 1]
+        place = np.clip(2 * (time - left) / (right - left) - 1, -1.0, 1.0)
+        basis = chebyshev.chebvander(place, self._coefficients.shape[2] - 1)
+        return np.asarray(np.einsum("srd,sd->rs", self._coefficients[cell], basis), dtype=np.float64)
+
+
+FIRST_CELLS = 8
+"""Cells that a trajectory is divided into at first; those that a polynomial does not fit are halved."""
+
+RESOLVED = 1e-14
+"""Share of the largest deflection that the last coefficients of a polynomial may have: rounding."""
+
+LEAST_SHARE, LEAST_SPREAD = 1e-6, 1e-9
+"""What a spread is measured against if it is smaller: a share of the largest deflection; rad (m)."""
+
+TOLERATED, GAIN = 1e-9, 4.0
+"""Below, halving twice must lower that share by this factor to be worth another one: else it is noise of the
+trajectory itself, whose knots may lie denser than the cells."""
+
+HALVINGS = 20
+"""To where a motion cannot go on, within a millionth of a first cell."""
+
+LAYER = 4.0
+"""Where the demand sets in anew, something dies away that need not show in a cell of more than so many time
+constants: its polynomial passes it over."""
+
+FAST = 100.0
+"""In cells of more time constants, the polynomial of the spread knows the rates better than the equation.
+
+By that rounding makes them wrong by eps T/d, by the polynomial by some eps spread STAGES^2 2/duration, which
+is less beyond 288 time constants; for the next derivative beyond 170.
+"""
+
+NEWTON_STEPS = 20
+"""Mostly five are taken."""
+
+CONVERGED = 1e-12
+"""Step, relative to the spread, after which the next one, which is quadratic in it, is rounding.
+
+Where the load passes zero, so does the spread, and is rounding itself: there, relative to that of the peak
+torque.
+"""
+
+LOST, SINGULAR = (
+    "its springs cannot have the stiffness at the deflection that the damper has let through",
+    "the stiffness does not determine the second motor any more",
+)
+"""Why it cannot go on."""
+
+
+class Marched(NamedTuple):
+    """The motion inside as functions of time.
+
+    Attributes:
+        phi: deflections, (2, samples), up to where they go; None if they go nowhere.
+        rates: w and its derivative, (2, samples), likewise.
+        end: up to which time, s.
+        reason: why not further; None at the end of the trajectory.
+    """
+
+    phi: Piecewise | None
+    rates: Piecewise | None
+    end: float
+    reason: str | None
+
+
+class _Solution(NamedTuple):
+    """What was found in a cell, at its start and nodes, or at its nodes alone.
+
+    Attributes:
+        phi: deflections, (2, 1 + stages).
+        rates: w and its derivative by the equation, (2, stages).
+        torque: the largest that is asked of the joint.
+        damping: the largest.
+        constants: the time constants that the cell lasts.
+    """
+
+    phi: FloatArray
+    rates: FloatArray
+    torque: float
+    damping: float
+    constants: float
+
+
+class _Cell(NamedTuple):
+    """A cell that is still to be solved.
+
+    Attributes:
+        left, right: its ends, s.
+        new: whether the demand sets in anew where it begins.
+        shares: of the last coefficients in the cells that it is a half and a quarter of, the latter first.
+        halved: how often it was halved.
+    """
+
+    left: float
+    right: float
+    new: bool = True
+    shares: tuple[float, float] = (np.inf, np.inf)
+    halved: int = 0
+
+    def halves(self, share: float) -> tuple[_Cell, _Cell]:
+        """Left and right."""
+        middle = (self.left + self.right) / 2
+        return (
+            _Cell(self.left, middle, self.new, (self.shares[1], share), self.halved + 1),
+            _Cell(middle, self.right, False, (self.shares[1], share), self.halved + 1),
+        )
+
+
+class March:
+    """Solves d w = tau_l - T from deflections at the start on.
+
+    Args:
+        springs: of the joint.
+        demand: what the joint is asked to do at times (samples,), s.
+    """
+
+    def __init__(self, springs: DampedSprings, demand: Callable[[FloatArray], Command]) -> None:
+        self._springs, self._demand, self._rule = springs, demand, Collocation()
+
+    def through(self, ends: FloatArray, phi: FloatArray) -> Marched:
+        """The whole way, from deflections (2, 1); between the ends, s, the demand is smooth."""
+        ended, solved = [float(ends[0])], list[tuple[FloatArray, FloatArray]]()
+        peaks = _Peaks(self._springs, self._demand(ends), phi)
+        todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
+        while todo:
+            cell = todo.pop()
+            found = self._solved(cell, phi, peaks.torque)
+            if isinstance(found, str):
+                share, unresolved = np.inf, True
+            else:
+                fitted = self._fitted(cell, found)
+                share = peaks.share(*fitted, found)
+                settling = cell.new and found.constants > LAYER
+                falling = share < cell.shares[0] / GAIN
+                unresolved = share > RESOLVED and (share > TOLERATED or falling or settling)
+            if unresolved and cell.halved < HALVINGS:
+                todo += cell.halves(share)[::-1]
+            elif isinstance(found, str):
+                return Marched(*_joined(ended, solved), cell.left, found)
+            else:
+                phi = found.phi[:, -1:]
+                solved.append(fitted)
+                ended.append(cell.right)
+        return Marched(*_joined(ended, solved), ended[-1], None)
+
+    def _fitted(self, cell: _Cell, found: _Solution) -> tuple[FloatArray, FloatArray]:
+        """Coefficients of deflections and rates; the latter by the equation, in fast cells derivatives."""
+        from numpy.polynomial import chebyshev
+
+        phi = self._rule.coefficients(found.phi)
+        if found.constants <= FAST:
+            return phi, self._rule.coefficients_of_rates(found.rates)
+        half = (cell.right - cell.left) / 2
+        first = chebyshev.chebder(self._springs.spread(phi)) / half
+        second = np.append(chebyshev.chebder(first) / half, 0.0)
+        return phi, np.stack((first, second))
+
+    def _solved(self, cell: _Cell, start: FloatArray, peak: float) -> _Solution | str:
+        """Deflections in a cell from those at its start, by Newton's method; or why there are none.
+
+        Args:
+            cell: where.
+            start: deflections (2, 1).
+            peak: torque so far, N m (N).
+        """
+        springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
+        slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
+        before, side = springs.spread(start), np.sign(springs.pivot(start, command.q[:1]))
+        spread, phi = before + 0 * command.q, start + 0 * command.q
+        converged = False
+        for _ in range(NEWTON_STEPS):
+            phi = springs.settled(spread, phi, command)
+            if np.isnan(phi[0]).any() or not springs.within(phi).all():
+                return LOST
+            if (np.sign(springs.pivot(phi, command.q)) != side).any():
+                return SINGULAR
+            if converged:
+                fastest = np.max(np.abs(springs.slope(phi, command.q)) / damping)
+                return _Solution(
+                    np.hstack((start, phi)),
+                    np.stack(springs.driven(phi, command)),
+                    float(np.max(np.abs(command.tau_e))),
+                    float(np.max(damping)),
+                    (cell.right - cell.left) * float(fastest),
+                )
+            rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
+            missing = command.tau_e - springs.torque(phi, command.q) - damping * rate
+            slope = springs.slope(phi, command.q)
+            matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
+            step = np.asarray(np.linalg.solve(matrix, missing), dtype=np.float64)
+            spread = spread + step
+            converged = _largest(step) <= CONVERGED * max(_largest(spread), peak / _largest(slope))
+        return LOST
+
+
+class _Peaks:
+    """The largest numbers so far, which the last coefficients are measured by.
+
+    A motion from rest begins with torques that are nothing but rounding, so these are looked at beforehand.
+
+    Args:
+        springs: of the joint.
+        demand: at the ends of the first cells.
+        start: deflections at the first of them.
+
+    Attributes:
+        torque: N m (N).
+    """
+
+    def __init__(self, springs: DampedSprings, demand: Command, start: FloatArray) -> None:
+        self._springs = springs
+        self._slope = _largest(springs.slope(start, demand.q[:1]))
+        self.torque = _largest(demand.tau_e)
+        self._phi, self._spread = 0.0, LEAST_SPREAD
+
+    def share(self, phi: FloatArray, rates: FloatArray, found: _Solution) -> float:
+        """Of the last coefficients of deflections, spread and torque of the damper, in its peak so far."""
+        spread = self._springs.spread(phi)
+        self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
+        self._spread = max(self._spread, _largest(spread), LEAST_SHARE * self._phi)
+        self.torque = max(self.torque, found.torque, self._slope * self._spread)
+        of_phi = float(np.nanmax(np.abs(phi[:, -2:]))) / max(self._phi, LEAST_SPREAD)
+        share = max(of_phi, _largest(spread[-2:]) / self._spread)
+        if found.constants > FAST:
+            return share
+        return max(share, found.damping * _largest(rates[0, -2:]) / self.torque)
+
+
+def _largest(values: FloatArray) -> float:
+    return float(np.max(np.abs(values)))
+
+
+def _joined(
+    ended: list[float], solved: list[tuple[FloatArray, FloatArray]]
+) -> tuple[Piecewise | None, Piecewise | None]:
+    """Deflections and rates over all cells."""
+    if not solved:
+        return None, None
+    phi, rates = (Piecewise(np.array(ended), np.stack(each)) for each in zip(*solved, strict=True))
+    return phi, rates
+
+
+@dataclass(frozen=True)
+class InternalMotions:
+    """The motion inside each damped transmission; joints whose damping is zero all the time have none.
+
+    Attributes:
+        joints: indices of those that have one.
+        stops: for each of these whose motion ends before the trajectory does, where.
+    """
+
+    joints: tuple[int, ...]
+    stops: Mapping[int, Stop]
+    _marched: Mapping[int, Marched] = field(repr=False)
+
+    @property
+    def breakpoints(self) -> FloatArray:
+        """Ends of the pieces, from the first step on, s: short where what moves inside dies away."""
+        ends = [each.phi.ends for each in self._marched.values() if each.phi is not None]
+        return np.unique(np.concatenate([np.zeros(0), *ends]))
+
+    def at(self, elapsed: FloatArray) -> dict[int, InternalMotion]:
+        """The motion of each joint at times from the first step on; NaN from a stop on."""
+        return {joint: self._at(joint, elapsed) for joint in self.joints}
+
+    def _at(self, joint: int, elapsed: FloatArray) -> InternalMotion:
+        marched = self._marched[joint]
+        if marched.phi is None or marched.rates is None:
+            none = np.full_like(elapsed, np.nan)
+            return InternalMotion(np.stack((none, none)), none, none)
+        gone = (elapsed >= marched.end) & (marched.reason is not None)
+        phi, rates = (np.where(gone, np.nan, each.at(elapsed)) for each in (marched.phi, marched.rates))
+        return InternalMotion(phi, *rates)
+
+
+def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
+    """Integrate what moves inside the damped transmissions of a robot, from the first step to the last.
+
+    The smooth functions of the trajectory count; derivatives given with samples play no part.
+    """
+    first, trajectory = trajectory.start, trajectory.from_zero()
+    joints = damped_joints(robot, trajectory)
+    demand = _Demand(robot, trajectory)
+    evenly = np.linspace(0.0, trajectory.duration, FIRST_CELLS + 1)
+    ends = np.union1d(evenly, Pieces.of(trajectory, 0.0).ends)
+    springs = {index: DampedSprings(robot.joints[index].actuator) for index in joints}
+    marched = {}
+    with np.errstate(all="ignore"):  # a trial step may leave the range of a law
+        for index in joints:
+            begin = springs[index].equilibrium(demand.of(index, ends[:1]), robot.joints[index].damper_start)
+            march = March(springs[index], partial(demand.of, index))
+            started = not np.isnan(begin[0]).any()
+            marched[index] = march.through(ends, begin) if started else Marched(None, None, 0.0, LOST)
+    stops = {
+        index: Stop(first + each.end, each.reason)
+        for index, each in marched.items()
+        if each.reason is not None
+    }
+    return InternalMotions(joints, stops, marched)
+
+
+def damped_joints(robot: Robot, trajectory: Trajectory) -> tuple[int, ...]:
+    """The joints with a damper parallel to their springs that is not at zero all the time."""
+    chosen = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
+    if not chosen:
+        return ()
+    damping = trajectory.block(0, 1).commanded[DAMPING.key][0]
+    return tuple(index for index in chosen if damping[index])
+
+
+def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str) -> None:
+    """Refuse what looks at steps one by one, where a step depends on all before.
+
+    Args:
+        robot: the robot.
+        trajectory: fitted to the robot.
+        work: what refuses, a plural.
+
+    Raises:
+        InputError: a transmission is damped.
+    """
+    names = ", ".join(robot.joint_names[index] for index in damped_joints(robot, trajectory))
+    if names:
+        raise InputError.one(
+            f"{work} do not know transmissions with a damper ({names}): what moves inside depends on the "
+            "whole motion; set their damping to 0, or move the dampers between the links"
+        )
+
+
+class _Demand:
+    """What joints are asked to do; times that were asked for before are remembered."""
+
+    def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
+        self._robot, self._trajectory = robot, trajectory
+        self._known: dict[bytes, Mapping[str, FloatArray]] = {}
+
+    def of(self, joint: int, time: FloatArray) -> Command:
+        key = time.tobytes()
+        if key not in self._known:
+            motion = self._trajectory.at(time)
+            self._known[key] = {**motion.variables(), **elastic_torques(self._robot, motion)}
+        return command_of(joint, self._known[key])

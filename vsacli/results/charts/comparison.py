@@ -1,0 +1,178 @@
+"""Several files of a kind on the same axes, and below by how much they differ from the first.
+
+Files are compared if they are of one kind and of the same joints. By default results are compared by their
+motor torques and simulations by their position errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.errors import InputError
+from vsacli.base.texts import one_line
+from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Sheet
+from vsacli.results.charts.figures import (
+    axis_label,
+    drawable_variables,
+    missing_variables,
+    variable_words,
+)
+from vsacli.results.charts.reduction import GROWING
+from vsacli.results.charts.stored import Signals, StoredCharts
+from vsacli.results.store.reader import StoredResult
+
+
+def check_comparable(files: Sequence[StoredResult]) -> None:
+    """Refuse files that do not belong on the same axes.
+
+    Raises:
+        InputError: they are of different kinds, or have different joints.
+    """
+    if len({file.kind for file in files}) > 1:
+        listed = ", ".join(f"{file.path} is a {file.kind}" for file in files)
+        raise InputError.one(f"{listed}; compare results with results, and simulations with simulations")
+    first = files[0]
+    for file in files[1:]:
+        if _joints(file) != _joints(first):
+            message = (
+                f"cannot be compared with {first.path}: it has the joints {_joints(file)}, "
+                f"the other has {_joints(first)}; compare results of the same robot"
+            )
+            raise InputError.one(message, file.path)
+
+
+def _joints(result: StoredResult) -> str:
+    pairs = zip(result.joint_names, result.joint_types, strict=True)
+    return ", ".join(f"{name} ({joint_type})" for name, joint_type in pairs)
+
+
+def distinct_labels(results: Sequence[StoredResult]) -> list[str]:
+    """Return the names of the trajectories; where two are equal, with the stem or the path of the file."""
+    for label in _LABELS:
+        labels = [label(result) for result in results]
+        if len(set(labels)) == len(labels):
+            return labels
+    return [f"{number}: {label}" for number, label in enumerate(labels, start=1)]
+
+
+_LABELS: tuple[Callable[[StoredResult], str], ...] = (
+    lambda result: result.trajectory_name,
+    lambda result: f"{result.trajectory_name} ({one_line(Path(result.path).stem)})",
+    lambda result: f"{result.trajectory_name} ({one_line(str(result.path))})",
+)
+
+
+COMPARISON = "compare"
+"""Name of the figure; the file is called `<stem>-compare`."""
+
+MOST_ROWS = 7
+HEIGHTS = (1.6, 0.9)
+"""Inches: of a panel, and of that below with the differences."""
+
+
+class _Compared(NamedTuple):
+    """A variable that is compared, words for the title of the figure, and the label of its axes."""
+
+    variable: str
+    title: str
+    words: str
+
+
+_COMPARED = {
+    "result": _Compared("tau_motor", "motor torques", r"$\tau_{motor}$"),
+    "simulation": _Compared("q_error", "position errors", "$q - q_d$"),
+}
+"""Variables that are compared by default: of results after Fig. 4 of Buondonno & De Luca (2016)."""
+
+
+def comparison_names(variables: Sequence[str] | None) -> list[str]:
+    """Return the names of the figures that compare these variables, or what is compared by default."""
+    return [COMPARISON] if variables is None else [f"{COMPARISON}-{variable}" for variable in variables]
+
+
+def comparison_sheets(
+    files: Sequence[StoredResult], variables: Sequence[str] | None = None
+) -> Iterator[tuple[str, Sheet]]:
+    """Overlay results, or simulations, of the same joints: a row of panels per joint, a column per curve.
+
+    Args:
+        files: open, all of a kind.
+        variables: names of those to compare, by default one that depends on the kind.
+
+    Returns:
+        The figures by name, see `comparison_names`.
+
+    Raises:
+        InputError: the files are of different kinds or have different joints, or one was written without a
+            variable that is compared.
+    """
+    check_comparable(files)
+    if variables is None:
+        several = [_COMPARED[files[0].kind]]
+    else:
+        for file in files:
+            chosen = drawable_variables(file, variables)
+        several = [_Compared(each.name, each.long_name, variable_words(each)) for each in chosen]
+    for file in files:
+        missing = [each.variable for each in several if each.variable not in file.variables]
+        if missing:
+            raise InputError.one(missing_variables(COMPARISON, missing), file.path)
+    names = comparison_names(None if variables is None else [each.variable for each in several])
+    charts = StoredCharts(files)
+    return ((name, _comparison(charts, each)) for name, each in zip(names, several, strict=True))
+
+
+def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
+    """Return for each joint the curves of all files, and below what the others differ by from the first."""
+    there = charts.existing(charts.first.declared[compared.variable])
+    there = there[:, : int(np.count_nonzero(np.any(there, axis=0)))]
+    signals = charts.signals({compared.variable: "computed"}, uncertain=False)
+    differences = charts.differences(compared.variable)
+    rows: list[list[Chart | None]] = []
+    for joint, of_joint in enumerate(there):
+        there_in = [column if has_it else None for column, has_it in enumerate(of_joint)]
+        rows.append([_over(charts, compared, signals, joint, column) for column in there_in])
+        rows.append([_apart(charts, compared, differences, joint, column) for column in there_in])
+    time = np.sort(np.concatenate([file.time[[0, -1]] for file in charts.files]))
+    block = Block(time, rows, MOST_ROWS, HEIGHTS)
+    height, folds = block.folding
+    size = (max(2, folds * there.shape[1]) * PANEL_WIDTH, sum(HEIGHTS) * height + 1.2)
+    robots = " / ".join(dict.fromkeys(file.robot_name for file in charts.files))
+    legend = {label: number for number, label in enumerate(distinct_labels(charts.files))}
+    return Sheet(f"{robots}, {compared.title}", size, legend, [block])
+
+
+def _over(
+    charts: StoredCharts, compared: _Compared, signals: Signals, joint: int, column: int | None
+) -> Chart | None:
+    if column is None:
+        return None
+    first, motors = charts.first, "motor" in charts.first.declared[compared.variable].dims
+    chart = charts.chart(compared.variable, signals, column, [joint], "file")
+    return replace(
+        chart,
+        title=first.joint_names[joint] + (f", motor {column + 1}" if motors else ""),
+        axis=axis_label(compared.words, chart.unit, first.joint_types[joint], column),
+        limits=(),
+        failures=[(failed, [joint]) for failed in charts.failures],
+    )
+
+
+def _apart(
+    charts: StoredCharts, compared: _Compared, differences: Signals, joint: int, column: int | None
+) -> Chart | None:
+    if column is None:
+        return None
+    lines = differences.lines(column, [joint], "file")
+    unit = charts.first.declared[compared.variable].quantity.unit(charts.first.joint_types[joint])
+    rms = [line.rms for line in lines if line.rms is not None]
+    title = f"difference, rms {', '.join(f'{value:.3g}' for value in rms)} {unit}"
+    if not any(value >= 0 for value in rms):
+        title = "no values in common"
+    shown = charts.calm(lines, 0) if compared.variable in GROWING and lines else None
+    return Chart(title, "", lines, shown=shown, cut_off=shown is not None, zero=True)

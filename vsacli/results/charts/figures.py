@@ -1,0 +1,338 @@
+"""Figures of stored files, by name: results after Figs. 1-3 of Buondonno & De Luca (2016), simulations.
+
+Joints of one unit share panels; many joints are split into groups, whose names stand beside the panels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from vsacli.base.errors import InputError, Problem
+from vsacli.base.simulation_variables import SIMULATION_VARIABLES, actual
+from vsacli.base.variables import MOTORS, VARIABLES, Variable, select_variables
+from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Sheet, folding
+from vsacli.results.charts.stored import StoredCharts, compliant_joints
+from vsacli.results.store.reader import StoredResult
+
+JOINTS_PER_PANEL = 7
+
+GROUP_HEIGHT, LEGEND_WIDTH = 2.3, 1.3
+"""Inches; the latter is for names beside the panels of a group."""
+
+NARROW_WIDTH, LOW_HEIGHT = 2.5, 1.4
+"""Inches: a stiffness panel where there are several columns of them, beside the positions."""
+
+CORRIDOR_HEIGHT, CORRIDOR_ROWS = 1.7, 5
+"""Inches, and panels below each other, of the figure of the stiffness alone."""
+
+MOTION_HEIGHT, MOTION_ROWS = 1.7, 7
+"""The same of the motion of a simulation."""
+
+FEASIBILITY = "feasibility"
+"""Name of the figure of `check-feasibility`; its file is called `<stem>-feasibility`."""
+
+FEASIBILITY_VARIABLES = ("stiffness", "stiffness_lower", "stiffness_upper", "flags")
+"""What it is drawn from."""
+
+Part: TypeAlias = tuple[str, str]
+"""A variable and the label of its axis; `{force}` moves the joint, `{motor}` numbers the motor."""
+
+
+class Drawing(NamedTuple):
+    """A figure: the variables that it needs, and the function that declares it."""
+
+    needs: tuple[str, ...]
+    sheet: Callable[[StoredCharts], Sheet]
+
+
+def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
+    """Return the joints that share a panel: of one type, hence one unit, evenly split where they are many."""
+    groups: list[list[int]] = []
+    for joint_type in dict.fromkeys(joint_types):
+        joints = [joint for joint, other in enumerate(joint_types) if other == joint_type]
+        panels = math.ceil(len(joints) / JOINTS_PER_PANEL)
+        groups += [part.tolist() for part in np.array_split(joints, panels)]
+    return groups
+
+
+def result_title(result: StoredResult) -> str:
+    """Robot and trajectory, once if they are called alike, and where an incomplete run ended."""
+    ending = "" if result.complete else f" (stopped at {result.time[-1]:.4g} s)"
+    return ", ".join(dict.fromkeys((result.robot_name, result.trajectory_name))) + ending
+
+
+def axis_label(words: str, unit: str, joint_type: str, column: int) -> str:
+    """The label of an axis of a `Part`."""
+    force = "force" if joint_type == "prismatic" else "torque"
+    return f"{words.format(force=force, motor=MOTORS[column])} [{unit}]"
+
+
+def variable_words(variable: Variable) -> str:
+    """The label of a variable without words of its own."""
+    return f"{variable.name}_{{motor}}" if "motor" in variable.dims else variable.name
+
+
+def grouped(charts: StoredCharts, *parts: Part, words: str = "") -> Sheet:
+    """Return the figure of variables side by side, with a column of panels for each of their curves."""
+    blocks = [_groups(charts, part, named=part == parts[-1]) for part in parts]
+    columns = [len(block.rows[0]) for block in blocks]
+    width = PANEL_WIDTH * sum(columns) if len(blocks) > 1 else 2 * PANEL_WIDTH + legend_width(charts)
+    height = GROUP_HEIGHT * max(len(block.rows) for block in blocks) + 1
+    title = ": ".join(filter(None, (result_title(charts.first), words)))
+    return Sheet(title, (width, height), _legend(charts), blocks, columns)
+
+
+def _of_parts(*parts: Part) -> Drawing:
+    return Drawing(tuple(name for name, _ in parts), lambda charts: grouped(charts, *parts))
+
+
+def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
+    """Return a row of panels for each group of joints that have a variable."""
+    name, words = part
+    there = charts.existing(charts.first.declared[name])
+    groups = [group for group in panel_groups(charts.first.joint_types) if there[group].any()]
+    columns = np.flatnonzero(there.any(axis=0)).tolist()
+    signals = charts.signals({name: "computed"})
+
+    def panel(group: Sequence[int], column: int) -> Chart | None:
+        present = [joint for joint in group if there[joint, column]]
+        if not present:
+            return None
+        chart = charts.chart(name, signals, column, present)
+        axis = axis_label(words, chart.unit, charts.first.joint_types[group[0]], column)
+        return replace(chart, axis=axis, failures=[(each, group) for each in charts.failures])
+
+    rows = [[panel(group, column) for column in columns] for group in groups]
+    beside = [{charts.first.joint_names[joint]: joint for joint in group} for group in groups]
+    return Block(charts.first.time, rows, beside=beside if named and legend_width(charts) else ())
+
+
+def legend_width(charts: StoredCharts) -> float:
+    """Inches that names take beside the panels: where one legend would be too long to find a joint in it."""
+    return LEGEND_WIDTH if len(charts.first.joint_names) > JOINTS_PER_PANEL else 0.0
+
+
+def _legend(charts: StoredCharts) -> dict[str, int]:
+    """Return the joints, unless they are named beside the panels."""
+    return {} if legend_width(charts) else {name: at for at, name in enumerate(charts.first.joint_names)}
+
+
+def _corridors(charts: StoredCharts, most_rows: int) -> Block:
+    """Return the stiffness of each joint inside what its load allows."""
+    rows = [
+        [replace(chart, failures=[(each, [joint]) for each in charts.failures])]
+        for joint, chart in zip(charts.compliant, charts.corridors(), strict=True)
+    ]
+    return Block(charts.first.time, rows, most_rows)
+
+
+def feasibility(charts: StoredCharts) -> Sheet:
+    """Return the figure of the commanded stiffness inside what the load allows."""
+    block = _corridors(charts, CORRIDOR_ROWS)
+    rows, folds = block.folding
+    size = (PANEL_WIDTH * (2 if folds == 1 else folds), CORRIDOR_HEIGHT * rows + 1)
+    return Sheet(result_title(charts.first), size, {}, [block])
+
+
+def check_drawable(actuators: Sequence[str]) -> None:
+    """Refuse a robot whose joints, by the types of their actuators, have no stiffness to draw.
+
+    Raises:
+        InputError: they have not.
+    """
+    if not compliant_joints(actuators):
+        raise InputError.one("there is no stiffness to plot: all joints are rigid")
+
+
+def _motion(charts: StoredCharts) -> Sheet:
+    """Fig. 1: positions at the left, stiffness at the right if any joint has one."""
+    part = ("q", "joint position $q$")
+    if not charts.compliant:
+        return grouped(charts, part)
+    positions = _groups(charts, part)
+    left = GROUP_HEIGHT * len(positions.rows)
+    stiffness = _corridors(charts, max(CORRIDOR_ROWS, int(left / LOW_HEIGHT)))
+    rows, folds = stiffness.folding
+    widths = (PANEL_WIDTH, PANEL_WIDTH if folds == 1 else NARROW_WIDTH * folds)
+    size = (sum(widths) + legend_width(charts), max(left, LOW_HEIGHT * rows) + 1)
+    return Sheet(result_title(charts.first), size, _legend(charts), [positions, stiffness], widths)
+
+
+_PARTS: dict[str, tuple[Part, ...]] = {
+    "motor-torque": (("tau_motor", r"motor {force} $\tau_{motor}$"),),
+    "elastic-torque": (("tau_e", r"elastic {force} $\tau_e$"),),
+    "energy": (("elastic_energy", "elastic energy"), ("motor_energy", "work of motor {motor}")),
+    "losses": (("dissipated_power", "friction and damping"),),
+    "damper": (("damping", "damping $d$"), ("tau_damper", "{force} of the damper")),
+    "motor-current": (("current", "current of motor {motor}, $i_{motor}$"),),
+    "motor-voltage": (("voltage", "voltage of motor {motor}, $u_{motor}$"),),
+}
+"""The figures of a result beside its motion; Figs. 2 and 3 are the first two."""
+
+_OF_SIMULATIONS: dict[str, Part] = {
+    "position-error": ("q_error", "position error $q - q_d$"),
+    "stiffness-error": ("stiffness_error", r"stiffness error $\sigma - \sigma_d$"),
+    **{
+        name: (actual(_PARTS[name][0][0]), _PARTS[name][0][1])
+        for name in ("motor-torque", "losses", "motor-current", "motor-voltage")
+    },
+}
+
+_FOLLOWED = {"q": "$q$", "stiffness": r"$\sigma$"}
+"""What simulations command, a column of panels each, and the label of its axes."""
+
+_ROLES = {"commanded": 0, "actual": 1}
+
+
+def _energy(charts: StoredCharts) -> Sheet:
+    """Return the energy in the springs at the left, if there are any; the work of each motor beside it."""
+    parts = _PARTS["energy"] if charts.compliant else _PARTS["energy"][1:]
+    return grouped(charts, *parts)
+
+
+def _simulated_motion(charts: StoredCharts) -> Sheet:
+    """Return a row of panels for each joint: position and stiffness, commanded and actual."""
+    first = charts.first
+    there = np.array([charts.existing(first.declared[name])[:, 0] for name in _FOLLOWED]).T
+    there = there[:, there.any(axis=0)]
+    names = list(_FOLLOWED)[: there.shape[1]]
+    signals = {name: charts.signals({name: "commanded", actual(name): "actual"}) for name in names}
+
+    def panel(joint: int, name: str) -> Chart:
+        chart = charts.chart(name, signals[name], 0, [joint], "role")
+        return replace(
+            chart,
+            title=first.joint_names[joint],
+            axis=f"{_FOLLOWED[name]} [{chart.unit}]",
+            limits=[limit._replace(look=len(_ROLES)) for limit in chart.limits],
+            failures=[(each, [joint]) for each in charts.failures],
+        )
+
+    rows = [
+        [panel(joint, name) if has_it else None for name, has_it in zip(names, of_joint, strict=True)]
+        for joint, of_joint in enumerate(there)
+    ]
+    height, folds = folding(len(rows), MOTION_ROWS)
+    size = (max(2, folds * len(names)) * PANEL_WIDTH, MOTION_HEIGHT * height + 1.2)
+    return Sheet(result_title(first), size, _ROLES, [Block(first.time, rows, MOTION_ROWS)])
+
+
+RESULT_DRAWINGS: dict[str, Drawing] = {
+    "motion": Drawing(("q", "stiffness"), _motion),
+    **{name: _of_parts(*parts) for name, parts in _PARTS.items()},
+    "energy": Drawing(tuple(name for name, _ in _PARTS["energy"]), _energy),
+}
+"""The figures of a result of `invdyn`, by name."""
+
+
+def result_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
+    """Return the figures of a result of a robot that has the variables that they need."""
+    return {
+        name: drawing
+        for name, drawing in RESULT_DRAWINGS.items()
+        if all(has(VARIABLES[needed]) for needed in drawing.needs)
+    }
+
+
+def simulation_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
+    """Return the figures of a simulation of a robot one of whose joints has the variables they show."""
+    return {
+        "motion": Drawing((*_FOLLOWED, *map(actual, _FOLLOWED)), _simulated_motion),
+        **{
+            name: _of_parts(part)
+            for name, part in _OF_SIMULATIONS.items()
+            if has(SIMULATION_VARIABLES[part[0]])
+        },
+    }
+
+
+def drawings_of(stored: StoredResult) -> dict[str, Drawing]:
+    """Return the figures that a file of its kind has, by name."""
+    if stored.kind == "simulation":
+        return simulation_drawings(lambda variable: bool(stored.existing(variable).any()))
+    return result_drawings(stored.has)
+
+
+def drawable_figures(
+    drawings: Mapping[str, Drawing], variables: Collection[str], path: str | Path = ""
+) -> list[str]:
+    """Return the names of the figures that can be drawn from these variables.
+
+    Raises:
+        InputError: there is none; `path` is the file it names.
+    """
+    omitted = omitted_figures(drawings, variables)
+    if len(omitted) == len(drawings):
+        raise InputError.one("nothing can be plotted: " + "; ".join(omitted.values()), path)
+    return [name for name in drawings if name not in omitted]
+
+
+def omitted_figures(drawings: Mapping[str, Drawing], variables: Collection[str]) -> dict[str, str]:
+    """Return the figures that cannot be drawn from these variables, by name, each with the reason."""
+    reasons = {}
+    for name, drawing in drawings.items():
+        missing = [variable for variable in drawing.needs if variable not in variables]
+        if missing:
+            reasons[name] = missing_variables(name, missing)
+    return reasons
+
+
+def missing_variables(figure: str, variables: Sequence[str]) -> str:
+    """Return the sentence for a figure that cannot be drawn."""
+    needed = " and ".join(variables)
+    return f"figure {figure} needs {needed}, which this result was written without (--variables)"
+
+
+def chosen_figures(stored: StoredResult, variables: Sequence[str] | None) -> list[str]:
+    """Return the names of the figures that can be drawn: of these variables, or else those that files have.
+
+    Raises:
+        InputError: there is no curve of one of the variables, or of none if they are not asked for.
+    """
+    if variables is None:
+        return drawable_figures(drawings_of(stored), stored.variables, stored.path)
+    return [variable.name for variable in drawable_variables(stored, variables)]
+
+
+def sheets_of(stored: StoredResult, variables: Sequence[str] | None = None) -> Iterator[tuple[str, Sheet]]:
+    """Yield the chosen figures by name, each declared when it is asked for: its curves take memory."""
+    charts, drawings = StoredCharts([stored]), drawings_of(stored)
+    for name in chosen_figures(stored, variables):
+        if variables is None:
+            yield name, drawings[name].sheet(charts)
+        else:
+            variable = stored.declared[name]
+            yield name, grouped(charts, (name, variable_words(variable)), words=variable.long_name)
+
+
+def drawable_variables(result: StoredResult, names: Sequence[str]) -> tuple[Variable, ...]:
+    """Return the variables of these names, in declared order.
+
+    Raises:
+        InputError: for each of which there is no curve, why.
+    """
+    selected = select_variables(names, result.declared)
+    reasons = [reason for variable in selected if (reason := _undrawable(result, variable))]
+    if reasons:
+        raise InputError(Problem(str(result.path), 0, reason) for reason in reasons)
+    return selected
+
+
+def _undrawable(result: StoredResult, variable: Variable) -> str:
+    """Return why there is no curve of a variable; nothing if there is one."""
+    name = variable.name
+    if name == "flags":
+        return "flags are bits, no curve; where steps cannot be done, figures of other variables have bands"
+    if "joint" not in variable.dims:
+        return f"{name} is not one of joints, which are what figures show; `vsacli export` writes it"
+    if name not in result.variables:
+        return f"holds no {name}, which the run was without, or written without (--variables)"
+    if not result.existing(variable).any():
+        return f"none of {', '.join(result.joint_names)} has {name}"
+    return ""

@@ -1,0 +1,175 @@
+"""Charts of what an optimization changes, and of motor torques within the tolerances of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.units import STIFFNESS, TIME, TORQUE
+from vsacli.base.variables import MOTORS
+from vsacli.results.charts.chart import (
+    DEVIATIONS,
+    PANEL_WIDTH,
+    REACHABLE,
+    Band,
+    Block,
+    Chart,
+    Limit,
+    Line,
+    Sheet,
+    folding,
+)
+from vsacli.results.charts.reduction import Curve, visible_range
+
+MOST_ROWS = 6
+ROW_HEIGHT, PACE_HEIGHT = 1.7, 3.0
+"""Inches."""
+
+BEFORE, AFTER, UNIFORM = 1, 0, 3
+"""Looks: what was found is the solid line."""
+
+PATH = f"place on the path, as the time at which it was commanded [{TIME}]"
+
+
+class Moved(NamedTuple):
+    """Motion of a joint; all (samples,), torques (motors, samples).
+
+    Attributes:
+        place: on the path, or the time.
+        stiffness: NaN throughout if the joint has none to choose.
+        lower, upper: ends of its attainable range.
+        torques: of the motors.
+    """
+
+    place: FloatArray
+    stiffness: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    torques: FloatArray
+
+    def stiffness_line(self, look: int) -> Line:
+        """Return the stiffness as a line, that of the optimum with its attainable range."""
+        band = Band(self.place, self.lower, self.upper, look)
+        there = look == AFTER and not np.isnan(self.lower).all()
+        return Line(Curve.reduced(self.place, self.stiffness), look, band=band if there else None)
+
+    def torque_lines(self, look: int) -> list[Line]:
+        """Return a line for each motor."""
+        return [Line(Curve.reduced(self.place, torque), look) for torque in self.torques]
+
+
+class JointChange(NamedTuple):
+    """A joint before and after.
+
+    Attributes:
+        name: of the joint.
+        joint_type: revolute or prismatic.
+        before: as commanded.
+        after: at the optimum.
+        limits: of its motor torques, (2,), infinite if there are none.
+    """
+
+    name: str
+    joint_type: str
+    before: Moved
+    after: Moved
+    limits: FloatArray
+
+    @property
+    def stiffness(self) -> Chart | None:
+        """The stiffness inside its attainable range; None if the joint has none to choose."""
+        if not np.isfinite(self.after.stiffness).any():
+            return None
+        both = np.concatenate([self.before.stiffness, self.after.stiffness])
+        unit = STIFFNESS.unit(self.joint_type)
+        return Chart(
+            title=self.name,
+            unit=unit,
+            lines=[self.before.stiffness_line(BEFORE), self.after.stiffness_line(AFTER)],
+            axis=rf"$\sigma$ [{unit}]",
+            shown=visible_range(both, self.after.lower, self.after.upper),
+            band=REACHABLE,
+        )
+
+    @property
+    def torques(self) -> Chart:
+        """The torques of all motors with their limits."""
+        unit = TORQUE.unit(self.joint_type)
+        lines = [*self.before.torque_lines(BEFORE), *self.after.torque_lines(AFTER)]
+        limits = [Limit(AFTER, 0, float(value)) for value in self.limits if np.isfinite(value)]
+        return Chart(f"{self.name}: motors", unit, lines, rf"$\tau$ [{unit}]", limits=limits)
+
+
+def change_sheet(joints: Sequence[JointChange], title: str, *, along_path: bool) -> Sheet:
+    """Return a figure with a row of panels for each joint: stiffness and motor torques.
+
+    Args:
+        joints: before and after.
+        title: of the figure.
+        along_path: whether places are on the path, rather than times.
+    """
+    rows, folds = folding(len(joints), MOST_ROWS)
+    panels = [[joint.stiffness, joint.torques] for joint in joints]
+    if not any(stiffness for stiffness, _ in panels):
+        panels = [[torques] for _, torques in panels]
+    block = Block(joints[0].before.place, panels, MOST_ROWS)
+    if along_path:
+        block = block._replace(xlabel=f"place on the path [{TIME}]")
+    size = (2 * PANEL_WIDTH * folds, ROW_HEIGHT * rows + 1)
+    return Sheet(title, size, {"as commanded": BEFORE, "optimum": AFTER}, [block])
+
+
+def pace_sheet(place: FloatArray, speed: FloatArray, uniform: float, title: str) -> Sheet:
+    """Return the figure of the speed along the path at the optimum.
+
+    Args:
+        place: on the path, (samples,), s as commanded.
+        speed: there, relative to the motion as commanded, (samples,).
+        uniform: that of the fastest motion that is sped up as a whole; NaN if it does not matter.
+        title: of the figure.
+    """
+    ends = place[[0, -1]]
+    lines, legend = [Line(Curve.reduced(place, speed), AFTER)], {"optimum": AFTER}
+    for label, look, value in (("as commanded", BEFORE, 1.0), ("fastest as a whole", UNIFORM, uniform)):
+        if np.isfinite(value):
+            lines.append(Line(Curve(ends, np.full(2, value)), look))
+            legend[label] = look
+    chart = Chart("", "", lines, "times as fast", from_zero=True)
+    return Sheet(title, (2 * PANEL_WIDTH, PACE_HEIGHT), legend, [Block(ends, [[chart]], xlabel=PATH)])
+
+
+class Torque(NamedTuple):
+    """Torque of a motor over time, with its standard deviation; all (samples,)."""
+
+    joint: str
+    joint_type: str
+    motor: int
+    values: FloatArray
+    deviation: FloatArray
+
+    def chart(self, time: FloatArray) -> Chart:
+        """Return the torque with its band, all of which the axis holds."""
+        curve, spread = Curve(time, self.values), DEVIATIONS * self.deviation
+        low, high = np.nanmin(self.values - spread), np.nanmax(self.values + spread)
+        room = 0.05 * (high - low) or 1.0
+        unit = TORQUE.unit(self.joint_type)
+        return Chart(
+            title=f"{self.joint}, motor {self.motor}",
+            unit=unit,
+            lines=[Line(curve, 0, band=Band.around(curve, self.deviation, look=1))],
+            axis=rf"$\tau_{self.motor}$ [{unit}]",
+            shown=(low - room, high + room),
+        )
+
+
+def band_sheet(time: FloatArray, torques: Sequence[Torque], title: str) -> Sheet:
+    """Return a figure of motor torques with their bands, a row of panels for each joint."""
+    by_joint: dict[str, dict[int, Chart]] = {}
+    for torque in torques:
+        by_joint.setdefault(torque.joint, {})[torque.motor] = torque.chart(time)
+    rows = [[charts.get(motor) for motor in MOTORS] for charts in by_joint.values()]
+    size = (2 * PANEL_WIDTH, 1.6 * len(rows) + 1)
+    return Sheet(title, size, {"computed": 0}, [Block(time, rows, 7)])

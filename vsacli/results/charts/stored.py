@@ -1,0 +1,310 @@
+"""Charts of stored results and simulations, of one file or of several on the same axes.
+
+`Signals` reads and reduces a variable once; `StoredCharts` makes charts of it: curves with their standard
+deviations, limits, the range that near-singular peaks do not set, attainable stiffness, and differences.
+`charts_of` gives everything that a page shows of a variable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.simulation_variables import actual, measured
+from vsacli.base.units import WrenchQuantity
+from vsacli.base.variables import MOTORS, VARIABLES, Variable, deviation
+from vsacli.base.wrench import WRENCH_AXES
+from vsacli.results.charts.chart import REACHABLE, Band, Chart, Failures, Limit, Line
+from vsacli.results.charts.reduction import BLOCK, GROWING, Sampled, calm_range, read_curves, visible_range
+from vsacli.results.store.reader import StoredResult
+from vsacli.robot.joint import existing
+
+BOUNDS = ("stiffness_lower", "stiffness_upper")
+
+By: TypeAlias = Literal["joint", "file", "role"]
+"""What the looks of the lines of a chart tell apart."""
+
+
+class Difference:
+    """A result minus another one, at those of its own times that both have; the other is interpolated.
+
+    Attributes:
+        time: those times, (samples,), s; empty if the files have no time in common.
+        joint_names: base to tip.
+    """
+
+    def __init__(self, result: StoredResult, other: StoredResult) -> None:
+        self._result, self._other = result, other
+        start = max(result.time[0], other.time[0])
+        end = min(result.time[-1], other.time[-1])
+        bounds = (np.searchsorted(result.time, start), np.searchsorted(result.time, end, side="right"))
+        self._first, last = map(int, bounds)
+        self.time: FloatArray = result.time[self._first : max(self._first, last)]
+        self.joint_names = result.joint_names
+
+    def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray:
+        """Read differences at the times start..stop-1, of the variable's shape; NaN where one of both is."""
+        stop = self.time.size if stop is None else stop
+        own = np.asarray(self._result.read(name, self._first + start, self._first + stop), dtype=np.float64)
+        with np.errstate(over="ignore", invalid="ignore"):  # infinities are as far apart as NaN says
+            return own - self._interpolated(name, self.time[start:stop])
+
+    def _interpolated(self, name: str, time: FloatArray) -> FloatArray:
+        """Return values of the other result, linear between its samples."""
+        steps = self._other.time
+        before = max(int(np.searchsorted(steps, time[0], side="right")) - 1, 0)
+        after = int(np.searchsorted(steps, time[-1])) + 1
+        values = np.asarray(self._other.read(name, before, after), dtype=np.float64)
+        if np.array_equal(steps[before:after], time):
+            return values
+        columns = values.reshape(len(values), -1)
+        found = [np.interp(time, steps[before:after], column) for column in columns.T]
+        return np.stack(found, axis=-1).reshape(len(time), *values.shape[1:])
+
+    def rms(self, name: str) -> FloatArray:
+        """Return the root mean square over the times at which neither is NaN, of the shape of a sample."""
+        total, count = 0.0, 0
+        with np.errstate(over="ignore", invalid="ignore"):
+            for start in range(0, self.time.size, BLOCK):
+                block = self.read(name, start, min(start + BLOCK, self.time.size))
+                block = np.where(np.isfinite(block), block, np.nan)
+                total = total + np.nansum(block**2, axis=0)
+                count = count + np.count_nonzero(~np.isnan(block), axis=0)
+            return np.asarray(np.sqrt(np.divide(total, count)))
+
+
+class Signals:
+    """A variable of each joint of some files, in the roles in which they hold it.
+
+    Args:
+        files: by their numbers.
+        roles: such as "commanded", by the names that they are stored under.
+        width: curves that a joint has of each, 1 or 2.
+        spread: name of the standard deviation; empty if there is none.
+        rms: of differences, (joints, width), by the numbers of the files.
+    """
+
+    def __init__(
+        self,
+        files: Mapping[int, Sampled],
+        roles: Mapping[str, str],
+        width: int,
+        spread: str = "",
+        rms: Mapping[int, FloatArray] | None = None,
+    ) -> None:
+        names = [*roles, spread] if spread else list(roles)
+        self._curves = {number: read_curves(file, names) for number, file in files.items()}
+        self._names = next(iter(files.values())).joint_names if files else ()
+        self._roles, self._width, self._spread, self._rms = list(roles.values()), width, spread, rms
+
+    def lines(self, column: int, joints: Sequence[int], by: By = "joint") -> list[Line]:
+        """Return a line for each file, role and joint."""
+        return [
+            self._line(file, at, joint, column, {"joint": joint, "file": file, "role": at}[by])
+            for file in self._curves
+            for at in range(len(self._roles))
+            for joint in joints
+        ]
+
+    def _line(self, file: int, at: int, joint: int, column: int, look: int) -> Line:
+        curves, band = self._curves[file][joint], None
+        curve = curves[at * self._width + column]
+        if self._spread:
+            band = Band.around(curve, curves.values[len(self._roles) * self._width + column], look)
+        rms = None if self._rms is None else float(self._rms[file][joint, column])
+        return Line(curve, look, self._names[joint], joint, joint, file, self._roles[at], band, rms)
+
+
+class StoredCharts:
+    """The charts of files of one kind and of the same joints.
+
+    Attributes:
+        files: open.
+        first: the first of them.
+        common: names of the variables that all of them hold.
+    """
+
+    def __init__(self, files: Sequence[StoredResult]) -> None:
+        self.files, self.first = files, files[0]
+        self.common = [name for name in self.first.variables if all(name in f.variables for f in files)]
+
+    @cached_property
+    def failures(self) -> list[Failures]:
+        """The failures of each file."""
+        return [Failures.of(file) for file in self.files]
+
+    @cached_property
+    def compliant(self) -> list[int]:
+        """The joints that have a stiffness."""
+        return compliant_joints(self.first.actuators)
+
+    def existing(self, variable: Variable) -> BoolArray:
+        """Return which curves of a variable any of the files has at each joint, (joints, 1 or 2)."""
+        return np.asarray(np.any([file.existing(variable) for file in self.files], axis=0))
+
+    def signals(self, roles: Mapping[str, str], *, uncertain: bool = True) -> Signals:
+        """Read a variable by the names it is stored under, if `uncertain` with its standard deviation."""
+        name = next(iter(roles))
+        spread = deviation(name) if uncertain and deviation(name) in self.common else ""
+        width = self.existing(self.first.declared[name]).shape[1]
+        return Signals(dict(enumerate(self.files)), roles, width, spread)
+
+    def differences(self, name: str) -> Signals:
+        """Read a variable of the other files minus that of the first, where they have times in common."""
+        several = {number: Difference(file, self.first) for number, file in enumerate(self.files[1:], 1)}
+        apart = {number: each for number, each in several.items() if each.time.size}
+        rms = {number: each.rms(name).reshape(len(each.joint_names), -1) for number, each in apart.items()}
+        return Signals(apart, {name: "computed"}, self.existing(self.first.declared[name]).shape[1], rms=rms)
+
+    def chart(
+        self, name: str, signals: Signals, column: int, joints: Sequence[int], by: By = "joint"
+    ) -> Chart:
+        """Return the chart of a curve of some joints, of one type, without title."""
+        lines = signals.lines(column, joints, by)
+        shown = self.calm(lines) if name in GROWING else None
+        unit = self._variable(name).quantity.unit(self.first.joint_types[joints[0]])
+        limits = self._limits(name, column, joints)
+        return Chart("", unit, lines, name=name, limits=limits, shown=shown, cut_off=shown is not None)
+
+    def calm(self, lines: Sequence[Line], *others: int) -> tuple[float, float] | None:
+        """Return the range of an axis if near-singular peaks would set it otherwise.
+
+        Args:
+            lines: of joints.
+            others: numbers of files that have to be calm as well, as differences take them.
+        """
+        calm = []
+        for line in lines:
+            assert line.joint is not None, "as of all variables that grow"
+            of_files = [
+                self.failures[file].calm(line.joint, line.curve.time) for file in (line.file, *others)
+            ]
+            calm.append(np.all(of_files, axis=0))
+        return calm_range([line.curve.values for line in lines], calm)
+
+    def corridors(self) -> Iterator[Chart]:
+        """Yield the stiffness of each joint inside what its load allows, as far as that is stored."""
+        bounds = BOUNDS if set(BOUNDS) <= set(self.common) else ()
+        curves = read_curves(self.first, ["stiffness", *bounds])
+        quantity = VARIABLES["stiffness"].quantity
+        for joint in self.compliant:
+            time, (command, *edges) = curves[joint].time, curves[joint].values
+            band = None
+            if edges and not np.isnan(edges[0]).all():
+                lower, upper = edges
+                band = Band(time, lower, upper, joint)
+            line = Line(curves[joint][0], joint, self.first.joint_names[joint], joint, joint, band=band)
+            yield Chart(
+                title=self.first.joint_names[joint],
+                unit=(unit := quantity.unit(self.first.joint_types[joint])),
+                lines=[line],
+                axis=rf"$\sigma$ [{unit}]",
+                name="stiffness",
+                limits=self._limits("stiffness", 0, [joint]),
+                shown=visible_range(command, *edges),
+                band=REACHABLE,
+            )
+
+    def _variable(self, name: str) -> Variable:
+        declared = self.first.declared
+        return declared[name] if name in declared else declared[actual(name)]
+
+    def _limits(self, name: str, column: int, joints: Sequence[int]) -> list[Limit]:
+        limits = self.first.limits(name)
+        bounds = limits[:, column % limits.shape[1]]
+        return [
+            Limit(joint, joint, float(value))
+            for joint in joints
+            for value in bounds[joint]
+            if np.isfinite(value)
+        ]
+
+    def charts_of(self, name: str) -> list[Chart]:
+        """Return all charts of a variable: by motor and type of joint, of simulations with the outcome."""
+        variable = self._variable(name)
+        if "joint" not in variable.dims:
+            return list(self._of_wrench(variable))
+        columns = list(self._columns(variable))
+        if name == "stiffness" and set(BOUNDS) <= set(self.common) and len(self.files) == 1:
+            return [replace(each, title=f"{variable.long_name}, {each.title}") for each in self.corridors()]
+        roles = self._roles(name)
+        charts = []
+        if roles:
+            signals = self.signals(roles)
+            for column, title, joints in columns:
+                charts.append(replace(self.chart(name, signals, column, joints), title=title))
+        for outcome in roles if len(self.files) > 1 else ():
+            apart = self.differences(outcome)
+            for column, title, joints in columns:
+                unit = variable.quantity.unit(self.first.joint_types[joints[0]])
+                lines = apart.lines(column, joints)
+                if lines:
+                    charts.append(Chart(f"difference: {title}", unit, lines, name=name))
+        return charts
+
+    def _roles(self, name: str) -> dict[str, str]:
+        """Return the roles of a variable by its stored names; of several files the outcome alone."""
+        simulated = actual(name) in self.common
+        roles = {name: "commanded" if simulated else "computed"}
+        roles |= {actual(name): "actual", measured(name): "measured"}
+        there = {stored: role for stored, role in roles.items() if stored in self.common}
+        if len(self.files) > 1:
+            outcome = actual(name) if simulated else name
+            return {outcome: there[outcome]} if outcome in there else {}
+        return there
+
+    def _columns(self, variable: Variable) -> Iterator[tuple[int, str, list[int]]]:
+        """Yield each column of a variable and type of joint: title, and the joints that have it."""
+        there, types = self.existing(variable), self.first.joint_types
+        words = variable.long_name
+        if (
+            actual(variable.name) in self.common
+        ):  # command and outcome are one chart, which is neither of both
+            words = VARIABLES[variable.name].long_name.replace("commanded ", "")
+        for column in range(there.shape[1]):
+            motor = f", motor {MOTORS[column]}" if "motor" in variable.dims else ""
+            for joint_type in dict.fromkeys(types):
+                joints = [at for at, each in enumerate(types) if each == joint_type and there[at, column]]
+                kind = f" ({joint_type} joints)" if len(set(types)) > 1 else ""
+                if joints:
+                    yield column, f"{words}{motor}{kind}", joints
+
+    def _of_wrench(self, variable: Variable) -> Iterator[Chart]:
+        """Yield forces and moments."""
+        assert isinstance(variable.quantity, WrenchQuantity), "see WRENCH_AXES"
+        curves = [read_curves(_Components(file), [variable.name]) for file in self.files]
+        for words, axes in (("forces", range(3)), ("moments", range(3, 6))):
+            lines = [
+                Line(of_file[axis][0], axis, WRENCH_AXES[axis], axis % 3, file=file)
+                for file, of_file in enumerate(curves)
+                for axis in axes
+            ]
+            unit = variable.quantity.of_axis(axes[0])
+            yield Chart(f"{variable.long_name}, {words}", unit, lines, name=variable.name)
+
+
+class _Components:
+    """A wrench over time, its components in place of joints."""
+
+    joint_names = WRENCH_AXES
+
+    def __init__(self, file: Sampled) -> None:
+        self._file = file
+
+    @property
+    def time(self) -> FloatArray:
+        return self._file.time
+
+    def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray:
+        return np.asarray(self._file.read(name, start, stop), dtype=np.float64)
+
+
+def compliant_joints(actuators: Sequence[str]) -> list[int]:
+    """Return the joints that have a stiffness, by the types of their actuators."""
+    there = existing(VARIABLES["stiffness"], actuators)
+    return [joint for joint, [has_stiffness] in enumerate(there) if has_stiffness]

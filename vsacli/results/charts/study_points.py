@@ -1,0 +1,142 @@
+"""Points of the table of a study: margin and cost of each run, over what varies."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.base.errors import InputError
+from vsacli.results.store.study_table import StoredStudy
+
+NAMED_RUNS = 3
+"""Number of worst runs that are named next to their points."""
+
+NORMAL_95 = 1.96
+"""Standard deviations of a normal distribution within which 95 % lie."""
+
+COSTS = {
+    "cost_after": "{}",
+    "energy_spent": "energy that motors spend",
+    "peak_tau_motor": "largest motor torque",
+}
+"""Columns that hold the cost of a motion, in words or in those of the table: the first there is counts."""
+
+ADDED = "J"
+"""Unit of costs that those of the joints add up to; of others the largest counts."""
+
+
+class StudyPoints:
+    """The numbers of a table that figures and pages show.
+
+    Attributes:
+        name: of the study.
+        runs: numbers of the runs, (rows,).
+        margin: smallest margin of all joints, (rows,), relative; NaN if a run failed.
+        feasible: whether every step was feasible and regular, (rows,).
+
+    Raises:
+        InputError: the table has no margins, or no rows.
+    """
+
+    def __init__(self, table: StoredStudy) -> None:
+        if "margin" not in table.columns or not table.rows:
+            what = "no runs" if not table.rows else "no margin; put it into `keep:` of the study"
+            raise InputError.one(f"nothing can be drawn: it has {what}", table.path)
+        self.name, self.runs, self._table = table.study_name, table.read("run"), table
+        self.margin = _least(table.read("margin"))
+        self.feasible: BoolArray = np.isin(table.texts("verdict"), ("ok", "over_limit", "doubtful"))
+
+    @cached_property
+    def varying(self) -> dict[str, FloatArray]:
+        """The numbers that are not the same in all rows, by path."""
+        table = self._table
+        found = {path: table.read(path) for path in table.parameters if not table.parameter_is_text(path)}
+        return {path: values for path, values in found.items() if np.ptp(values) > 0}
+
+    @cached_property
+    def cost(self) -> tuple[str, FloatArray] | None:
+        """The words for the cost, and that of each run, NaN if samples have none; None if none was kept."""
+        return next((self._cost(name) for name in COSTS if name in self._table.columns), None)
+
+    @property
+    def optimised(self) -> bool:
+        """Whether each run is an optimum, whose margin is the one that was requested."""
+        return "cost_after" in self._table.columns
+
+    @property
+    def shown(self) -> list[tuple[str, FloatArray]]:
+        """Columns drawn over what varies: margin and cost, or of optima the costs before and after."""
+        cost = [] if self.cost is None else [self.cost]
+        first = self._cost("cost_before") if self.optimised else ("smallest margin [%]", 100 * self.margin)
+        return [first, *cost]
+
+    def _cost(self, name: str) -> tuple[str, FloatArray]:
+        values, column = self._table.read(name), self._table.column(name)
+        unit = column.quantity.revolute
+        words = COSTS.get(name, "{}").format(column.long_name)
+        return f"{words} [{unit}]", _sum(values) if unit == ADDED else _most(values)
+
+    @property
+    def share(self) -> tuple[float, float, float]:
+        """Share of the feasible runs, with the interval of 95 % confidence (Wilson 1927)."""
+        count, feasible = len(self.feasible), int(self.feasible.sum())
+        share, square = feasible / count, NORMAL_95**2
+        centre = (share + square / (2 * count)) / (1 + square / count)
+        spread = math.sqrt(share * (1 - share) / count + square / (4 * count**2))
+        half = NORMAL_95 * spread / (1 + square / count)
+        return share, max(0.0, centre - half), min(1.0, centre + half)
+
+    @property
+    def exceedance(self) -> tuple[FloatArray, FloatArray]:
+        """Each margin, ascending, and the share of all runs that have at least this one."""
+        margins = np.sort(self.margin[np.isfinite(self.margin)])
+        return margins, np.arange(len(margins), 0, -1) / len(self.margin)
+
+    def unit(self, path: str) -> str:
+        """The unit of a number, empty if it has none."""
+        unit = self._table.unit(path)
+        return "" if unit == "1" else unit
+
+    @property
+    def worst(self) -> IndexArray:
+        """The rows with the smallest margins."""
+        order = np.argsort(np.where(np.isnan(self.margin), np.inf, self.margin), kind="stable")
+        return order[: min(NAMED_RUNS, int(np.isfinite(self.margin).sum()))]
+
+    @property
+    def front(self) -> IndexArray:
+        """Feasible rows with less cost than any with a larger margin, the least margin first."""
+        assert self.cost is not None, "a front is asked for where there is a cost"
+        rows = np.flatnonzero(self.feasible & np.isfinite(self.cost[1]) & np.isfinite(self.margin))
+        rows = rows[np.lexsort((self.cost[1][rows], -self.margin[rows]))]
+        cost = self.cost[1][rows]
+        before = np.concatenate([[np.inf], np.minimum.accumulate(cost)[:-1]])
+        return rows[cost < before][::-1]
+
+
+def _least(margins: FloatArray) -> FloatArray:
+    """Return the least margin of all joints; those without an attainable range have none."""
+    least: FloatArray = np.where(np.isnan(margins), np.inf, margins).min(axis=1)
+    return np.where(np.isinf(least), np.nan, least)
+
+
+def _sum(costs: FloatArray) -> FloatArray:
+    """Add costs up over joints."""
+    total: FloatArray = _there(costs).sum(axis=1)
+    return total
+
+
+def _most(costs: FloatArray) -> FloatArray:
+    """Return the largest cost of all joints and motors."""
+    most: FloatArray = _there(costs).max(axis=1)
+    return most
+
+
+def _there(costs: FloatArray) -> FloatArray:
+    """Return costs (rows, ...) as (rows, columns), without columns that are NaN in every row."""
+    costs = costs.reshape(len(costs), -1)
+    there = ~np.isnan(costs).all(axis=0)
+    return costs[:, there] if there.any() else costs

@@ -1,0 +1,279 @@
+"""Formats of exported results: CSV, MATLAB files, Parquet, JointTrajectory messages; and datasets of xarray.
+
+CSV has a column for each joint and variable, whose floats read back bit for bit. MATLAB files are of version
+5, which MATLAB, Octave and SciPy read. Parquet holds the columns of the CSV. Messages
+`trajectory_msgs/msg/JointTrajectory` of ROS 2 are JSON, and written such that readers of YAML find the same
+in it: a point behind each mantissa, and no letter beyond ASCII.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import IO, TYPE_CHECKING, Any, TextIO, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from vsacli.base.arrays import AnyArray
+from vsacli.base.errors import InputError
+from vsacli.base.simulation_variables import actual
+from vsacli.base.variables import MOTORS, VARIABLES
+from vsacli.base.wrench import WRENCH_AXES
+from vsacli.results.exports.result_format import ResultFormat
+from vsacli.results.exports.selection import Chosen, Samples, Selection
+from vsacli.results.store.schema import storage_type, variable_attributes
+
+if TYPE_CHECKING:
+    import pyarrow
+    import xarray
+
+
+def write_csv(selection: Selection, stream: TextIO, done: Callable[[int], object]) -> None:
+    """Write a header line and a line for each sample; a file should be open with newline=""."""
+    names = selection.result.joint_names
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["time", *(column for each in selection.chosen for column in each.columns(names))])
+    for block in selection.blocks():
+        columns = [block.time.tolist()]
+        for each in selection.chosen:
+            columns += _cells(each.of_columns(block.values[each.name]))
+        writer.writerows(zip(*columns, strict=True))
+        done(len(block.time) * len(selection.chosen))
+
+
+def _cells(columns: npt.NDArray[Any]) -> list[list[Any]]:
+    """Return columns as numbers; NaN becomes None, which csv leaves empty."""
+    missing = np.isnan(columns)
+    if missing.any():
+        columns = columns.astype(object)
+        columns[missing] = None
+    cells: list[list[Any]] = columns.tolist()
+    return cells
+
+
+CSV = ResultFormat(write_csv, missing="empty cells")
+
+
+MAX_VARIABLE_BYTES = 2**31 - 2**16
+"""The format counts the bytes of a variable in 32 bits, of which readers take 31; less what stands before."""
+
+
+def write_mat(selection: Selection, stream: IO[bytes], done: Callable[[int], object]) -> None:
+    """Write `time`, each variable (samples, joints[, 2]), with names and units.
+
+    A variable is read when its turn comes, so that no more than one is in memory.
+    """
+    from scipy.io import savemat
+
+    savemat(cast("Any", stream), _Variables(selection, done), oned_as="column", long_field_names=True)
+
+
+def check_sizes(selection: Selection) -> None:
+    """Refuse a variable that is too large for the format."""
+    for chosen in selection.chosen:
+        size = len(selection.time) * chosen.there.size * np.dtype(np.float64).itemsize
+        if size > MAX_VARIABLE_BYTES:
+            reason = (
+                f"{chosen.name} has {size:,} bytes, and a variable of a MATLAB file of version 5 must stay "
+                "below 2 GB; take a lower --rate, or read the result itself, whose variables h5read gives"
+            )
+            raise InputError.one(reason, selection.result.path)
+
+
+class _Variables(Mapping[str, Any]):
+    """The variables of the file by name, each made when it is asked for."""
+
+    def __init__(self, selection: Selection, done: Callable[[int], object]) -> None:
+        self._made: dict[str, Callable[[], Any]] = {
+            "joint_names": lambda: _cell_array(selection.result.joint_names),
+            "joint_types": lambda: _cell_array(selection.result.joint_types),
+            "units": lambda: _units(selection),
+            "time": lambda: selection.time,
+            **{each.name: _reading(selection, each, done) for each in selection.chosen},
+        }
+
+    def __getitem__(self, name: str) -> Any:
+        return self._made[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._made)
+
+    def __len__(self) -> int:
+        return len(self._made)
+
+
+def _reading(selection: Selection, chosen: Chosen, done: Callable[[int], object]) -> Callable[[], Any]:
+    def read() -> Any:
+        values = selection.read(chosen, 0, len(selection.time))
+        done(len(values))
+        return values
+
+    return read
+
+
+def _cell_array(texts: Sequence[str]) -> Any:
+    """Return a column of texts, which MATLAB indexes by braces."""
+    return np.array(texts, dtype=object)[:, None]
+
+
+def _units(selection: Selection) -> dict[str, Any]:
+    """Return the units of each variable by name: one for each joint, or axis of the wrench."""
+    types = selection.result.joint_types
+    units = {each.name: _cell_array(each.units(types)) for each in selection.chosen}
+    return {"time": "s", **units}
+
+
+MAT = ResultFormat(write_mat, binary=True, missing="NaN", check=check_sizes)
+
+
+OF_RESULT = ("robot_name", "trajectory_name", "verdict")
+"""Attributes of the result in the metadata of a table."""
+
+
+def write_parquet(selection: Selection, stream: IO[bytes], done: Callable[[int], object]) -> None:
+    """Write the columns of the CSV, in groups of rows of which one at a time is in memory."""
+    from pyarrow import Table, array, parquet
+
+    schema = _schema(selection)
+    with parquet.ParquetWriter(stream, schema) as writer:
+        for block in selection.blocks():
+            columns = [block.time]
+            for each in selection.chosen:
+                columns += list(each.of_columns(block.values[each.name]))
+            arrays = [array(column, mask=np.isnan(column)) for column in columns]
+            writer.write_table(Table.from_arrays(arrays, schema=schema))
+            done(len(block.time) * len(selection.chosen))
+
+
+def check_installed(_selection: Selection) -> None:
+    """Refuse if there is nothing that could write it."""
+    try:
+        import pyarrow  # noqa: F401
+    except ModuleNotFoundError:
+        reason = "Parquet needs the package pyarrow, which is not installed; pip install pyarrow gets it"
+        raise InputError.one(reason) from None
+
+
+def _schema(selection: Selection) -> pyarrow.Schema:
+    import pyarrow
+
+    of_result: dict[Any, Any] = {name: getattr(selection.result, name) for name in OF_RESULT}
+    return pyarrow.schema(
+        [
+            pyarrow.field(name, pyarrow.from_numpy_dtype(kind), metadata={"unit": unit})
+            for name, kind, unit in _columns(selection)
+        ],
+        metadata=of_result,
+    )
+
+
+def _columns(selection: Selection) -> Iterator[tuple[str, np.dtype[Any], str]]:
+    """Yield name, type and unit of each column."""
+    result = selection.result
+    yield "time", np.dtype(np.float64), "s"
+    for each in selection.chosen:
+        units = np.repeat(each.units(result.joint_types), each.there.sum(axis=1)).tolist()
+        for name, unit in zip(each.columns(result.joint_names), units, strict=True):
+            yield name, storage_type(each.variable), unit
+
+
+PARQUET = ResultFormat(write_parquet, binary=True, missing="nulls", check=check_installed)
+
+
+FIELDS = {"positions": "q", "velocities": "dq", "accelerations": "ddq", "effort": "tau_e"}
+"""The variable in each field of a point. The effort is what the joint exerts on the link: there is one of it,
+while motors may be two, whose torques depend on springs that the message does not know."""
+
+WITHOUT_POINT = re.compile(r"(?<![\d.])(\d+)e")
+"""In 1e-05, which JSON takes for a number, and YAML for a text."""
+
+NANOSECONDS = 10**9
+"""In a second: times of messages are whole seconds and nanoseconds."""
+
+LONGEST = 2**31 - 1
+"""Seconds of a message: builtin_interfaces/msg/Duration has 32 bits for them, with a sign."""
+
+
+def check_fields(selection: Selection) -> None:
+    """Refuse what no field of a message holds, a selection without positions, and times that are too long."""
+    names, fields = {each.name for each in selection.chosen}, _fields(selection)
+    strange = sorted(names - set(fields.values()))
+    if strange:
+        places = ", ".join(f"{variable} ({field})" for field, variable in fields.items())
+        raise InputError.one(f"a JointTrajectory has no place for {', '.join(strange)}, only for {places}")
+    if fields["positions"] not in names:
+        raise InputError.one(f"a JointTrajectory needs positions: add {fields['positions']} to --variables")
+    if selection.time.size and selection.time[-1] - selection.time[0] > LONGEST:
+        lasts = f"lasts {selection.time[-1] - selection.time[0]:.4g} s"
+        raise InputError.one(
+            f"{lasts}, and a JointTrajectory counts seconds up to {LONGEST}", selection.result.path
+        )
+
+
+def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[[int], object]) -> None:
+    """Write the message, a line for each point; `time_from_start` counts from the first sample."""
+    names = json.dumps(list(selection.result.joint_names))
+    stream.write('{"header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},\n')
+    stream.write(f'"joint_names": {names},\n"points": [')
+    separator = "\n"
+    for block in selection.blocks():
+        points = ",\n".join(map(json.dumps, _points(selection, block)))
+        stream.write(separator + WITHOUT_POINT.sub(r"\1.0e", points))
+        separator = ",\n"
+        done(len(block.time) * len(selection.chosen))
+    stream.write("\n]}\n")
+
+
+def _fields(selection: Selection) -> dict[str, str]:
+    """Return the variable that each field takes from a file of this kind."""
+    simulated = selection.result.kind == "simulation"
+    return {field: actual(name) if simulated else name for field, name in FIELDS.items()}
+
+
+def _points(selection: Selection, block: Samples) -> Iterator[dict[str, Any]]:
+    fields, values = _fields(selection), block.values
+    present = {field: values[name].tolist() for field, name in fields.items() if name in values}
+    since = np.rint((block.time - selection.time[0]) * NANOSECONDS).astype(np.int64).tolist()
+    for time, *point in zip(since, *present.values(), strict=True):
+        seconds, nanoseconds = divmod(time, NANOSECONDS)
+        stamp = {"sec": seconds, "nanosec": nanoseconds}
+        yield {**dict(zip(present, point, strict=True)), "time_from_start": stamp}
+
+
+JOINT_TRAJECTORY = ResultFormat(
+    write_joint_trajectory,
+    variables={"result": tuple(FIELDS.values()), "simulation": tuple(map(actual, FIELDS.values()))},
+    check=check_fields,
+)
+
+
+def labelled_dataset(
+    arrays: Mapping[str, AnyArray], joint_names: Sequence[str], joint_types: tuple[str, ...]
+) -> xarray.Dataset:
+    """Return the dataset that xarray makes of a result file with these variables.
+
+    Args:
+        arrays: variables by name, each (samples, ...) with the dimensions that are declared for it.
+        joint_names: base to tip.
+        joint_types: "revolute" or "prismatic".
+
+    Raises:
+        ModuleNotFoundError: xarray is not installed.
+    """
+    try:
+        import xarray
+    except ModuleNotFoundError:
+        reason = "to_xarray needs the package xarray, which is not installed; pip install xarray gets it"
+        raise ModuleNotFoundError(reason, name="xarray") from None
+    labels = {"joint": list(joint_names), "motor": list(MOTORS), "wrench_axis": list(WRENCH_AXES)}
+    variables = {}
+    for name, array in arrays.items():
+        attributes = variable_attributes(VARIABLES[name], joint_types)
+        attributes.pop("coordinates", None)  # xarray knows them
+        variables[name] = (("time", *VARIABLES[name].dims), array, attributes)
+    used = {dim for dims, _, _ in variables.values() for dim in dims}
+    coordinates = {name: label for name, label in labels.items() if name in used}
+    return xarray.Dataset(variables, {**coordinates, "joint_type": ("joint", list(joint_types))})

@@ -1,0 +1,129 @@
+"""Sheets as figures: panels in rows and columns with common axes of time, one legend and a title."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+from matplotlib.legend import Legend
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.units import TIME
+from vsacli.results.charts import chart as charts
+from vsacli.results.charts.chart import Block, Sheet
+from vsacli.results.plots.panels import draw_chart
+from vsacli.results.plots.styles import house_style, line_handle, line_style, make_legible, shortened
+
+LATE = 1e5
+"""First time, s, from which on ticks count from it: their digits would not fit side by side."""
+
+FINE, FEW_TICKS = 0.1, 4
+"""Length of a span, s, below which the digits of more than so many ticks would not fit side by side."""
+
+TITLE_LENGTH, LABEL_BESIDE = 70, 16
+"""Characters of a title, and of a name beside a panel."""
+
+_INCHES_PER_CHARACTER = 0.07
+_INCHES_PER_HANDLE = 0.7
+
+AxesGrid = npt.NDArray[Any]
+"""Panels in rows and columns."""
+
+
+def drawn(sheet: Sheet) -> Figure:
+    """Draw a figure."""
+    with house_style():
+        figure = Figure(sheet.size, layout="constrained")
+        places = figure.add_gridspec(1, len(sheet.blocks), width_ratios=list(sheet.widths))
+        handles = line_handles(sheet.legend)
+        for column, block in enumerate(sheet.blocks):
+            handles += _draw_block(places[column], block)
+        return complete(figure, sheet.title, handles)
+
+
+def line_handles(lines: charts.Legend) -> list[Artist]:
+    """Return the entries of a legend for lines."""
+    return [line_handle(line_style(look), label) for label, look in lines.items()]
+
+
+def _draw_block(place: SubplotSpec, block: Block) -> list[Artist]:
+    """Draw charts into panels of their own; return what a legend shows besides the lines."""
+    handles: list[Artist] = []
+    panels = _panels(place, block)
+    for of_row, row in zip(panels, block.rows, strict=True):
+        for axes, chart in zip(of_row, row, strict=True):
+            handles += [] if chart is None else draw_chart(axes, chart)
+    for of_row, row, lines in zip(panels, block.rows, block.beside, strict=False):
+        last = max(column for column, chart in enumerate(row) if chart is not None)
+        _name_beside(of_row[last], line_handles(lines))
+    return handles
+
+
+def _panels(place: SubplotSpec, block: Block) -> AxesGrid:
+    """Return the panels of a block, (rows, columns); those without a chart are removed."""
+    rows, folds = block.folding
+    each, columns = len(block.heights), len(block.rows[0])
+    places = place.subgridspec(rows * each, folds * columns, height_ratios=[*block.heights] * rows)
+    grid = places.subplots(squeeze=False).reshape(rows * each, folds, columns)
+    panels = grid.swapaxes(0, 1).reshape(-1, columns)
+    for unused in panels[len(block.rows) :].flat:
+        unused.remove()
+    panels = panels[: len(block.rows)]
+    present = np.array([[chart is not None for chart in row] for row in block.rows])
+    for unused in panels[~present]:
+        unused.remove()
+    for first in range(0, len(present), rows * each):
+        fold = slice(first, first + rows * each)
+        for column, there in zip(panels[fold].T, present[fold].T, strict=True):
+            if there.any():
+                share_time(column[there], block.time, block.xlabel)
+    return panels
+
+
+def share_time(column: Sequence[Axes], time: FloatArray, label: str = f"time [{TIME}]") -> None:
+    """Let panels, top to bottom, share an axis of time over this span, labelled below the last."""
+    for axes in column[:-1]:
+        axes.sharex(column[-1])
+        axes.tick_params(labelbottom=False)
+    column[-1].set_xlabel(label)
+    if time[0] >= LATE:
+        whole = math.floor(time[0])
+        column[-1].set_xlabel(f"time after {whole} {TIME} [{TIME}]")
+        column[-1].xaxis.set_major_formatter(lambda tick, _: f"{tick - whole:g}")
+    if time[-1] > time[0]:
+        column[-1].set_xlim(time[0], time[-1])
+        if time[-1] - time[0] < FINE:
+            column[-1].locator_params(axis="x", nbins=FEW_TICKS)
+
+
+def _name_beside(axes: Axes, handles: Sequence[Artist]) -> None:
+    """Name lines beside a panel, at its right."""
+    labels = [shortened(str(handle.get_label()), LABEL_BESIDE) for handle in handles]
+    _take_literally(axes.legend(handles, labels, loc="center left", bbox_to_anchor=(1.0, 0.5)))
+
+
+def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
+    """Add the title and, below all panels, one legend with each label once in as many columns as fit."""
+    figure.suptitle(shortened(title, TITLE_LENGTH), fontsize=11, parse_math=False)
+    by_label = {str(handle.get_label()): handle for handle in handles}
+    if by_label:
+        labels = [shortened(label) for label in by_label]
+        width = _INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * max(map(len, labels))
+        rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
+        columns = math.ceil(len(labels) / rows)
+        legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)
+        _take_literally(legend)
+    make_legible(figure)
+    return figure
+
+
+def _take_literally(legend: Legend) -> None:
+    for text in legend.get_texts():
+        text.set_parse_math(False)

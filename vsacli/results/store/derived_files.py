@@ -1,0 +1,140 @@
+"""Files in the layout of a result file: simulations, and results with derivatives by numbers of the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple, Protocol
+
+import h5py
+import numpy as np
+
+from vsacli.base.arrays import AnyArray, FloatArray
+from vsacli.base.outputs import Staged
+from vsacli.base.simulation_variables import MEASURED, SIMULATION_VARIABLES, measured
+from vsacli.base.variables import MOTORS, Block
+from vsacli.results.store.layout import attach_scales, create_labels
+from vsacli.results.store.new_file import ChunkFiller, chunk_rows
+from vsacli.results.store.schema import SENSITIVITY, SIMULATION
+from vsacli.results.store.writer import ResultWriter
+from vsacli.robot.model import Robot
+from vsacli.trajectory.trajectory import Trajectory
+
+_COMPUTED = ("q", "dq", "ddq", "tau_e", "theta", "tau_motor", "motor_power", "flags")
+"""Variables beside their derivatives."""
+
+_SLOPE = "_slope"
+"""What the name of a derivative ends with."""
+
+
+class SimulationWriter(ResultWriter):
+    """Writes a simulation file; the trajectory's samples are the most it can have.
+
+    Args:
+        file, robot, trajectory, provenance: as of `ResultWriter`.
+        sensed: whether the run has readings of sensors.
+    """
+
+    _format = SIMULATION
+    _declared = SIMULATION_VARIABLES
+
+    def __init__(
+        self,
+        file: Staged,
+        robot: Robot,
+        trajectory: Trajectory,
+        *,
+        sensed: bool = False,
+        provenance: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
+        self._sensed = sensed
+        super().__init__(file, robot, trajectory, provenance=provenance)
+
+    def _absent(self, trajectory: Trajectory) -> dict[str, str]:  # noqa: ARG002
+        return {} if self._sensed else dict.fromkeys(map(measured, MEASURED), "the run had no sensors")
+
+
+class Number(NamedTuple):
+    """A number of the robot: the path to it, its value in SI units, and its unit."""
+
+    path: str
+    value: float
+    unit: str
+
+
+class Sloped(Protocol):
+    """Consecutive steps with derivatives."""
+
+    @property
+    def time(self) -> FloatArray:
+        """Times, (samples,), s."""
+
+    @property
+    def block(self) -> Block:
+        """The variables themselves."""
+
+    def over_time(self, name: str) -> FloatArray:
+        """Derivatives of a variable, (samples, numbers, joints[, 2])."""
+
+
+class SensitivityWriter(ResultWriter):
+    """Writes a sensitivity file.
+
+    Args:
+        numbers: by which is differentiated.
+        slopes: names of the variables that are, each with whether it is one of motors.
+    """
+
+    _format = SENSITIVITY
+
+    def __init__(
+        self,
+        file: Staged,
+        robot: Robot,
+        trajectory: Trajectory,
+        numbers: Sequence[Number],
+        slopes: Mapping[str, bool],
+        *,
+        provenance: Mapping[str, str],
+    ) -> None:
+        super().__init__(file, robot, trajectory, _COMPUTED, provenance=provenance)
+        self._numbers, self._wanted = numbers, slopes
+
+    def _create(self) -> None:
+        super()._create()
+        file, (paths, values, units) = self._file, zip(*self._numbers, strict=True)
+        scale = create_labels(file, "parameter", paths, "number of the robot file", track_order=False)
+        scale.make_scale("parameter")
+        stored = file.create_dataset("parameter_value", data=list(values))
+        words = "SI unit of the number"
+        for dataset in (stored, create_labels(file, "parameter_unit", units, words, track_order=False)):
+            attach_scales(dataset, [scale])
+        for name, of_motors in self._wanted.items():
+            slope = self._slope(name, of_motors, scale)
+            self._fillers[f"{name}{_SLOPE}"] = ChunkFiller(slope, self.do)
+
+    def _slope(self, name: str, of_motors: bool, scale: h5py.Dataset) -> h5py.Dataset:
+        row = (len(self._numbers), len(self._robot.joints), *((len(MOTORS),) if of_motors else ()))
+        samples = self._trajectory.samples
+        dataset = self._file.create_dataset(
+            f"{name}{_SLOPE}",
+            shape=(samples, *row),
+            maxshape=(samples, *row),
+            dtype="<f8",
+            chunks=(chunk_rows(samples, 8 * int(np.prod(row))), *row),
+        )
+        dataset.attrs["units"] = f"units of {name}, per parameter_unit"
+        dataset.attrs["long_name"] = f"derivative of {name} by each number of the robot file"
+        scales = [self._file["time"], scale, self._file["joint"], self._file["motor"]]
+        attach_scales(dataset, scales[: dataset.ndim])
+        return dataset
+
+    def _values(self, block: Any, name: str) -> AnyArray:
+        """Return what a block, as `Sloped`, has for a dataset."""
+        variable = name.removesuffix(_SLOPE)
+        return super()._values(block.block, name) if variable == name else block.over_time(variable)
+
+    def _size(self) -> int:
+        columns = sum(len(MOTORS) if of_motors else 1 for of_motors in self._wanted.values())
+        slopes = 8 * columns * len(self._numbers) * len(self._robot.joints)
+        return super()._size() + self._trajectory.samples * slopes

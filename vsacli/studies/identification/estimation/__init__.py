@@ -1,1 +1,0 @@
-"""Equations of records, and the numbers that satisfy them best."""

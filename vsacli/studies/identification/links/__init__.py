@@ -1,1 +1,0 @@
-"""Equations of links, their base parameters, and bodies that have them."""

@@ -1,0 +1,237 @@
+"""Equations of motors behind springs: tau_motor = B theta'' + D theta' + friction + U_theta(q, theta).
+
+They are (73)-(74) with what was recorded, and free of the links. The unknowns are numbers of springs, motors
+and friction that words or patterns of paths ask for; `MotorSystem` is the system of one joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.drivetrain import SIDES
+from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import InputError
+from vsacli.compute.duals import Dual, tangent_of, value_of
+from vsacli.dynamics.drive import motor_torques
+from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, apart, parameters, seeded
+from vsacli.studies.identification.conditioning import Signals
+from vsacli.studies.identification.estimation import Equations
+from vsacli.studies.identification.fitted_system import SystemOfEquations
+
+SPRINGS, MOTORS, FRICTION = "springs", "motors", "friction"
+GROUPS = (SPRINGS, MOTORS, FRICTION)
+"""What users may ask for by a word."""
+
+FIXED = ("gear_ratio", "torque_constant", "resistance")
+"""Numbers of motors that are counted or printed on them, and of which no torque on the joint's side tells."""
+
+WIDTH = "width"
+
+OF_MOTORS = ("motor", "coupled_inertia")
+"""Words of paths to numbers of motors."""
+
+
+def unknowns(robot: Robot, index: int, fit: Sequence[str]) -> tuple[Parameter, ...]:
+    """The numbers of one joint's motors and springs that are to be found.
+
+    Terms of a spring that are zero, and the width of friction that is sharp, stay so unless a pattern names
+    them: what is not there is not looked for.
+
+    Args:
+        robot: the robot.
+        index: of the joint.
+        fit: words of `GROUPS`, and patterns of paths such as `joints.elbow.actuator.spring.*`.
+    """
+    return tuple(
+        each
+        for each in parameters(robot)
+        if each.joint == index and (group := group_of(each)) and _asked_for(each, group, fit)
+    )
+
+
+def with_friction(robot: Robot, joints: Sequence[int]) -> Robot:
+    """A robot whose motors behind springs have friction of zero where they had none, so that it can be found.
+
+    Args:
+        robot: the robot.
+        joints: indices of those that it is about.
+    """
+    paths = [str(each) for each in parameters(robot) if each.joint in joints and group_of(each)]
+    sprung = [joint.name for joint in robot.joints if joint.actuator.sprung]
+    inertias = [path for path in paths if path.endswith(".inertia") and path.split(".")[1] in sprung]
+    frictions = [path.replace(".inertia", f".{FRICTION}") for path in inertias]
+    lacking = [each for each in frictions if not any(path.startswith(f"{each}.") for path in paths)]
+    return robot.replace({each: {"coulomb": 0.0} for each in lacking})
+
+
+def admissible(robot: Robot, path: str, value: float) -> float | None:
+    """A value that the robot file may hold at a path: this one, or else zero; None if it may hold neither."""
+    for each in (value, 0.0):
+        try:
+            robot.replace(path, each)
+        except InputError:
+            continue
+        return each
+    return None
+
+
+def group_of(parameter: Parameter) -> str | None:
+    """What a number of a joint belongs to, a word of `GROUPS`; None if it is not to be found."""
+    place = parameter.path[2:]
+    if place[0] != "actuator" or place[-1] in FIXED:
+        return None
+    if FRICTION in place:
+        return FRICTION
+    return MOTORS if place[1] in OF_MOTORS else SPRINGS
+
+
+def _asked_for(parameter: Parameter, group: str, fit: Sequence[str]) -> bool:
+    if any(fnmatchcase(str(parameter), pattern) for pattern in fit):
+        return True
+    absent = parameter.value == 0 and (group == SPRINGS or parameter.path[-1] == WIDTH)
+    return group in fit and not absent
+
+
+def check_fit(robot: Robot, fit: Sequence[str], words: Sequence[str]) -> None:
+    """Refuse what is neither a word nor fits a number that can be found.
+
+    Raises:
+        InputError: saying what was probably meant.
+    """
+    paths = [str(each) for each in parameters(robot) if each.joint is not None and group_of(each)]
+    problems = []
+    for word in fit:
+        if word not in words and not any(fnmatchcase(path, word) for path in paths):
+            listed = f"{', '.join(words[:-1])} or {words[-1]}"
+            hint = did_you_mean(word, [*words, *paths])
+            problems.append(
+                f"--fit {word}: expected {listed}, or the path of a number of motors or springs{hint}"
+            )
+    if problems:
+        raise InputError.one("; ".join(problems))
+
+
+def predicted_torques(actuator: Actuator, motion: dict[str, Any]) -> Any:
+    """Torques of both motors, (2, samples), from the motion of joint and motors by name; NaN of none."""
+    tau_spring = actuator.carried(motion).tau_spring
+    missing = np.full((SIDES - len(tau_spring), *tau_spring.shape[1:]), np.nan)
+    against = np.concatenate((tau_spring, missing))
+    return motor_torques(actuator, motion["dtheta"], motion["ddtheta"], against)
+
+
+def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
+    """What the motors of a joint are called in reports."""
+    joint = robot.joints[index]
+    if len(joint.actuator.motors) == 1:
+        return (f"motor of {joint.name}",)
+    return tuple(f"motor {number} of {joint.name}" for number, _ in enumerate(joint.actuator.motors, 1))
+
+
+def joint_motion(signals: Signals, index: int) -> dict[str, Any]:
+    """Motion of a joint and its motors, samples last, as duals that no number of the robot changes.
+
+    Functions of NumPy then take numbers of the robot that are duals.
+    """
+    return {name: Dual(values, {}) for name, values in _arrays(signals, index).items()}
+
+
+def _arrays(signals: Signals, index: int) -> dict[str, FloatArray]:
+    q, theta = signals.q[:, index], signals.theta[:, index].T
+    return {
+        "q": q,
+        "dq": signals.dq[:, index],
+        "ddq": signals.ddq[:, index],
+        "theta": theta,
+        "phi": theta - q,
+        "dtheta": signals.dtheta[:, index].T,
+        "ddtheta": signals.ddtheta[:, index].T,
+    }
+
+
+class MotorSystem(SystemOfEquations):
+    """Equations of the motors of a joint with springs.
+
+    Args:
+        robot: the robot, as its file has it.
+        index: of the joint.
+        sought: numbers of its actuator that are to be found; the others are taken as they are.
+    """
+
+    def __init__(self, robot: Robot, index: int, sought: Sequence[Parameter] = ()) -> None:
+        self._robot, self._index, self._sought = robot, index, tuple(sought)
+        self.title = robot.joints[index].name
+        self.names = tuple(map(str, sought))
+        self.units = tuple(each.unit for each in sought)
+        self.sums = ("",) * len(self.names)
+        self.before = np.array([each.value for each in sought])
+
+    def of_record(self, values: FloatArray, signals: Signals) -> Equations:
+        """See `SystemOfEquations.of_record`; the equations of those motors whose torque was recorded."""
+        index, count = self._index, len(self._sought)
+        present = [
+            each._replace(value=float(value)) for each, value in zip(self._sought, values, strict=True)
+        ]
+        carrying = apart(seeded(self._robot, present).joints[index]).actuator
+        with np.errstate(all="ignore"):  # numbers far off, from which the search comes back
+            torques = predicted_torques(carrying, joint_motion(signals, index))
+        slopes = tangent_of(torques, count, np.shape(value_of(torques)))
+        measured = signals.tau_motor[:, index].T
+        recorded = [motor for motor in range(SIDES) if not np.isnan(measured[motor]).all()]
+        columns = [
+            signals.filter.applied(np.stack((measured[motor], value_of(torques)[motor], *slopes[:, motor])).T)
+            for motor in recorded
+        ]
+        rows = len(columns[0]) if columns else 0
+        together = np.concatenate([np.empty((0, 2 + count)), *columns])
+        names = motor_names(self._robot, index)
+        return Equations(
+            measured=together[:, 0],
+            predicted=together[:, 1],
+            slopes=together[:, 2:],
+            group=np.repeat([names[motor] for motor in recorded], rows),
+            sample=np.tile(np.arange(rows), len(recorded)),
+        )
+
+    def admissible(self, number: int, value: float) -> float | None:
+        """The value itself if the robot file may hold it, else zero if it may hold that; None if neither."""
+        return admissible(self._robot, self.names[number], value)
+
+    def without(self, fixed: dict[int, float]) -> MotorSystem:
+        """See `SystemOfEquations.without`."""
+        robot = self._robot.replace({self.names[number]: value for number, value in fixed.items()})
+        return MotorSystem(robot, self._index, [e for n, e in enumerate(self._sought) if n not in fixed])
+
+
+def motor_systems(
+    robot: Robot,
+    joints: Sequence[int],
+    fit: Sequence[str],
+    records: Sequence[Signals],
+) -> Iterator[MotorSystem]:
+    """Of the joints with springs, those of which anything is to be found.
+
+    Numbers of springs that change no torque at all, since they but bound where these work, are passed over.
+
+    Args:
+        robot: the robot.
+        joints: indices of those that were recorded.
+        fit: words and patterns, see `unknowns`.
+        records: of its motion.
+    """
+    for index in joints:
+        sought = unknowns(robot, index, fit) if robot.joints[index].actuator.sprung else ()
+        if not sought:
+            continue
+        system = MotorSystem(robot, index, sought)
+        slopes = [system.of_record(system.before, each).slopes for each in records]
+        acts = np.any(np.concatenate(slopes) != 0, axis=0)
+        left = [each for each, does in zip(sought, acts, strict=True) if does or group_of(each) != SPRINGS]
+        if left:
+            yield MotorSystem(robot, index, left)

@@ -1,1 +1,0 @@
-"""Equations of motors and springs."""

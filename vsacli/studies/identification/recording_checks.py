@@ -1,0 +1,406 @@
+"""Recordings held against the robot: columns that are not what their names say, late torques, and their gain.
+
+`model_doubts` finds wrong units, turned signs, exchanged columns and motors before a fit, `delay` by how much
+torques are later than positions after it. `gains` asks whether all numbers are by one factor not those of
+the file.
+
+Equations of motors are linear in inertias, dampings, friction and the sizes of springs: torques that read 3 %
+too large make all of these 3 % too large, and leave nothing. No motion tells such a gain from a joint whose
+numbers differ so from the file. What the file says of the links does: what springs carry by the numbers found
+is held against the torque that links of these masses need.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.drivetrain import Drivetrain
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.base.variables import MOTORS, VARIABLES
+from vsacli.robot.model import Robot
+from vsacli.robot.parameters import parameters
+from vsacli.studies.identification.conditioning import Signals
+from vsacli.studies.identification.estimation import SEPARABLE, Equations, least_squares
+from vsacli.studies.identification.fitted_system import Solution
+from vsacli.studies.identification.identification_report import significant
+from vsacli.studies.identification.independence import independence
+from vsacli.studies.identification.link_equations import LINKS, link_system, without_links
+from vsacli.studies.identification.motor_equations import MOTORS as MOTORS_GROUP
+from vsacli.studies.identification.motor_equations import MotorSystem, group_of, motor_names
+from vsacli.studies.identification.recordings import MOTOR, POSITION, TORQUE, Record
+from vsacli.studies.measured.agreement import Agreement, straight_line
+from vsacli.studies.measured.pairing import exactness, tame
+from vsacli.studies.measured.slips import exchanged, slips
+
+ELSEWHERE = 0.5
+"""Distance, over the size of the deflections, from which on they are on another branch."""
+
+FOLLOWS_BETTER = 0.25
+"""Variance of a motor about what it may follow, over that about its joint, below which it does follow it."""
+
+FOLLOWS = 0.5
+"""The same over the variance of what it follows."""
+
+RESTING = 1e-3
+"""Share of the predicted range below which a measured torque does not move."""
+
+ODD_GAINS: Mapping[str, float] = MappingProxyType(
+    {
+        "run against each other: one has the wrong sign": -1.0,
+        "look as if the first were in degrees, or the second marked so": 180 / math.pi,
+        "look as if the second were in degrees, or the first marked so": math.pi / 180,
+    }
+)
+"""Of a motor's motion over its joint's, by what they look like."""
+
+
+def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: Signals) -> Iterator[str]:
+    """Sentences on what looks as if columns were not what their names say.
+
+    Motors follow their joints, and torques what the robot file predicts, but for what is to be found.
+
+    Args:
+        robot: as its file has it.
+        joints: indices of those that were recorded.
+        record: as it was read.
+        signals: the same, conditioned.
+    """
+    sprung = [index for index in joints if robot.joints[index].actuator.sprung]
+    sprung = [index for index in sprung if (TORQUE, index, MOTORS[0]) in record.columns]
+    torques = [each for index in sprung for each in _torques(robot, index, record, signals)]
+    if torques:
+        agreements, ratios = zip(*torques, strict=True)
+        yield from slips(_followed(agreements), ratios)
+    for index in sprung:
+        yield from _positions(robot, index, record, signals)
+        yield from _branch(robot, index, signals)
+
+
+def _followed(torques: Sequence[Agreement]) -> list[Agreement]:
+    """Torques with the columns whose predictions they follow, where columns look exchanged."""
+    found, units = list(torques), {torque.unit for torque in torques}
+    if len(units) > 1 or len({torque.samples for torque in torques}) > 1:
+        return found
+    exact = [exactness(tame(torque.measured)) for torque in torques]
+    predicted = [torque.computed for torque in torques]
+    for row, column in exchanged([torque.measured for torque in torques], exact, lambda _row: predicted):
+        found[row] = replace(torques[row], follows=torques[column].column)
+    return found
+
+
+def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[str]:
+    """Motors behind springs that follow something else than their joint."""
+    stride = signals.filter.stride
+    actuator, q = robot.joints[index].actuator, signals.q[::stride]
+    for motor, follows in enumerate(actuator.has(VARIABLES["phi"])[: actuator.motor_count]):
+        theta = signals.theta[::stride, index, motor]
+        own = float(np.var(theta - q[:, index]))
+        name, joint = (
+            record.columns[place] for place in ((MOTOR, index, MOTORS[motor]), (POSITION, index, None))
+        )
+        if not follows:
+            continue
+        for words, gain in ODD_GAINS.items():
+            if _follows(theta / gain, q[:, index], own / gain**2):
+                yield f"columns {name!r} and {joint!r} {words}"
+        for other in range(q.shape[1]):
+            if other != index and _follows(theta, q[:, other], own):
+                listed = f"{record.columns[POSITION, other, None]!r}, not {joint!r}"
+                yield f"column {name!r} follows {listed}: columns look exchanged"
+
+
+def _follows(theta: FloatArray, q: FloatArray, own: float) -> bool:
+    """Whether a motor follows a joint, and much better than its own, about which its variance is given."""
+    about = float(np.var(theta - q))
+    return about < FOLLOWS_BETTER * own and about < FOLLOWS * float(np.var(q))
+
+
+def _torques(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[tuple[Agreement, float]]:
+    """Torques as measured beside those that the robot file predicts, and the gear ratio."""
+    system = MotorSystem(robot, index)
+    equations = system.of_record(system.before, signals)
+    joint = robot.joints[index]
+    for motor, (name, of_joint) in enumerate(
+        zip(motor_names(robot, index), joint.actuator.motors, strict=True)
+    ):
+        rows = equations.group == name
+        computed, measured = equations.predicted[rows], equations.measured[rows]
+        yield (
+            _agreement(
+                record.columns[TORQUE, index, MOTORS[motor]],
+                (joint.name, MOTORS[motor], VARIABLES[TORQUE].quantity.unit(joint.type)),
+                signals.time[:: signals.filter.stride],
+                computed,
+                measured,
+            ),
+            math.nan if of_joint.gear_ratio is None else of_joint.gear_ratio,
+        )
+
+
+def _agreement(
+    column: str,
+    whose: tuple[str, int, str],
+    time: FloatArray,
+    computed: FloatArray,
+    measured: FloatArray,
+) -> Agreement:
+    joint, motor, unit = whose
+    error = measured - computed
+    offset, gain, correlation = straight_line(computed, measured)
+    worst, rms = int(np.argmax(np.abs(error))), float(np.sqrt(np.mean(error**2)))
+    return Agreement(
+        column=column,
+        variable=TORQUE,
+        joint=joint,
+        motor=motor,
+        unit=unit,
+        samples=len(error),
+        rms=rms,
+        share=rms / float(np.sqrt(np.mean(computed**2))),
+        worst=float(error[worst]),
+        worst_time=float(time[worst]),
+        offset=offset,
+        gain=gain,
+        correlation=correlation,
+        lag=math.nan,
+        time=time,
+        computed=computed,
+        measured=measured,
+        still="measured" if np.ptp(measured) < RESTING * np.ptp(computed) else None,
+    )
+
+
+def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
+    """Deflections that carry what they do on another branch than that of the preload."""
+    actuator = robot.joints[index].actuator
+    if not actuator.commanded or actuator.opposite_preload is None:
+        return
+    stride = signals.filter.stride
+    q, theta = signals.q[::stride, index], signals.theta[::stride, index]
+    phi = Drivetrain([actuator]).deflections(q[:, None], theta).T
+    carried = actuator.carried({"q": q, "theta": theta.T, "phi": phi})
+    on_branch = actuator.solve(carried.tau_e, carried.stiffness, q).deflections
+    off = np.linalg.norm(on_branch - phi, axis=0) > ELSEWHERE * np.linalg.norm(phi, axis=0)
+    if np.mean(off) > 1 / 2:
+        yield (
+            f"the springs of {robot.joint_names[index]} are deflected as with the preload "
+            f"{actuator.opposite_preload}: the columns of motors 1 and 2 may be exchanged, or the preload in "
+            "the robot file is the other"
+        )
+
+
+CERTAIN_DELAY = 4.0
+"""Standard errors from which on a delay is taken out; at 2, each twentieth record without any would be."""
+
+WORTH_IT = 0.05
+"""Samples from which on it is worth it."""
+
+
+class Delay(NamedTuple):
+    """Of the torques of a record behind its positions.
+
+    Attributes:
+        seconds: negative if they are ahead; NaN if it cannot be told.
+        standard_error: of that.
+    """
+
+    seconds: float
+    standard_error: float
+
+    def matters(self, rate: float) -> bool:
+        """Whether it is to be taken out of a record with so many samples a second."""
+        size = abs(self.seconds)
+        return size > CERTAIN_DELAY * self.standard_error and size * rate > WORTH_IT
+
+
+def delay(found: Sequence[Solution], signals: Signals) -> Delay:
+    """The one with which the equations of all motors hold best.
+
+    Torques that are late by d are tau(t - d) = tau(t) - d tau'(t): a further unknown of each system.
+    """
+    rates = np.gradient(signals.tau_motor, 1 / signals.rate, axis=0)
+    beside = signals._replace(tau_motor=rates, noise=None)
+    told = [each for system in found for each in _delay_of(system, signals._replace(noise=None), beside)]
+    values, errors = np.array([each for each in told if np.isfinite(each).all()]).reshape(-1, 2).T
+    if not len(values):
+        return Delay(np.nan, np.nan)
+    weights = 1 / errors**2
+    return Delay(float(weights @ values / weights.sum()), float(weights.sum() ** -0.5))
+
+
+def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tuple[float, float]]:
+    """The delay with its standard error, unless nothing of the system was recorded."""
+    equations, of_rates = found.equations(signals), found.equations(rates)
+    if len(equations.measured):
+        of_positions = found.equations(signals._replace(tau_motor=0 * rates.tau_motor))
+        slopes = np.column_stack((equations.slopes, of_positions.measured - of_rates.measured))
+        fit = least_squares([equations._replace(slopes=slopes)], np.append(found.predicting, 0.0))
+        yield float(fit.values[-1]), float(fit.standard_errors[-1])
+
+
+def without_delay(signals: Signals, late: float) -> Signals:
+    """The same with torques that are earlier by so many seconds."""
+    from scipy.interpolate import make_interp_spline
+
+    torques = signals.tau_motor.copy()
+    there = np.isfinite(torques).all(axis=0)
+    shifted: FloatArray = make_interp_spline(signals.time, torques[:, there], k=3)(signals.time + late)
+    torques[:, there] = shifted
+    return signals._replace(tau_motor=torques)
+
+
+CERTAIN_FACTOR = 4.0
+"""Standard errors from which on a factor is not 1, or not another one."""
+
+WITHIN = 3.0
+"""Standard errors, root mean square, by which numbers may be off from a common factor."""
+
+
+class Factor(NamedTuple):
+    """A ratio of what was found to what the file has, with its standard error."""
+
+    value: float
+    error: float
+
+    def differs(self, other: float) -> bool:
+        """Whether it is certainly another one."""
+        return abs(self.value - other) > CERTAIN_FACTOR * self.error
+
+    def __str__(self) -> str:
+        return f"{significant(self.value, self.error)} +- {self.error:.2g}"
+
+
+class Gain(NamedTuple):
+    """What is said of the gain of a joint's torques.
+
+    Attributes:
+        sentence: on it.
+        doubtful: whether it is the torques, rather than the robot, that differ from the file.
+    """
+
+    sentence: str
+    doubtful: bool
+
+
+def gains(
+    robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
+) -> list[Gain]:
+    """Return what is to be said of joints all of whose numbers are by one factor not those of the file.
+
+    Args:
+        robot: as its file has it.
+        joints: indices of those that were recorded.
+        motors: what was found, joint by joint.
+        signals: records.
+    """
+    factors = {each.system.title: factor for each in motors if (factor := _common_factor(each, signals))}
+    if not factors:
+        return []
+    by_links = _by_links(robot, joints, motors, signals)
+    found = {each.system.title: each for each in motors}
+    return [
+        _said(found[name], factor, by_links.get(name), rotor=_rotor_differs(robot, found[name]))
+        for name, factor in factors.items()
+    ]
+
+
+def _common_factor(found: Solution, signals: Sequence[Signals]) -> Factor | None:
+    """That by which all numbers of a joint's motors and springs differ from the file; None if none does."""
+    equations = [found.equations(each) for each in signals]
+    slopes = np.concatenate([each.slopes[:, found.free] for each in equations])
+    predicted = np.concatenate([each.predicted for each in equations])
+    weight = np.concatenate([[1 / found.fit.residual_rms[name] for name in each.group] for each in equations])
+    told = np.flatnonzero(np.isfinite(found.fit.standard_errors))
+    if not told.size or found.fit.inseparable:
+        return None
+    split = independence(slopes * weight[:, None], SEPARABLE)
+    share = split.q.T @ (predicted * weight)
+    left = predicted * weight - split.q @ share
+    if np.linalg.norm(left) > SEPARABLE * np.linalg.norm(share):
+        return None  # equations have other numbers, which a gain does not change: so it leaves something
+    by_gain = np.zeros(slopes.shape[1])
+    by_gain[split.kept] = np.linalg.solve(split.r, share) / split.scale[split.kept]
+    return _fitted_factor(found, by_gain[told], told)
+
+
+def _fitted_factor(found: Solution, by_gain: FloatArray, told: IndexArray) -> Factor | None:
+    """The factor with which numbers come nearest to the file, if they then agree with it."""
+    of_file = found.system.before[list(found.free)][told]
+    difference = found.fit.values[told] - of_file
+    covariance = found.fit.covariance[np.ix_(told, told)]
+    weighted = np.linalg.solve(covariance, np.column_stack((by_gain, difference)))
+    information = float(by_gain @ weighted[:, 0])
+    share, error = float(by_gain @ weighted[:, 1]) / information, information**-0.5
+    rest = difference - share * by_gain
+    off = float(rest @ np.linalg.solve(covariance, rest)) / max(len(told) - 1, 1)
+    factor = Factor(1 / (1 - share), error / (1 - share) ** 2)
+    return factor if factor.differs(1.0) and off < WITHIN**2 else None
+
+
+def _by_links(
+    robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
+) -> dict[str, Factor]:
+    """What springs carry by the numbers found, over what links as in the file need, by joint."""
+    if without_links(robot, joints, (LINKS,), signals):
+        return {}
+    system = link_system(robot, (), motors)
+    count = len(system.base.kept)
+    equations = [system.equations(system.before, each) for each in signals]
+    found = {}
+    for each in motors:
+        title = each.system.title
+        own = [at for at, name in enumerate(system.names) if at >= count and name.split(".")[1] == title]
+        of_link = [_of_link(one, f"link of {title}", system.before[:count], own) for one in equations]
+        fit = least_squares(of_link, np.zeros(1 + len(own)))
+        if np.isfinite(fit.standard_errors[0]):
+            found[title] = Factor(float(fit.values[0]), float(fit.standard_errors[0]))
+    return found
+
+
+def _of_link(equations: Equations, group: str, base: FloatArray, own: Sequence[int]) -> Equations:
+    """Equations of a joint's torque in units of that of its links; resistance of the joint is free."""
+    here = equations.group == group
+    slopes = equations.slopes[here]
+    assert equations.errors is not None, "as of links"
+    return equations._replace(
+        measured=equations.measured[here],
+        predicted=np.zeros(int(here.sum())),
+        slopes=np.column_stack((slopes[:, : len(base)] @ base, slopes[:, own])),
+        group=equations.group[here],
+        sample=equations.sample[here],
+        errors=equations.errors[here],
+        noise=None,
+    )
+
+
+def _rotor_differs(robot: Robot, found: Solution) -> bool:
+    """Whether numbers of motors are certainly others than in the file, not those of springs alone."""
+    known = {str(each): each for each in parameters(robot)}
+    return any(
+        abs(found.fit.values[at] - found.system.before[number])
+        > CERTAIN_FACTOR * found.fit.standard_errors[at]
+        for at, number in enumerate(found.free)
+        if found.system.names[number] in known and group_of(known[found.system.names[number]]) == MOTORS_GROUP
+    )
+
+
+def _said(found: Solution, factor: Factor, by_links: Factor | None, *, rotor: bool) -> Gain:
+    """Which of both it is, as far as the links, or the rotor, tell."""
+    size = "large" if factor.value > 1 else "small"
+    alike = f"{found.system.title}: the numbers found are {factor} times those of the file, all of them"
+    carried = f"what springs carry by these numbers is {by_links} times what links as in the file need"
+    if by_links and by_links.differs(1.0) and not by_links.differs(factor.value):
+        return Gain(f"{alike}, and {carried}: the torques read too {size}", doubtful=True)
+    if by_links and by_links.differs(factor.value) and not by_links.differs(1.0):
+        return Gain(f"{alike}, but {carried}: it is springs and motors that differ", doubtful=False)
+    beside = f"{carried}, which does not decide it" if by_links else "the links tell nothing of it"
+    if rotor:
+        reason = "a rotor and springs hardly differ alike, torques that read too {size} make them"
+        return Gain(f"{alike}: {reason.format(size=size)}; {beside}", doubtful=True)
+    return Gain(f"{alike}: torques that read too {size} look the same; {beside}", doubtful=False)

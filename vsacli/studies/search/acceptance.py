@@ -1,0 +1,428 @@
+"""The constraints of every search: margin and limits of each sample, judged as a run judges them.
+
+Limits of recorded motions count beyond what the recording leaves uncertain. The attainable range of the
+stiffness follows from margin, limits of stiffness and limits of deflection.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.reach import OfJoint, margin
+from vsacli.actuators.transmission import Command
+from vsacli.base import units
+from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray, of_joint
+from vsacli.base.errors import VsacliError
+from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.signals import STIFFNESS, Signal
+from vsacli.base.variables import deviation
+from vsacli.dynamics.drive import drive
+from vsacli.dynamics.inverse import compute_block, usual_block
+from vsacli.dynamics.limits import limit_checks, limit_flags, open_steps
+from vsacli.dynamics.uncertainty import deviations, probed_times
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+from vsacli.studies.search.loads import Instants, Load, Passage, evenly_chosen, joined
+from vsacli.trajectory.recorded.samples import SampledProfile
+from vsacli.trajectory.trajectory import Trajectory
+
+RESERVED = ("dq", "dtheta", "tau_motor", "current", "voltage")
+"""Variables that may be beyond a limit between steps that keep it, and that a search can keep clear of it."""
+
+
+STRICTER = (0.0, 0.0, 0.0, 1e-6, 1e-4, 0.01)
+"""Shares by which the rule is stricter, one search after the other. What has the margin at the steps may fall
+short of it between them; instants at which it does count from then on, so that two searches do as a rule."""
+
+_Found = TypeVar("_Found")
+
+
+class ImpossibleError(VsacliError):
+    """No change of a kind mends a motion.
+
+    Attributes:
+        reasons: why, in clauses; one for each joint that cannot be mended.
+    """
+
+    def __init__(self, *reasons: str) -> None:
+        super().__init__("; ".join(reasons))
+        self.reasons = reasons
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """When a step of a robot is accepted: a margin of at least `near_singular`, and every limit kept.
+
+    Attributes:
+        robot: the robot.
+        near_singular: the margin.
+        recorded: how limits are judged if the task was recorded.
+        reserve: share of each limit of `RESERVED` that is kept clear of.
+        ignored: joints that do not count, by index.
+        between: instants between the steps that count as well, since the start of the task as it is, s.
+    """
+
+    robot: Robot
+    near_singular: float
+    recorded: RecordedLimits | None = None
+    reserve: float = 0.0
+    ignored: frozenset[int] = frozenset()
+    between: FloatArray = field(default_factory=lambda: np.empty(0), compare=False)
+
+    def stricter(self, share: float) -> Acceptance:
+        """The same with a margin that is larger by a share, which is kept clear of limits as well."""
+        return replace(self, near_singular=(1 + share) * self.near_singular, reserve=share)
+
+    def confirmed(
+        self, attempt: Callable[[Acceptance], tuple[_Found, FloatArray | None]]
+    ) -> tuple[_Found, bool]:
+        """Search until a run confirms what is found, and return that, and whether it did.
+
+        Args:
+            attempt: searches by a rule; returns what it finds, and instants, as in `between`, at which a run
+                of that falls short, or None. They count in the next search.
+        """
+        between = self.between
+        for share in STRICTER:
+            found, short = attempt(replace(self, between=between).stricter(share))
+            if short is None:
+                return found, True
+            between = np.union1d(between, short)
+        return found, False
+
+    def refused(self, passage: Passage) -> BoolArray:
+        """The steps that are not accepted, (samples, joints)."""
+        block = compute_block(self.robot, passage.motion, self.near_singular)
+        values = map(block.of_joint, range(len(self.robot.joints)))
+        by_joint = [
+            self._refused(joint, of_joint, passage.instants)
+            for joint, of_joint in zip(self.robot.joints, values, strict=True)
+        ]
+        refused = np.stack(by_joint, axis=1)
+        refused[:, list(self.ignored)] = False
+        return refused
+
+    def passages(self, trajectory: Trajectory, factor: float = 1.0) -> Iterator[Passage]:
+        """All steps of a task, or of one that was stretched by a factor, in blocks; then what is between."""
+        samples = usual_block(len(self.robot.joints))
+        for start in range(0, trajectory.samples, samples):
+            yield Passage.of(trajectory, start, start + samples, factor)
+        if self.between.size:
+            yield Passage.between(trajectory, self.between, factor)
+
+    def watched(self, trajectory: Trajectory, steps: int) -> Passage:
+        """At most so many steps of a task, and the instants between the steps that count."""
+        passages = [evenly_chosen(trajectory, steps)]
+        if self.between.size:
+            passages.append(Passage.between(trajectory, self.between))
+        return joined(passages)
+
+    def refused_joints(self, trajectory: Trajectory, factor: float = 1.0) -> BoolArray:
+        """The joints with any step that is not accepted, (joints,)."""
+        joints: BoolArray = np.any(
+            [np.any(self.refused(passage), axis=0) for passage in self.passages(trajectory, factor)], axis=0
+        )
+        return joints
+
+    def refused_steps(self, joint: Joint, load: Load) -> BoolArray:
+        """The steps of one joint that are not accepted, (samples,)."""
+        return self._refused(joint, self._driven(joint, load), load.instants)
+
+    def beyond_position(self, trajectory: Trajectory) -> dict[int, Trouble]:
+        """For each joint, by index, how it exceeds a limit of its position, at whatever speed, if it does."""
+        found: dict[int, Trouble] = {}
+        for passage in self.passages(trajectory):
+            for index, joint in enumerate(self.robot.joints):
+                values = {"q": passage.motion.q[:, index]}
+                trouble = self._limit_trouble(joint, values, passage.motion.time, passage.instants)
+                if trouble is not None:
+                    found.setdefault(index, trouble)
+        return found
+
+    def reasons(self, passage: Passage) -> tuple[str, ...]:
+        """For each joint that is not accepted throughout, the worst that is wrong with it."""
+        joints = enumerate(zip(self.robot.joints, passage.loads(self.robot), strict=True))
+        found = (self.reason(*pair) for index, pair in joints if index not in self.ignored)
+        return tuple(reason for reason in found if reason)
+
+    def trouble(self, joint: Joint, load: Load) -> Trouble | None:
+        """The worst that is wrong with the steps of one joint; None if they are accepted."""
+        values = self._driven(joint, load)
+        of_limits = self._limit_trouble(joint, values, load.time, load.instants)
+        return self._reach_trouble(joint, load, values) or of_limits
+
+    def reason(self, joint: Joint, load: Load) -> str:
+        """The same in a clause; empty if they are accepted."""
+        trouble = self.trouble(joint, load)
+        return "" if trouble is None else trouble.clause(joint)
+
+    def path_reason(self, joint: Joint, load: Load) -> str:
+        """A limit that the motion itself exceeds, whatever the stiffness, in a clause; empty if none."""
+        values = {"q": load.command.q, "dq": load.command.dq}
+        trouble = self._limit_trouble(joint, values, load.time, load.instants)
+        return "" if trouble is None else trouble.clause(joint)
+
+    def _driven(self, joint: Joint, load: Load) -> OfJoint:
+        """All variables of one joint, by name."""
+        return {**load.command.arrays(), **drive(joint, load.command, self.near_singular).arrays()}
+
+    def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
+        short = margin(values["stiffness"], values["stiffness_lower"], values["stiffness_upper"])
+        flags = values["flags"]
+        if self.recorded is not None:
+            flags = self.recorded.flags(self.robot, joint, values, instants)
+        refused: BoolArray = (short < self.near_singular) | has(flags, Flag.INFEASIBLE | LIMITS)
+        return refused | self._near_limits(joint, values)
+
+    def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
+        """The steps at which a reserve is used up, (samples,)."""
+        near = np.zeros(len(values["flags"]), dtype=np.bool_)
+        for check in limit_checks(joint) if self.reserve else ():
+            if check.variable in RESERVED:
+                near |= check.clearance(values) < self.reserve
+        return near
+
+    def _reach_trouble(self, joint: Joint, load: Load, values: OfJoint) -> Trouble | None:
+        asked = load.command.commanded["stiffness"]
+        lower, upper = values["stiffness_lower"], values["stiffness_upper"]
+        gap = margin(asked, lower, upper)
+        gap[np.isnan(gap)] = np.inf
+        gap[has(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf
+        step = int(gap.argmin())
+        if gap[step] >= self.near_singular:
+            return None
+        low, high = lower[step] / (1 - self.near_singular), upper[step] / (1 + self.near_singular)
+        bound = low if math.isnan(low) or asked[step] < low else high
+        unit = units.STIFFNESS.unit(joint.type)
+        return Trouble("stiffness", "stiffness", load.time[step], asked[step], bound, unit, of_load=True)
+
+    def _limit_trouble(
+        self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
+    ) -> Trouble | None:
+        """The first kind of limit that is exceeded, of those on variables that were computed."""
+        flags = limit_flags(joint, values, np.zeros(len(time), dtype=np.uint16))
+        if self.recorded is not None:
+            flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
+        for check in limit_checks(joint):
+            if check.variable in values and (excess := check.worst(values, flags)):
+                whose, unit = check.flag.quantity_of(check.motor), check.unit(joint.type)
+                return Trouble(check.variable, whose, time[excess.step], excess.value, excess.bound, unit)
+        return None
+
+
+class Trouble(NamedTuple):
+    """The worst step at which a joint is not accepted.
+
+    Attributes:
+        variable: what is beyond a bound, by its name in results.
+        whose: the same in words.
+        time: when, s.
+        value: of the variable there.
+        bound: that it is beyond; NaN if no stiffness carries the elastic torque.
+        unit: of both.
+        of_load: whether the bound follows from the load, else it is a limit of the robot.
+    """
+
+    variable: str
+    whose: str
+    time: float
+    value: float
+    bound: float
+    unit: str
+    of_load: bool = False
+
+    def clause(self, joint: Joint) -> str:
+        """What is wrong, and with which joint."""
+        when = f"at t = {self.time:.3f} s"
+        if math.isnan(self.bound):
+            whatever = "" if math.isnan(self.value) else " at any stiffness"
+            return f"the springs of {joint.name} cannot carry its elastic torque {when}{whatever}"
+        below = self.value < self.bound
+        if self.variable == "stiffness":
+            needed = f"{'at least' if below else 'at most'} {stiffness_text(joint, self.bound)}"
+            return f"{joint.name} needs {needed} {when} and is asked for {self.value:.6g}"
+        asked = f"{self.value:.6g} {self.unit} {when}"
+        side = "below" if below else "above"
+        return f"the {self.whose} of {joint.name}, {asked}, is {side} its limit {self.bound:g}"
+
+
+def stiffness_text(joint: Joint, value: float) -> str:
+    """A stiffness with its unit."""
+    return f"{value:.6g} {units.STIFFNESS.unit(joint.type)}"
+
+
+SAME_STIFFNESS = 1e-9
+"""Relative difference of stiffnesses that may be rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLimits:
+    """What the recorded signals of a task leave uncertain of limits, however slow and stiff it becomes.
+
+    A run computes deviations at some times and is linear in between; here the same times count, so that both
+    say the same of a step. They are computed only where the answer depends on them.
+
+    Attributes:
+        trajectory: the task as it is.
+    """
+
+    trajectory: Trajectory
+
+    def flags(self, robot: Robot, joint: Joint, values: OfJoint, instants: Instants) -> FlagArray:
+        """The flags of steps of one joint, (samples,), with the limits that are certainly exceeded.
+
+        Args:
+            robot: the robot.
+            joint: of it, perhaps with another preload.
+            values: variables of the joint, among them `flags` with all limits that seem to be exceeded.
+            instants: where the steps stand in the task.
+        """
+        flags: FlagArray = np.array(values["flags"])
+        if not self._estimates:
+            return flags
+        steps = np.flatnonzero(open_steps(joint, values))
+        if steps.size:
+            rows = {name: np.asarray(array)[..., steps] for name, array in values.items()}
+            uncertain = self._deviations(robot, joint, rows.get(STIFFNESS.key), instants.at(steps))
+            flags[steps] &= ~np.uint16(LIMITS)
+            flags[steps] = limit_flags(joint, {**rows, **uncertain}, flags[steps])
+        return flags
+
+    @cached_property
+    def _estimates(self) -> dict[Signal, SampledProfile]:
+        return self.trajectory.estimates
+
+    @cached_property
+    def _probed(self) -> FloatArray:
+        return probed_times(self.trajectory)
+
+    def _deviations(
+        self, robot: Robot, joint: Joint, stiffness: FloatArray | None, instants: Instants
+    ) -> dict[str, AnyArray]:
+        """Standard deviations of the variables of a joint by name, (samples,) or (2, samples).
+
+        NaN where none may be stated.
+        """
+        elapsed = instants.time - self.trajectory.start
+        before = np.clip(np.searchsorted(self._probed, elapsed) - 1, 0, len(self._probed) - 2)
+        first, last = self._probed[before], self._probed[before + 1]
+        share = (elapsed - first) / (last - first)
+        index = robot.joint_names.index(joint.name)
+        joints = (*robot.joints[:index], joint, *robot.joints[index + 1 :])
+        change = self._change(index, joint, stiffness, instants)
+        parts = [
+            self._probe(replace(robot, joints=joints), index, time, instants.factor, change)
+            for time in (first, last)
+        ]
+        return {name: (1 - share) * parts[0][name] + share * parts[1][name] for name in parts[0]}
+
+    def _change(
+        self, index: int, joint: Joint, stiffness: FloatArray | None, instants: Instants
+    ) -> FloatArray:
+        """What was added to the stiffness of a joint, (samples,)."""
+        if stiffness is None or STIFFNESS.key not in joint.commanded:
+            return np.zeros(len(instants.time))
+        asked = self.trajectory.at(instants.time).commanded[STIFFNESS.key][:, index]
+        return np.where(np.abs(stiffness - asked) > SAME_STIFFNESS * asked, stiffness - asked, 0.0)
+
+    def _probe(
+        self, robot: Robot, index: int, elapsed: FloatArray, factor: FloatArray, change: FloatArray
+    ) -> dict[str, AnyArray]:
+        """Deviations of the variables of one joint at times of the task that is passed so slowly."""
+        motion = self.trajectory.at(self.trajectory.start + elapsed)
+        motion = motion.mapped(motion.time, lambda array, order: array / factor[:, None] ** order)
+        motion.commanded[STIFFNESS.key][:, index] += change
+        covariances = {}
+        for signal, estimate in self._estimates.items():
+            covariance = estimate.covariance(elapsed)
+            if signal is STIFFNESS:  # what is added makes it a command
+                covariance[index][..., change != 0] = 0.0
+            orders = np.arange(signal.orders)
+            covariances[signal] = covariance / factor ** np.add.outer(orders, orders)[..., None]
+        found = deviations(robot, motion, self._estimates, covariances)
+        known = {
+            deviation(name): np.where(found.unstated[name], np.nan, array)
+            for name, array in found.deviations.items()
+        }
+        return of_joint(known, index)
+
+
+BISECTIONS = 50
+"""Bisections of a share of 0 to 1: down to rounding."""
+
+
+class Range(NamedTuple):
+    """Smallest and largest admissible stiffness, (samples,); none where low > high or low is NaN."""
+
+    low: FloatArray
+    high: FloatArray
+
+
+def checked_range(acceptance: Acceptance, joint: Joint, load: Load) -> Range:
+    """The admissible stiffness at every instant of a load, whose low end always exists.
+
+    Raises:
+        ImpossibleError: no stiffness mends the joint, or it has none to choose.
+    """
+    variable_stiffness_actuator(joint)
+    if reason := acceptance.path_reason(joint, load):
+        raise ImpossibleError(f"no stiffness changes that {reason}")
+    admissible = admissible_stiffness(joint, load.command, acceptance.near_singular)
+    if np.isnan(admissible.low).any():
+        raise ImpossibleError(acceptance.reason(joint, load))
+    return admissible
+
+
+def variable_stiffness_actuator(joint: Joint) -> Actuator:
+    """The actuator of a joint, if its stiffness can be chosen.
+
+    Raises:
+        ImpossibleError: the actuator has none to choose.
+    """
+    if "stiffness" not in joint.actuator.commanded:
+        raise ImpossibleError(f"the actuator of {joint.name} has no stiffness to choose")
+    return joint.actuator
+
+
+def admissible_stiffness(joint: Joint, command: Command, near_singular: float) -> Range:
+    """Stiffness that keeps the margin, the joint's stiffness limit and the deflection limits.
+
+    The margin min(sigma - lower, upper - sigma)/sigma >= m means lower/(1-m) <= sigma <= upper/(1+m).
+
+    Args:
+        joint: with springs and limits.
+        command: its elastic torque counts, and its stiffness as a scale.
+        near_singular: the margin m.
+    """
+    actuator = variable_stiffness_actuator(joint)
+    corridor = actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
+    least, most = joint.limits.stiffness
+    low = np.maximum(corridor.lower / (1 - near_singular), least)
+    high = np.minimum(corridor.upper / (1 + near_singular), most)
+    if np.isinf(actuator.max_deflections).all():
+        return Range(low, high)
+    return Range(low, np.minimum(high, _deflection_ceiling(actuator, command, corridor.lower)))
+
+
+def _deflection_ceiling(actuator: Actuator, command: Command, lower: FloatArray) -> FloatArray:
+    """The stiffness from `lower` on up to which both deflections keep their limit.
+
+    With the stiffness grows the preload: phi_1 increases and phi_2 decreases, or the other way round. What is
+    halved is a share x of 0 to 1, which maps to all stiffness above `lower`.
+    """
+    limits = np.array(actuator.max_deflections)[:, None]
+    kept, broken = np.zeros_like(lower), np.ones_like(lower)
+    for _ in range(BISECTIONS):
+        share = (kept + broken) / 2
+        stiffness = lower + command.commanded["stiffness"] * share / (1 - share)
+        solution = actuator.solve(command.tau_e, stiffness, command.q)
+        within = np.all(np.abs(solution.deflections) <= limits, axis=0)
+        kept, broken = np.where(within, share, kept), np.where(within, broken, share)
+    return lower + command.commanded["stiffness"] * kept / (1 - kept)

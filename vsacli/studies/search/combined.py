@@ -1,0 +1,271 @@
+"""Search over slow-down, stiffness and preload together, for the combination of least cost.
+
+Given the factor of the slow-down, what the links demand is known; given that, corridor and limits of a joint
+do not depend on the other joints. So the search has one dimension, along which joints are fixed one by one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import BoolArray, FloatArray, evenly
+from vsacli.base.signals import STIFFNESS
+from vsacli.dynamics.limits import limit_flags
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
+from vsacli.studies.search.loads import Load, Passage, joined
+from vsacli.studies.search.scans import FACTORS_AT_ONCE, FIRST_STEPS, LARGEST_FACTOR, WATCHED_STEPS, Factors
+from vsacli.studies.search.task import Combination, Form, Task, constant_change, preload_path
+
+STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
+"""Relative strides of the scan, each up to the factor before it: fine where a slow-down is small."""
+
+MOST_ROUNDS = 20
+"""Rounds of adding steps that refuse what the watched ones accept; two or three are usual."""
+
+SAME_CORRIDOR = 1e-6
+"""Relative difference of two corridors that may be rounding."""
+
+PRELOAD_GAIN = 0.9
+"""Share to which the other preload must bring down the change of a joint, so that it is worth its while."""
+
+
+class CombinedSearch:
+    """A search for the combination of changes that mends a motion.
+
+    It looks at some steps, which others that refuse what it finds join. What helps at a factor is remembered.
+
+    Args:
+        task: what is to be mended, by which rule, and at which cost.
+        form: of the changes of stiffness.
+        preloads: whether joints may take the other preload.
+    """
+
+    def __init__(self, task: Task, form: Form = constant_change, *, preloads: bool = False) -> None:
+        self.task, self.form = task, form
+        watched = task.acceptance.watched(task.trajectory, WATCHED_STEPS)
+        self._choices = _choices(task.acceptance.robot, watched if preloads else None)
+        self._watched, self._factors = watched, Factors.of(task.trajectory)
+        self._found: dict[int, Combination] = {}
+        self._impossible = task.impossible.setdefault((form, preloads), set())
+
+    @property
+    def exchangeable(self) -> bool:
+        """Whether the other preload of some joint may be worth trying."""
+        return any(len(choices) > 1 for choices in self._choices)
+
+    def smallest(self) -> Combination | None:
+        """The combination of least cost; confirmed on all steps if its changes are constants."""
+        return self._confirmed(self._smallest)
+
+    def fastest(self) -> Combination | None:
+        """The combination with the least slow-down, likewise."""
+        return self._confirmed(self._fastest)
+
+    def _confirmed(self, choose: Callable[[], Combination | None]) -> Combination | None:
+        # along a recording, limits count beyond its noise: only a whole evaluation says what is refused
+        if not self._impossible and not self.task.trajectory.estimates:
+            self._impossible |= self._ruled_out()
+        for _ in range(MOST_ROUNDS):
+            found = choose()
+            refused = None if found is None or self.form is not constant_change else self._refused(found)
+            if refused is None:
+                return found
+            self._watched = joined([self._watched, refused])
+            self._found.clear()
+        return None
+
+    def _refused(self, found: Combination) -> Passage | None:
+        """Steps of the first block with any that refuse constant changes, with what was commanded at them."""
+        acceptance = self.task.acceptance_with(found)
+        change = np.zeros(self.task.trajectory.joints)
+        change[list(found.constants)] = list(found.constants.values())
+        for passage in acceptance.passages(self.task.trajectory.stretched(found.factor), found.factor):
+            steps = np.flatnonzero(np.any(acceptance.refused(passage.stiffened(change)), axis=1))
+            if steps.size:
+                return passage.select(steps[evenly(len(steps), WATCHED_STEPS)]).slowed(1 / found.factor)
+        return None
+
+    def _fastest(self) -> Combination | None:
+        """The combination with the least factor that scan and bisection find."""
+        refused = self._factors.first - 1
+        for number in self._scanned():
+            if self._at(number) is not None:
+                break
+            refused = number
+        else:
+            return None
+        while number - refused > 1:
+            middle = (number + refused) // 2
+            number, refused = (number, middle) if self._at(middle) is None else (middle, refused)
+        return self._at(number)
+
+    def _smallest(self) -> Combination | None:
+        """The combination of least cost, by the scan, and then steps to either side that get shorter."""
+        best, at, cost = None, 0, self.task.cost
+        for number in self._scanned():
+            if best is not None and cost.of_factor(self._factors.factor(number)) >= best.size:
+                break
+            found = self._at(number)
+            if found is not None and (best is None or found.size < best.size):
+                best, at = found, number
+        if best is None:
+            return None
+        step = self._stride(at)
+        within = range(self._factors.first, self._factors.last + 1)
+        while step:
+            sides = {
+                side: self._at(side)
+                for side in (at - step, at + step)
+                if side in within and cost.of_factor(self._factors.factor(side)) < best.size
+            }
+            found, side = min(
+                ((each, side) for side, each in sides.items() if each is not None),
+                key=lambda pair: pair[0].size,
+                default=(best, at),
+            )
+            if found.size < best.size:
+                best, at = found, side
+            else:
+                step //= 2
+        return best
+
+    def _at(self, number: int) -> Combination | None:
+        """What mends every joint at a factor, if anything does."""
+        if number in self._impossible:
+            return None
+        if number not in self._found:
+            try:
+                self._found[number] = self._mended(self._factors.factor(number))
+            except ImpossibleError:
+                self._impossible.add(number)
+                return None
+        return self._found[number]
+
+    def _ruled_out(self) -> set[int]:
+        """Return numbers of scanned factors at which a few steps show that nothing helps.
+
+        Many factors are tried at once, which costs hardly more than one of them.
+        """
+        few = self._watched.select(evenly(len(self._watched.factor), FIRST_STEPS))
+        numbers, found = list(self._scanned()), set[int]()
+        for start in range(0, len(numbers), FACTORS_AT_ONCE):
+            tried = numbers[start : start + FACTORS_AT_ONCE]
+            impossible = self._refusing(joined(few.slowed(self._factors.factor(each)) for each in tried))
+            of_factors = impossible.reshape(len(tried), -1).any(axis=1)
+            found.update(tried[index] for index in np.flatnonzero(of_factors).tolist())
+            if not of_factors.all():
+                break
+        return found
+
+    def _refusing(self, passage: Passage) -> BoolArray:
+        """The steps at which no stiffness of some joint is accepted, (samples,)."""
+        acceptance = self.task.acceptance
+        impossible = np.zeros(len(passage.factor), dtype=np.bool_)
+        loads = passage.loads(acceptance.robot)
+        for index, (choices, load) in enumerate(zip(self._choices, loads, strict=True)):
+            joint = choices[""]
+            if index in acceptance.ignored:
+                continue
+            path = {"q": load.command.q, "dq": load.command.dq}
+            impossible |= limit_flags(joint, path, np.zeros(len(impossible), dtype=np.uint16)) != 0
+            if STIFFNESS.key not in joint.actuator.commanded:
+                impossible |= acceptance.refused_steps(joint, load)
+            elif len(choices) == 1:
+                low, high = admissible_stiffness(joint, load.command, acceptance.near_singular)
+                impossible |= np.isnan(low) | (low > (1 + SAME_CORRIDOR) * high)
+        return impossible
+
+    def _mended(self, factor: float) -> Combination:
+        """The changes of all joints at a factor.
+
+        Raises:
+            ImpossibleError: some joint is refused whatever its stiffness.
+        """
+        acceptance = self.task.acceptance
+        loads = self._watched.slowed(factor).loads(acceptance.robot)
+        joints = list(enumerate(zip(self._choices, loads, strict=True)))
+        for index, (choices, load) in joints:
+            if index not in acceptance.ignored and (reason := acceptance.path_reason(choices[""], load)):
+                raise ImpossibleError(reason)
+        found = [self._of_joint(index, choices, load) for index, (choices, load) in joints]
+        return Combination(
+            factor,
+            changes={index: change for index, (_, _, change) in enumerate(found) if change.any()},
+            preloads={index: preload for index, (_, preload, _) in enumerate(found) if preload},
+            size=math.hypot(self.task.cost.of_factor(factor), *(size for size, _, _ in found)),
+        )
+
+    def _of_joint(self, index: int, choices: dict[str, Joint], load: Load) -> tuple[float, str, FloatArray]:
+        """Cost, preload and change of stiffness of one joint; the preload is empty if it stays as it is."""
+        if index in self.task.acceptance.ignored:
+            return 0.0, "", np.zeros(len(load.time))
+        asked, best, reason = load.command.commanded["stiffness"], None, ImpossibleError()
+        for preload, joint in choices.items():
+            try:
+                change = self._change(joint, load)
+            except ImpossibleError as error:
+                reason = error
+                continue
+            size = self.task.cost.of_stiffness(asked, change) if change.any() else 0.0
+            if best is None or size < PRELOAD_GAIN * best[0]:
+                best = size, preload, change
+            if not size:
+                break
+        if best is None:
+            raise reason
+        return best
+
+    def _change(self, joint: Joint, load: Load) -> FloatArray:
+        acceptance = self.task.acceptance
+        if not acceptance.refused_steps(joint, load).any():
+            return np.zeros(len(load.time))
+        return self.form(acceptance, joint, load)
+
+    def _scanned(self) -> Iterator[int]:
+        """The numbers of the factors at which a search looks."""
+        number = self._factors.first
+        while number < self._factors.last:
+            yield number
+            number += self._stride(number)
+        yield self._factors.last
+
+    def _stride(self, number: int) -> int:
+        factor = self._factors.factor(number)
+        share = next(share for limit, share in STRIDES if factor <= limit)
+        return math.ceil(number * share)
+
+
+def _choices(robot: Robot, watched: Passage | None) -> list[dict[str, Joint]]:
+    """What each joint may be by the word for its preload, which is empty if it stays as it is.
+
+    Args:
+        robot: the robot.
+        watched: some steps; the other preload is a choice if it makes a difference there. None if it is none.
+    """
+    choices = [{"": joint} for joint in robot.joints]
+    if watched is None:
+        return choices
+    for index, (joint, load) in enumerate(zip(robot.joints, watched.loads(robot), strict=True)):
+        preload = joint.actuator.opposite_preload
+        if preload is not None:
+            exchanged = robot.replace(preload_path(robot, index), preload).joints[index]
+            if not _alike(joint.actuator, exchanged.actuator, load.command):
+                choices[index][preload] = exchanged
+    return choices
+
+
+def _alike(one: Actuator, other: Actuator, command: Command) -> bool:
+    """Whether two preloads of an actuator are mirror images, as those of like springs are."""
+    if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
+        return False
+    asked = command.tau_e, command.commanded["stiffness"], command.q
+    first, second = one.solve(*asked), other.solve(*asked)
+    pairs = (first.lower, second.lower), (first.upper, second.upper)
+    return all(np.allclose(here, there, rtol=SAME_CORRIDOR, equal_nan=True) for here, there in pairs)

@@ -1,0 +1,191 @@
+"""A fix as files: the trajectory, a CSV table for what is no formula, the robot with another preload."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.outputs import Outputs
+from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
+from vsacli.base.texts import for_yaml
+from vsacli.base.wrench import wrench_columns
+from vsacli.documents.edited import edited, moved_files
+from vsacli.dynamics.inverse import usual_block
+from vsacli.robot.file import text_to_change
+from vsacli.studies.search.fixed_text import TableFile, edited_text, formula
+from vsacli.studies.search.suggestions import Remedy
+from vsacli.studies.search.task import preload_path
+from vsacli.trajectory.file import FORMAT
+from vsacli.trajectory.profile import Profile
+from vsacli.trajectory.recorded.samples import SampledProfile
+from vsacli.trajectory.times import ResampledTimes, UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+
+def fixed_paths(path: str | Path) -> tuple[Path, Path, Path]:
+    """The YAML file, which is always written, and the CSV file and the robot file beside it."""
+    document = Path(path)
+    return document, document.with_suffix(".csv"), document.with_name(f"{document.stem}-robot.yaml")
+
+
+def check_fixed_target(path: str | Path, outputs: Outputs) -> None:
+    """Refuse a YAML path that cannot be written, or beside which the others cannot.
+
+    Raises:
+        InputError: it does not end in .yaml or .yml.
+        StorageError: as `Outputs.file`.
+    """
+    if Path(path).suffix not in (".yaml", ".yml"):
+        raise InputError.one("the fixed trajectory is a YAML file; give a name that ends in .yaml", path)
+    for file in fixed_paths(path):
+        outputs.check(file)
+
+
+def write_fixed(remedy: Remedy, path: str | Path, outputs: Outputs) -> None:
+    """Write the trajectory of a remedy, and its robot if that has another preload.
+
+    Signals stay formulas where they are; else they are recorded at the steps with all their derivatives, in a
+    CSV file of the same stem. The robot file is that of the robot with the preload changed.
+
+    Raises:
+        InputError, StorageError: as `check_fixed_target`, or the robot file cannot be changed so, or the disk
+            fails.
+    """
+    document, table, robot = fixed_paths(path)
+    trajectory, names = remedy.declared, remedy.robot.joint_names
+    declared = _declared(trajectory, table.name)
+    recorded = [signal for signal, keys in declared.items() if keys["type"] == "csv"]
+    beside = None
+    if recorded:
+        beside = TableFile(table.name, lambda file: _write_table(trajectory, recorded, names, file))
+    text = edited_text(remedy, beside, document.parent) if recorded in ([], [STIFFNESS]) else None
+    lines = _document(trajectory, remedy.factor, declared) if text is None else [text]
+    contents: dict[Path, Callable[[TextIO], object]] = {document: lambda file: file.writelines(lines)}
+    if beside is not None:
+        contents[table] = beside.write
+    if remedy.preload is not None:
+        contents[robot] = lambda file: file.write(robot_text(remedy, robot.parent))
+    for target, write in contents.items():
+        with outputs.file(target).opened() as stream:
+            write(stream)
+
+
+def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]]:
+    """The keys and values that declare each signal; those without a formula are recorded in the table."""
+    profiles: dict[Signal, Profile] = {POSITION: trajectory.position}
+    chosen = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
+    profiles |= {COMMANDED[key]: trajectory.commanded[key] for key in chosen}
+    if trajectory.wrench is not None:
+        profiles[WRENCH] = trajectory.wrench.profile
+    formulas = {signal: formula(profile) for signal, profile in profiles.items()}
+    if None not in formulas.values() and not isinstance(trajectory.times, UniformTimes):
+        formulas[POSITION] = None  # the table has the times
+    declared = {
+        signal: {"type": "csv", "file": table, **_choice(profiles[signal].estimate)} if keys is None else keys
+        for signal, keys in formulas.items()
+    }
+    if trajectory.wrench is not None:
+        declared[WRENCH]["frame"] = trajectory.wrench.frame
+    return declared
+
+
+def _choice(estimate: SampledProfile | None) -> dict[str, Any]:
+    """What was said of the fit of a record."""
+    if estimate is None:
+        return {}
+    chosen = estimate.choice
+    noise = None if chosen.noise is None else list(chosen.noise)
+    said = {"fit": chosen.method, "noise": noise, "bandwidth": chosen.bandwidth}
+    return {key: value for key, value in said.items() if value is not None}
+
+
+def _document(
+    trajectory: Trajectory, factor: float, declared: Mapping[Signal, dict[str, Any]]
+) -> Iterator[str]:
+    """Lines of the trajectory file."""
+    yield f"format: {FORMAT}\n"
+    yield f"name: {for_yaml(trajectory.name)}\n"
+    if factor != 1:
+        yield f"slow_down: {factor!r}\n"
+    if isinstance(trajectory.times, UniformTimes) and not any(
+        keys["type"] == "csv" for keys in declared.values()
+    ):
+        yield f"duration: {trajectory.times.duration!r}\nrate: {trajectory.times.rate!r}\n"
+    if isinstance(trajectory.times, ResampledTimes) and trajectory.estimates:
+        yield f"rate: {trajectory.times.rate!r}\n"
+    for signal, keys in declared.items():
+        yield f"{signal.key}:\n"
+        yield from (f"  {key}: {_in_one_line(value)}\n" for key, value in keys.items())
+
+
+def _in_one_line(content: Any) -> str:
+    """Content as YAML in flow style, words without quotes."""
+    match content:
+        case dict():
+            return "{" + ", ".join(f"{key}: {_in_one_line(each)}" for key, each in content.items()) + "}"
+        case list():
+            return "[" + ", ".join(map(_in_one_line, content)) + "]"
+        case str() if content.isidentifier():
+            return content
+    return for_yaml(content) if isinstance(content, str) else json.dumps(content)
+
+
+def _write_table(
+    trajectory: Trajectory, recorded: Sequence[Signal], joint_names: Sequence[str], stream: TextIO
+) -> None:
+    """Records that were fitted, as they were; of other signals value and derivatives at the steps."""
+    records = {signal: each.record.columns for signal, each in trajectory.estimates.items()}
+    names = [name for signal in recorded for name in records.get(signal, signal.names)]
+    raw = {name: rows for columns in records.values() for name, rows in columns.items()}
+    chosen = {name: trajectory.chosen(key) for key in trajectory.commanded for name in COMMANDED[key].names}
+    headers = [np.array(_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["time", *np.concatenate(headers).tolist()])
+    stamps, samples = _stamps(trajectory), usual_block(len(joint_names))
+    for start in range(0, len(stamps), samples):
+        part = slice(start, start + samples)
+        computed = trajectory.block(start, start + samples).variables() if set(names) - set(raw) else {}
+        rows = (raw[name][:, part].T if name in raw else computed[name] for name in names)
+        columns = [each[:, chosen.get(name, ...)] for name, each in zip(names, rows, strict=True)]
+        writer.writerows(np.concatenate([stamps[part, None], *columns], axis=1).tolist())
+
+
+def _stamps(trajectory: Trajectory) -> FloatArray:
+    """The times of what is recorded: those of the steps, or of a record if these differ."""
+    for estimate in trajectory.estimates.values():
+        if estimate.resampled:
+            return estimate.record.start + estimate.record.time
+    return trajectory.times.block(0, trajectory.samples)
+
+
+def _columns(name: str, joint_names: Sequence[str]) -> list[str]:
+    return wrench_columns(name) if name in WRENCH.names else [f"{joint}.{name}" for joint in joint_names]
+
+
+def robot_text(remedy: Remedy, folder: Path) -> str:
+    """The text of the robot's file with the preloads of a remedy, as it stands in a folder.
+
+    Everything else, comments too, stays as the user wrote it; paths lead to the same files.
+
+    Raises:
+        InputError: the robot was not read from a file, or its text does not admit the change.
+    """
+    assert remedy.preload is not None
+    own, home = text_to_change(remedy.robot)
+    values = {
+        preload_path(remedy.robot, remedy.robot.joint_names.index(joint)): preload
+        for joint, preload in remedy.preload.preloads.items()
+    }
+    try:
+        return edited(own, values | dict(moved_files(own, home, folder)))
+    except InputError as error:
+        raise InputError.one(
+            f"{remedy.preload.sentence} there by hand: {error}", remedy.robot.sources[0].path
+        ) from None

@@ -1,0 +1,283 @@
+"""The text of a trajectory file with a fix in it: what changes is replaced where it stands, all else is kept.
+
+Comments, layout, units and names of joints stay as the user wrote them. Not every file can be changed so, for
+example one whose values are shared by aliases; so the text is read again, and counts only if it says what the
+fix is. Profiles in closed form are declared by the keys and values of `formula`.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, TextIO
+
+import numpy as np
+
+from vsacli.base.errors import InputError
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.base.storage import reading_copies, temporary_folder
+from vsacli.documents.edited import MappingNode, Node, ScalarNode, edited, moved_files, node_at, root_of
+from vsacli.documents.source import is_table
+from vsacli.studies.search.suggestions import Remedy
+from vsacli.trajectory.curves import ClosedForm, Constant, RestToRest
+from vsacli.trajectory.curves.sinusoids import Sinusoids
+from vsacli.trajectory.curves.steps import Chain
+from vsacli.trajectory.curves.via_points import ViaPoints
+from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.profile import Profile
+from vsacli.trajectory.trajectory import Trajectory
+
+SAME_TRANSITION = 1e-9
+"""Largest relative difference of transitions that are rounded differently."""
+
+
+def formula(profile: Profile) -> dict[str, Any] | None:
+    """The keys and values that declare a profile over its span; None if there is no formula of it."""
+    match profile:
+        case RestToRest(degree=degree, start=start, end=end):
+            return {"type": "polynomial", "degree": degree, "start": _values(start), "end": _values(end)}
+        case Constant(value=value):
+            return {"type": "constant", "value": _values(value)}
+        case ViaPoints(degree=degree, points=points, breakpoints=passed):
+            times = (passed - passed[0]).tolist()
+            return {"type": "via", "degree": degree, "points": list(map(_values, points)), "times": times}
+        case Sinusoids():
+            return _sinusoids(profile)
+        case Chain():
+            return _sequence(profile) if profile.signal is POSITION else _steps(profile)
+    return None
+
+
+def _sinusoids(profile: Sinusoids) -> dict[str, Any]:
+    amplitudes = {"sine": list(map(_values, profile.sine)), "cosine": list(map(_values, profile.cosine))}
+    return {
+        "type": "sinusoids",
+        "frequency": profile.cycles / _length(profile),
+        "offset": _values(profile.offset),
+        **{name: harmonics for name, harmonics in amplitudes.items() if harmonics},
+        "ramp": profile.ramp * _length(profile),
+    }
+
+
+def _sequence(chain: Chain) -> dict[str, Any] | None:
+    """A motion in parts, each with its duration; where it stands still it dwells."""
+    parts = []
+    for part in chain.parts:
+        declared = formula(part)
+        if declared is None:
+            return None
+        if isinstance(part, Constant):
+            declared = {"type": "dwell"}
+        parts.append(declared if "times" in declared else {**declared, "duration": _length(part)})
+    return {"type": "sequence", "parts": parts}
+
+
+def changes_of_steps(chain: Chain) -> list[RestToRest] | None:
+    """The changes between levels that last equally long; None if the parts are something else."""
+    changes = [part for part in chain.parts if isinstance(part, RestToRest)]
+    held = [part for part in chain.parts if isinstance(part, Constant)]
+    durations = list(map(_length, changes))
+    if len(changes) + len(held) < len(chain.parts) or not changes:
+        return None
+    if len({change.degree for change in changes}) > 1 or not math.isclose(
+        min(durations), max(durations), rel_tol=SAME_TRANSITION
+    ):
+        return None
+    return changes
+
+
+def _steps(chain: Chain) -> dict[str, Any] | None:
+    """Levels with changes between them."""
+    changes = changes_of_steps(chain)
+    if changes is None:
+        return None
+    return {
+        "type": "steps",
+        "degree": changes[0].degree,
+        "levels": [_values(changes[0].start), *(_values(change.end) for change in changes)],
+        "times": [change.span[0] - chain.span[0] for change in changes],
+        "transition": min(map(_length, changes)),
+    }
+
+
+def _length(profile: ClosedForm) -> float:
+    first, last = profile.span
+    return last - first
+
+
+def _values(values: Sequence[float]) -> list[float | None]:
+    return [None if math.isnan(value) else value for value in values]
+
+
+SAME = 1e-9
+"""Relative difference of numbers that are the same but for rounding: what limits admit as such."""
+
+CLOSE = 1e-8
+"""Share of the peak of a variable by which the text may miss it: rounding, and four derivatives of that."""
+
+DIGITS = 12
+"""Digits of numbers that are written in place of others."""
+
+Values = dict[str, Any]
+
+
+class TableFile(NamedTuple):
+    """A table that stands beside the text, in which the stiffness is recorded.
+
+    Attributes:
+        name: of the file.
+        write: writes it to a stream.
+    """
+
+    name: str
+    write: Callable[[TextIO], object]
+
+
+def edited_text(remedy: Remedy, table: TableFile | None, folder: Path) -> str | None:
+    """Return the user's file with the fix in it, as it stands in a folder; None if it cannot be changed so.
+
+    Args:
+        remedy: the fix.
+        table: with the stiffness, if that is no formula any more.
+        folder: where the text will stand.
+    """
+    asked = remedy.asked
+    source = None if asked is None else next(iter(asked.sources), None)
+    if asked is None or source is None or source.text is None or is_table(source.path):
+        return None
+    for values in _candidates(remedy, asked, source.text):
+        try:
+            text = _with(source.text, values, table)
+            moved = dict(moved_files(source.text, Path(source.path).parent, folder))
+            if _says(text, source.path, remedy, table):
+                kept = {
+                    path: file for path, file in moved.items() if table is None or path != "stiffness.file"
+                }
+                return edited(text, kept)
+        except InputError:
+            continue
+    return None
+
+
+def _candidates(remedy: Remedy, asked: Trajectory, text: str) -> Iterator[Values]:
+    """Values by path that may say what the fix is: other times, or `slow_down` if that is not enough."""
+    root, names = root_of(text), remedy.robot.joint_names
+    fixed = remedy.declared
+    named = {"name": fixed.name}
+    if remedy.factor == 1:
+        yield named | _changed(root, asked, fixed, names) | _duration(root, asked, fixed)
+    factor = 1 + remedy.longer
+    unstretched = fixed if remedy.factor != 1 else fixed.stretched(1 / factor)
+    before = node_at(root, "slow_down")
+    declared = float(before.value) if isinstance(before, ScalarNode) else 1.0
+    slower = {} if factor == 1 else {"slow_down": _rounded(declared * factor)}
+    yield named | _changed(root, asked, unstretched, names) | slower
+
+
+def _duration(root: Node, asked: Trajectory, fixed: Trajectory) -> Values:
+    if asked.duration == fixed.duration or node_at(root, "duration") is None:
+        return {}
+    return {"duration": _rounded(fixed.duration)}
+
+
+def _changed(root: Node, asked: Trajectory, fixed: Trajectory, names: Sequence[str]) -> Values:
+    """The numbers of formulas that differ, by path, where the text has them."""
+    values: Values = {}
+    for signal, profile in _profiles(asked).items():
+        old, new = formula(profile), formula(_profiles(fixed)[signal])
+        node = node_at(root, signal.key)
+        if old is not None and new is not None and node is not None:
+            values |= dict(_differences(node, signal.key, old, new, names))
+    return values
+
+
+def _profiles(trajectory: Trajectory) -> dict[Signal, Profile]:
+    found = {POSITION: trajectory.position}
+    found |= {COMMANDED[key]: profile for key, profile in trajectory.commanded.items()}
+    if trajectory.wrench is not None:
+        found[WRENCH] = trajectory.wrench.profile
+    return found
+
+
+def _differences(
+    node: Node, path: str, old: Any, new: Any, names: Sequence[str]
+) -> Iterator[tuple[str, Any]]:
+    """Paths below one, and what is new there: single values where the text has them, else all of a list."""
+    if isinstance(old, dict):
+        for key, value in old.items():
+            below = node_at(node, key)
+            if below is not None:
+                yield from _differences(below, f"{path}.{key}", value, new[key], names)
+    elif isinstance(old, list):
+        if _same(old, new):
+            return
+        words = list(names) if isinstance(node, MappingNode) else list(map(str, range(len(old))))
+        if isinstance(node, ScalarNode):
+            yield path, _shared(new)
+            return
+        for word, before, after in zip(words, old, new, strict=True):
+            below = node_at(node, word)
+            if below is not None:
+                yield from _differences(below, f"{path}.{word}", before, after, names)
+    elif not _same(old, new):
+        yield path, _rounded(new)
+
+
+def _same(old: Any, new: Any) -> bool:
+    """Whether numbers, or lists of them, are the same but for rounding."""
+    if isinstance(old, list):
+        return all(map(_same, old, new))
+    if isinstance(old, float | int) and isinstance(new, float | int):
+        return math.isclose(old, new, rel_tol=SAME, abs_tol=SAME * SAME)
+    return bool(old == new)
+
+
+def _shared(values: list[Any]) -> Any:
+    """One number for all joints, or one each."""
+    given = [None if value is None else _rounded(value) for value in values]
+    return given[0] if all(value == given[0] for value in given) else given
+
+
+def _rounded(value: float) -> float | int:
+    number = float(f"{value:.{DIGITS}g}")
+    return int(number) if number.is_integer() and abs(number) < 10**DIGITS else number
+
+
+def _with(text: str, values: Values, table: TableFile | None) -> str:
+    """The text with values; with a table the stiffness is recorded, and the times come from there."""
+    if table is None:
+        return edited(text, values)
+    values = {key: value for key, value in values.items() if not key.startswith("stiffness.")}
+    values["stiffness"] = {"type": "csv", "file": table.name}
+    text = edited(text, values)
+    marks = [node_at(root_of(text), key) for key in ("duration", "rate", "slow_down")]
+    for node in sorted((node for node in marks if node is not None), key=lambda node: -node.start_mark.index):
+        line = text.rfind("\n", 0, node.start_mark.index) + 1
+        text = f"{text[:line]}# {text[line:]}"
+    return text
+
+
+def _says(text: str, path: str, remedy: Remedy, table: TableFile | None) -> bool:
+    """Whether a text in place of the user's file says what the fix is, at every step."""
+    with temporary_folder() as place:
+        copies = {path: str(place / "text")}
+        (place / "text").write_text(text, encoding="utf-8")
+        if table is not None:
+            copies[os.path.join(os.path.dirname(path), table.name)] = str(place / "table")
+            with (place / "table").open("w", encoding="utf-8") as stream:
+                table.write(stream)
+        with reading_copies(copies):
+            again = load_trajectory(path, remedy.robot)
+    wanted = remedy.trajectory
+    if again.samples != wanted.samples:
+        return False
+    blocks = (each.block(0, each.samples).variables() for each in (again, wanted))
+    found, expected = blocks
+    return found.keys() == expected.keys() and all(
+        np.allclose(
+            found[name], array, rtol=0, atol=CLOSE * np.nanmax(np.abs(array), initial=0.0), equal_nan=True
+        )
+        for name, array in expected.items()
+    )

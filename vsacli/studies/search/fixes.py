@@ -1,0 +1,304 @@
+"""Fixes of a task: each kind of change alone, the combinations worth choosing from, and the causes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
+from vsacli.base.units import STIFFNESS
+from vsacli.dynamics.internal_motion import damped_joints, refuse_damped_transmissions
+from vsacli.dynamics.inverse import fitted
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, RecordedLimits, Trouble
+from vsacli.studies.search.combined import CombinedSearch
+from vsacli.studies.search.loads import Load
+from vsacli.studies.search.scans import (
+    WATCHED_STEPS,
+    has_transitions,
+    lowest_offset,
+    smallest_offset,
+    smallest_slow_down,
+)
+from vsacli.studies.search.suggestions import Cause, NotPossible, Remedy, Suggestions
+from vsacli.studies.search.task import AS_IT_IS, Combination, Task, least_change
+from vsacli.trajectory.times import RecordedTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+SIMPLER_SHARE = 1.05
+"""How much larger a remedy with fewer kinds of change may be and still be worth more."""
+
+FASTER_SHARE = 0.8
+"""Share of the extra time of a remedy that another may take to be worth its while although it is larger."""
+
+
+def suggest(robot: Robot, trajectory: Trajectory, near_singular: float = NEAR_SINGULAR_MARGIN) -> Suggestions:
+    """The smallest changes after which every step has the margin and keeps every limit.
+
+    Slow-down, constant change and other profile of the stiffness each by itself; and remedies to choose from,
+    which combine them, also with another preload. Each is recomputed over all steps and confirmed.
+
+    Args:
+        robot: the robot.
+        trajectory: what it is asked to do.
+        near_singular: the margin min(sigma - lower, upper - sigma)/sigma that every step shall have.
+
+    Raises:
+        InputError: the trajectory is not for the robot, a transmission is damped, or `near_singular` is no
+            possible margin.
+        TypeError: robot or trajectory is none.
+    """
+    trajectory = fitted(robot, trajectory)
+    check_near_singular(near_singular)
+    acceptance = Acceptance(robot, near_singular, RecordedLimits(trajectory))
+    asked = Task(acceptance, trajectory)
+    as_it_is = Remedy(0.0, robot, trajectory)
+    if damped_joints(robot, trajectory):
+        if asked.falls_short(as_it_is) is not None:
+            refuse_damped_transmissions(robot, trajectory, "suggestions")
+        return Suggestions(near_singular)
+    if not acceptance.refused_joints(trajectory).any() and asked.falls_short(as_it_is) is None:
+        return Suggestions(near_singular)
+    found_causes = dict(causes(asked))
+    tried = _tried(asked, found_causes)
+    if not tried.chosen and any(cause.fixable for cause in found_causes.values()):
+        found_causes = {
+            index: replace(cause, fixable=cause.fixable and is_fixable(asked, index))
+            for index, cause in found_causes.items()
+        }
+        tried = _tried(asked, found_causes)
+    return Suggestions(
+        near_singular,
+        slow_down=_part(tried.found.slower, "slow_down", tried.failed),
+        stiffness_offset=_part(tried.found.offset, "stiffness_offset", tried.failed),
+        stiffness_profile=_part(tried.found.profile, "stiffness_profile", tried.failed),
+        transition=_part(tried.found.transition, "transition", tried.failed),
+        causes=tuple(found_causes.values()),
+        remedies=tuple(tried.chosen),
+    )
+
+
+class _Tried(NamedTuple):
+    """What a search found, which of it is worth choosing, and what falls short between the steps."""
+
+    found: _Found
+    chosen: list[Remedy]
+    failed: list[Remedy]
+
+
+def _tried(task: Task, found_causes: Mapping[int, Cause]) -> _Tried:
+    """Search for what mends the joints that can be mended; instants at which it falls short join in."""
+    hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
+    if hopeless == found_causes.keys():
+        reasons = NotPossible(tuple(map(str, found_causes.values())))
+        return _Tried(_Found(reasons, reasons, reasons, None, []), [], [])
+    asked = Task(replace(task.acceptance, ignored=hopeless), task.trajectory, task.cost)
+    tried = _searched(asked)
+    if tried.chosen or not isinstance(task.trajectory.times, RecordedTimes):
+        return tried
+    # steps between the samples may exceed a limit of the position that these keep, at whatever speed
+    return _searched(replace(asked, keeps_rate=False))
+
+
+def _searched(asked: Task) -> _Tried:
+    """What is found when instants that fall short join the steps, search after search."""
+
+    def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:
+        found = _Found.of(replace(asked, acceptance=rule))
+        chosen, failed, short = _worth_choosing(found.remedies, asked)
+        return _Tried(found, chosen, failed), short if failed else None
+
+    tried, _ = asked.acceptance.confirmed(attempt)
+    return tried
+
+
+class _Found(NamedTuple):
+    """What a search finds: each kind of change by itself, and what may take several."""
+
+    slower: Remedy | NotPossible
+    offset: Remedy | NotPossible
+    profile: Remedy | NotPossible
+    transition: Remedy | NotPossible | None
+    combined: list[Remedy]
+
+    @classmethod
+    def of(cls, task: Task) -> Self:
+        """What mends a task at its steps."""
+        return cls(
+            _attempt(lambda: task.with_constants(_slow_down(task))),
+            _attempt(lambda: task.with_constants(task.constants())),
+            _attempt(lambda: task.with_profiles(AS_IT_IS)),
+            _attempt(task.with_transition) if has_transitions(task.trajectory) else None,
+            list(_combined(task)),
+        )
+
+    @property
+    def remedies(self) -> list[Remedy]:
+        """All of them."""
+        alone = (self.slower, self.offset, self.profile, self.transition)
+        return [*(each for each in alone if isinstance(each, Remedy)), *self.combined]
+
+
+def _slow_down(task: Task) -> Combination:
+    factor = smallest_slow_down(task.acceptance, task.trajectory)
+    return Combination(factor, {}, {}, task.cost.of_factor(factor))
+
+
+def _attempt(find: Callable[[], Remedy]) -> Remedy | NotPossible:
+    try:
+        return find()
+    except ImpossibleError as error:
+        return NotPossible(error.reasons)
+
+
+def _part(found: Remedy | NotPossible | None, name: str, failed: Sequence[Remedy]) -> Any:
+    """The only change of a remedy, or why there is none."""
+    if not isinstance(found, Remedy):
+        return found
+    if any(found is each for each in failed):
+        return NotPossible(("what keeps every limit at the steps exceeds one between them",))
+    return getattr(found, name)
+
+
+def _combined(task: Task) -> Iterator[Remedy]:
+    """Remedies that may take several kinds of change."""
+    constant, least = CombinedSearch(task), CombinedSearch(task, least_change)
+    smallest = constant.smallest()
+    yield from (task.with_constants(found) for found in (smallest, constant.fastest()) if found is not None)
+    profiles = list(_with_profiles(task, least.smallest(), least.fastest()))
+    yield from profiles or _with_profiles(task, smallest)
+    exchanged = CombinedSearch(task, preloads=True)
+    found = exchanged.smallest() if exchanged.exchangeable else None
+    if found is not None and found.preloads:
+        yield task.with_constants(found)
+
+
+def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Remedy]:
+    """The remedies with profiles that slow down as these combinations do, as far as there are any."""
+    factors = {found.factor: found for found in combinations if found is not None and found.factor > 1}
+    for found in factors.values():
+        with suppress(ImpossibleError):
+            yield task.with_profiles(found)
+
+
+def _worth_choosing(
+    candidates: Iterable[Remedy], task: Task
+) -> tuple[list[Remedy], list[Remedy], FloatArray]:
+    """Those that a run confirms and no simpler one makes superfluous, with another preload last.
+
+    Returns:
+        These; those that a run does not confirm, since they fall short between the steps; and when these do,
+        as times since the start of the task, s.
+    """
+    chosen: list[Remedy] = []
+    failed: list[Remedy] = []
+    instants = [np.empty(0)]
+    for remedy in sorted(candidates, key=lambda each: (len(each.kinds), each.size)):
+        if not any(_superfluous(remedy, beside) for beside in chosen):
+            short = task.falls_short(remedy)
+            (chosen if short is None else failed).append(remedy)
+            instants += [] if short is None else [short]
+    ordered = sorted(chosen, key=lambda each: (each.preload is not None, each.size))
+    return ordered, failed, np.concatenate(instants)
+
+
+def _superfluous(remedy: Remedy, beside: Remedy) -> bool:
+    """Whether a remedy has nothing for it that another one, no more complicated, has not."""
+    if beside.kinds < remedy.kinds:
+        return beside.size <= SIMPLER_SHARE * remedy.size
+    faster = remedy.longer < FASTER_SHARE * beside.longer
+    return beside.kinds == remedy.kinds and beside.size <= remedy.size and not faster
+
+
+def causes(task: Task) -> Iterator[tuple[int, Cause]]:
+    """Index and cause of each joint with a step that is not accepted."""
+    acceptance = task.acceptance
+    refused = np.flatnonzero(acceptance.refused_joints(task.trajectory)).tolist()
+    steps = acceptance.watched(task.trajectory, WATCHED_STEPS)
+    moving, resting = (passage.loads(acceptance.robot) for passage in (steps, steps.slowed(math.inf)))
+    beyond = acceptance.beyond_position(task.trajectory)
+    for index in refused:
+        joint = acceptance.robot.joints[index]
+        if index in beyond:
+            text = f"{_what(beyond[index])}: no timing and no stiffness changes that, another path does"
+            yield index, Cause(joint.name, text, fixable=False)
+        else:
+            text, hopeful = _text(acceptance, joint, moving[index], resting[index])
+            yield index, Cause(joint.name, text, fixable=hopeful or is_fixable(task, index))
+
+
+def is_fixable(task: Task, index: int) -> bool:
+    """Whether a joint by itself can be fixed, by any kind of change."""
+    others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
+    alone = Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
+    if CombinedSearch(alone, preloads=True).smallest() is not None:
+        return True
+    with suppress(ImpossibleError):
+        alone.with_profiles(AS_IT_IS)
+        return True
+    with suppress(ImpossibleError):
+        return has_transitions(task.trajectory) and bool(alone.with_transition())
+    return False
+
+
+def _text(acceptance: Acceptance, joint: Joint, moving: Load, resting: Load) -> tuple[str, bool]:
+    """The cause, and whether it is sure that something helps."""
+    at_rest = acceptance.trouble(joint, resting)
+    if at_rest is None:
+        worst = acceptance.trouble(joint, moving)
+        return ("falls short between the steps" if worst is None else _what(worst)), True
+    if "stiffness" not in joint.actuator.commanded:
+        why = "no slower motion helps, and it has no stiffness to choose"
+        return f"{_what(at_rest, resting=True)}: {why}", False
+    try:
+        offset = smallest_offset(acceptance, joint, resting)
+    except ImpossibleError:
+        why = f"no slower motion and no constant stiffness helps{_in_the_way(acceptance, joint, resting)}"
+        return f"{_what(at_rest, resting=True)}: {why}", False
+    return (
+        f"{_what(at_rest, resting=True)}: no slower motion helps, {_stiffness(joint, resting, offset)}",
+        True,
+    )
+
+
+def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
+    """The limit that the softest constant stiffness exceeds, in a clause; empty if there is none."""
+    try:
+        offset = lowest_offset(acceptance, joint, resting)
+    except ImpossibleError:
+        return ""
+    trouble = acceptance.trouble(joint, resting.changed(offset))
+    if trouble is None:
+        return ""
+    asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
+    constant = asked.min() == asked.max()
+    least = f"{asked[0] + offset:.4g} {unit}" if constant else f"{offset:+.4g} {unit}"
+    return f", since with {least}, the least it may have, {_what(trouble)}"
+
+
+def _what(trouble: Trouble, *, resting: bool = False) -> str:
+    """What is beyond which bound, and when."""
+    when = f"at t = {trouble.time:.3f} s" + (", even at rest" if resting else "")
+    if math.isnan(trouble.bound):
+        return f"its springs cannot carry the elastic torque {when}"
+    side = "below" if trouble.value < trouble.bound else "above"
+    shown = f"{trouble.bound:.4g}"
+    bound = f"the {shown} its load allows" if trouble.of_load else f"its limit of {shown}"
+    return f"{trouble.whose} is {trouble.value:.4g} {trouble.unit} {when}, {side} {bound}"
+
+
+def _stiffness(joint: Joint, resting: Load, offset: float) -> str:
+    """Which stiffness helps at rest."""
+    asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
+    if asked.min() == asked.max():
+        relation = "at least" if offset > 0 else "at most"
+        return f"a stiffness of {relation} {asked[0] + offset:.6g} {unit} does"
+    relation = "higher" if offset > 0 else "lower"
+    return f"a stiffness {relation} by {abs(offset):.6g} {unit} does"

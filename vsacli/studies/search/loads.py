@@ -1,0 +1,270 @@
+"""Samples of a task, slower or with another stiffness; the load of each joint at them, and its periods."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from vsacli.actuators.transmission import Command
+from vsacli.base.arrays import FloatArray, IndexArray, evenly
+from vsacli.base.signals import STIFFNESS
+from vsacli.base.wrench import WRENCH_NAMES, Wrench
+from vsacli.dynamics.inverse import command_of, elastic_torques, usual_block
+from vsacli.robot.model import Robot
+from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.times import stretch
+from vsacli.trajectory.trajectory import Trajectory
+
+
+class Instants(NamedTuple):
+    """Where steps stand in the trajectory that is to be mended.
+
+    Attributes:
+        time: of that trajectory as it is, (samples,) in s.
+        factor: by which it is passed more slowly there, (samples,).
+    """
+
+    time: FloatArray
+    factor: FloatArray
+
+    def at(self, steps: IndexArray | slice) -> Instants:
+        """Some of them."""
+        return Instants(self.time[steps], self.factor[steps])
+
+
+class Passage(NamedTuple):
+    """Some steps of a task, as they are or changed.
+
+    Attributes:
+        motion: with the times of the task as it is.
+        factor: by which it is passed more slowly, (samples,).
+    """
+
+    motion: Motion
+    factor: FloatArray
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, start: int, stop: int, factor: float = 1.0) -> Passage:
+        """The steps start..stop-1 of a task, or of one that was stretched by a factor."""
+        motion = trajectory.block(start, stop)
+        if factor != 1:
+            motion = motion.mapped(_unstretched(trajectory, motion.time, factor), lambda array, _: array)
+        return cls(motion, np.full(len(motion.time), factor))
+
+    @classmethod
+    def between(cls, trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> Passage:
+        """Instants between the steps of a task, or of one that was stretched by a factor.
+
+        Args:
+            trajectory: the task, or the stretched one.
+            elapsed: since the start of the task as it is, s.
+            factor: of the stretching.
+        """
+        motion = motion_between(trajectory, elapsed, factor)
+        unstretched = _unstretched(trajectory, motion.time, factor)
+        return cls(motion.mapped(unstretched, lambda array, _: array), np.full(len(elapsed), factor))
+
+    @property
+    def instants(self) -> Instants:
+        """Where the steps stand in the task."""
+        return Instants(self.motion.time, self.factor)
+
+    def slowed(self, factor: float) -> Passage:
+        """The same passed more slowly, at rest if the factor is infinite."""
+        slower = self.motion.mapped(self.motion.time, lambda array, order: array / factor**order)
+        return Passage(slower, self.factor * factor)
+
+    def stiffened(self, change: FloatArray) -> Passage:
+        """With something added to the stiffness of each joint, (joints,) N m/rad (N/m)."""
+        motion, arrays = self.motion, self.motion.of_joints
+        arrays[STIFFNESS.key] = arrays[STIFFNESS.key] + change
+        return self._replace(motion=Motion.of(motion.time, arrays, motion.wrench))
+
+    def loads(self, robot: Robot) -> list[Load]:
+        """The load of each joint of a robot."""
+        motion = self.motion
+        commanded = {**motion.variables(), **elastic_torques(robot, motion)}
+        commands = (command_of(index, commanded) for index in range(len(robot.joints)))
+        return [Load(motion.time, command, self.instants) for command in commands]
+
+    def select(self, steps: IndexArray) -> Passage:
+        """Some of the steps, by index."""
+        motion = self.motion.mapped(self.motion.time[steps], lambda array, _: array[steps])
+        return Passage(motion, self.factor[steps])
+
+
+def motion_between(trajectory: Trajectory, elapsed: FloatArray, factor: float = 1.0) -> Motion:
+    """The motion at instants, as of `Passage.between`, with the times of the trajectory."""
+    return trajectory.at(np.clip(trajectory.start + factor * elapsed, *trajectory.times.span))
+
+
+def evenly_chosen(trajectory: Trajectory, steps: int) -> Passage:
+    """At most so many steps of a trajectory, both ends included."""
+    chosen = evenly(trajectory.samples, steps)
+    samples = usual_block(trajectory.joints)
+    return joined(
+        Passage.of(trajectory, start, start + samples).select(inside - start)
+        for start in range(0, trajectory.samples, samples)
+        if (inside := chosen[(start <= chosen) & (chosen < start + samples)]).size
+    )
+
+
+def joined(passages: Iterable[Passage]) -> Passage:
+    """The steps of several passages, one after the other."""
+    motions, factors = zip(*passages, strict=True)
+    variables = [motion.variables() for motion in motions]
+    arrays = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
+    last = motions[-1].wrench
+    wrench = last and Wrench(*(arrays[name] for name in WRENCH_NAMES), frame=last.frame)
+    return Passage(Motion.of(arrays["time"], arrays, wrench), np.concatenate(factors))
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What one joint is asked to do, and its elastic torque.
+
+    Attributes:
+        time: ascending, (samples,) in s, of the task or of one that was stretched.
+        command: rows (samples,).
+        instants: where they stand in the task.
+        steps: which of the times are steps, by index, where others are among them.
+    """
+
+    time: FloatArray
+    command: Command
+    instants: Instants
+    steps: IndexArray | slice = field(default_factory=lambda: slice(None))
+
+    @classmethod
+    def over(cls, trajectory: Trajectory, factor: float, time: FloatArray, command: Command) -> Load:
+        """At times of a task that was stretched by a factor, the steps among them."""
+        unstretched = _unstretched(trajectory, time, factor)
+        steps = np.searchsorted(time, trajectory.times.block(0, trajectory.samples))
+        return cls(time, command, Instants(unstretched, np.full(len(time), factor)), steps)
+
+    def at(self, steps: IndexArray | slice) -> Load:
+        """The load at some of the times."""
+        rows = {name: row[steps] for name, row in self.command.arrays().items()}
+        return Load(self.time[steps], Command.of(rows), self.instants.at(steps))
+
+    def changed(self, stiffness: FloatArray | float, *rates: FloatArray) -> Load:
+        """The load with something added to the stiffness and, if given, to its rate and second derivative."""
+        commanded = dict(self.command.commanded)
+        for name, change in zip(STIFFNESS.names, (stiffness, *rates), strict=False):
+            commanded[name] = commanded[name] + change
+        return replace(self, command=self.command._replace(commanded=commanded))
+
+
+def joint_loads(
+    robot: Robot,
+    trajectory: Trajectory,
+    joints: list[int],
+    factor: float = 1.0,
+    between: FloatArray | None = None,
+) -> list[Load]:
+    """The loads of some joints, given by index: at every step, and half-way from one to the next.
+
+    Every second instant, from the first on, is a step, unless there are further instants.
+
+    Args:
+        robot: the robot.
+        trajectory: a task, or one that was stretched.
+        joints: by index.
+        factor: of the stretching.
+        between: further instants, as times since the start of the task as it is, s.
+    """
+    instants = 2 * trajectory.samples - 1
+    names = Command.names(trajectory.commanded)
+    time, rows = np.empty(instants), np.empty((len(joints), len(names), instants))
+    samples = usual_block(len(robot.joints))
+    for start in range(0, trajectory.samples, samples):
+        steps = trajectory.block(start, start + samples + 1)
+        middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
+        for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
+            places = slice(first, first + 2 * len(motion.time), 2)
+            time[places], rows[:, :, places] = motion.time, _rows(robot, motion, joints, names)
+    if between is not None and between.size:
+        motion = motion_between(trajectory, between, factor)
+        time, chosen = np.unique(np.concatenate([time, motion.time]), return_index=True)
+        rows = np.concatenate([rows, _rows(robot, motion, joints, names)], axis=2)[:, :, chosen]
+    commands = (Command.of(dict(zip(names, of_joint, strict=True))) for of_joint in rows)
+    return [Load.over(trajectory, factor, time, command) for command in commands]
+
+
+def _rows(robot: Robot, motion: Motion, joints: list[int], names: tuple[str, ...]) -> FloatArray:
+    """What some joints are commanded along a motion, with elastic torques, (joints, names, instants)."""
+    if not (joints and len(motion.time)):
+        return np.empty((len(joints), len(names), len(motion.time)))
+    commanded = {**motion.variables(), **elastic_torques(robot, motion)}
+    return np.stack([[commanded[name][:, joint] for name in names] for joint in joints])
+
+
+def _unstretched(trajectory: Trajectory, time: FloatArray, factor: float) -> FloatArray:
+    """Times of a stretched trajectory as they were before."""
+    return stretch(time, trajectory.start, 1 / factor)
+
+
+SAME = 1e-6
+"""Largest difference of what repeats itself, relative to the largest value of each variable."""
+
+AT_REST = 1e-9
+"""Largest share of its largest velocity with which a motion rests: rounding."""
+
+LOADING = ("q", "dq", "ddq", "tau_e", "dtau_e", "ddtau_e")
+"""What the motors have to do with, but for the stiffness."""
+
+FEWEST_STEPS = 20
+"""Steps of a period; what repeats itself faster is not told from noise."""
+
+
+class Ends(NamedTuple):
+    """How a motion begins and ends.
+
+    Attributes:
+        periods: how many equal periods it has; 0 if it does not repeat itself.
+        moving: whether it begins, and ends, on its way without repeating itself.
+    """
+
+    periods: int = 0
+    moving: tuple[bool, bool] = (False, False)
+
+    @classmethod
+    def of(cls, trajectory: Trajectory, loads: Sequence[Load]) -> Ends:
+        """Those of a trajectory with the loads of all joints."""
+        moving = _moving_ends(trajectory)
+        if not any(moving):
+            return cls()
+        counts = [periods(load) for load in loads]
+        return cls(math.gcd(*counts)) if all(counts) else cls(0, moving)
+
+
+def rests(trajectory: Trajectory) -> bool:
+    """Whether all joints stand still at both ends of a trajectory."""
+    return not any(_moving_ends(trajectory))
+
+
+def _moving_ends(trajectory: Trajectory) -> tuple[bool, bool]:
+    """Whether any joint moves at the start, and at the end."""
+    some = np.abs(trajectory.block(0, trajectory.samples).dq)
+    first, last = (bool(np.any(row > AT_REST * some.max(axis=0))) for row in some[[0, -1]])
+    return first, last
+
+
+def periods(load: Load) -> int:
+    """How many equal periods, whole numbers of steps, a load has; 0 if it does not end as it begins.
+
+    Every second instant of a load is a step.
+    """
+    arrays = load.command.arrays()
+    rows = np.stack([arrays[name] for name in LOADING])
+    tolerance = SAME * np.abs(rows).max(axis=1, keepdims=True)
+    steps = rows.shape[1] // 2
+    for count in range(max(steps // FEWEST_STEPS, 1), 0, -1):
+        period, rest = divmod(steps, count)
+        if not rest and np.all(np.abs(rows[:, 2 * period :] - rows[:, : -2 * period]) <= tolerance):
+            return count
+    return 0

@@ -1,0 +1,364 @@
+"""The trajectory with which a cost is least, among those that the robot can execute."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.flags import NEAR_SINGULAR_MARGIN, check_near_singular
+from vsacli.base.texts import as_name
+from vsacli.base.units import ENERGY
+from vsacli.dynamics.internal_motion import refuse_damped_transmissions
+from vsacli.dynamics.inverse import fitted
+from vsacli.robot.model import Robot
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.changed_motion import reads_back, with_raised_stiffness
+from vsacli.studies.search.cheapest_stiffness import (
+    BOTH,
+    SEARCHES,
+    TIME,
+    TIMING,
+    CheapestStiffness,
+    Countdown,
+    cheapest_stiffness,
+    check_timing_varies,
+    checked_criterion,
+    chosen_joints,
+    falls_short,
+    varied_joints,
+)
+from vsacli.studies.search.combined import CombinedSearch
+from vsacli.studies.search.criteria import Criterion, Scale, asked_size, run_costs
+from vsacli.studies.search.loads import Ends, joint_loads
+from vsacli.studies.search.optimum import JointOptimum, Optimum, TimingOptimum, TotalCost
+from vsacli.studies.search.paced_motion import (
+    LOOKED_AT,
+    PacedJoint,
+    PacedMotion,
+    instants_of,
+    path_at,
+    retimed,
+)
+from vsacli.studies.search.paced_search import CheapestPaceSearch, NoStartError, PacedSearch, TimingSearch
+from vsacli.studies.search.splines import Pacing
+from vsacli.studies.search.task import Combination, Task
+from vsacli.trajectory.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+
+def optimize(
+    robot: Robot,
+    trajectory: Trajectory,
+    minimize: str = "torque",
+    vary: str = "stiffness",
+    *,
+    margin: float = NEAR_SINGULAR_MARGIN,
+    seed: int = 0,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Optimum:
+    """The stiffness or the timing with which a motion costs least, or takes least time, within all limits.
+
+    A stiffness profile is four times continuously differentiable. Its first two derivatives vanish at both
+    ends, unless the motion repeats itself: then so does the profile. A timing passes the same path at another
+    pace, in the same time unless that is minimised. What is found is a local optimum.
+
+    Args:
+        robot: the robot.
+        trajectory: for this robot.
+        minimize: "torque" (rms of the motor torques), "energy" (that the motors spend), "copper" (heat in
+            their windings) or "peak" (of the motor torques), of each joint by itself, or of all
+            together where the timing varies; or "time".
+        vary: "stiffness", "timing" or "both"; for "time" one of the latter.
+        margin: min(sigma - lower, upper - sigma)/sigma that every step shall have.
+        seed: of the starts that are drawn.
+        progress: is told how many further searches are done, of those that `searches` tells.
+
+    Raises:
+        InputError: the trajectory is not for the robot, something that is needed is not given, or the two
+            words do not go together.
+    """
+    trajectory = fitted(robot, trajectory)
+    check_near_singular(margin)
+    refuse_damped_transmissions(robot, trajectory, "optimisations")
+    varied = varied_joints(robot, vary)
+    what = Optimum(robot, trajectory.name, minimize, "duration", vary, margin)
+    if minimize == TIME:
+        check_timing_varies(vary)
+        return fastest(what, trajectory, varied, seed, progress)
+    shared = vary in (TIMING, BOTH)
+    criterion = checked_criterion(robot, minimize, range(len(robot.joints)) if shared else varied)
+    what = replace(what, words=criterion.words)
+    if shared:
+        return cheapest_pace(what, trajectory, criterion, varied, seed, progress)
+    return cheapest_stiffness(what, trajectory, criterion, seed, progress)
+
+
+def searches(robot: Robot, minimize: str, vary: str) -> int:
+    """How many searches an optimisation may take."""
+    of_pace = SEARCHES * (vary in (TIMING, BOTH))
+    return of_pace + (0 if minimize == TIME or vary == TIMING else SEARCHES * len(chosen_joints(robot)))
+
+
+MOST_DIVIDED = 4 * LOOKED_AT
+"""Steps up to which those of a result are divided."""
+
+ROOM = 0.02
+"""Share of the stiffness by which a search that has to slow down begins further inside the corridor."""
+
+_Search = TypeVar("_Search", bound=PacedSearch)
+
+
+def fastest(
+    what: Optimum, trajectory: Trajectory, varied: Sequence[int], seed: int, progress: Callable[[int], object]
+) -> Optimum:
+    """The fastest pace, and the stiffness of joints that varies, by index, confirmed by runs.
+
+    If no slow-down makes the stiffness as commanded feasible, the search begins from the smallest slow-down
+    with other constants.
+    """
+    bar, ends = Countdown(progress), _ends(what, trajectory)
+    try:
+        try:
+            uniform, found, best = _fastest(what, trajectory, ends, varied, seed, bar.count)
+        except NoStartError:
+            if not varied:
+                raise
+            path = with_raised_stiffness(trajectory, _smallest_slow_down(what, trajectory).constants)
+            _, found, best = _fastest(what, path, ends, varied, seed, bar.count)
+            uniform = math.nan
+    except ImpossibleError as error:
+        return replace(what, reasons=error.reasons)
+    bar.finish()
+    optimum = TimingOptimum(
+        before=trajectory.duration,
+        uniform=uniform,
+        after=best.duration,
+        found=found.found,
+        starts=found.starts,
+        agreeing=found.agreeing,
+        bounding=found.bounding,
+    )
+    return replace(what, timing=optimum, trajectory=best, pace=found.pace(max(ends.periods, 1)))
+
+
+def _fastest(
+    what: Optimum,
+    path: Trajectory,
+    ends: Ends,
+    varied: Sequence[int],
+    seed: int,
+    progress: Callable[[], None],
+) -> tuple[float, Pacing, Trajectory]:
+    """The duration of the fastest uniform motion, the fastest pace, and the motion at it."""
+    search, found, best = _confirmed(
+        what, path, ends, lambda rule: TimingSearch(rule, path, ends, varied, seed, progress)
+    )
+    return search.uniform, found, best
+
+
+def cheapest_pace(
+    what: Optimum,
+    trajectory: Trajectory,
+    criterion: Criterion,
+    varied: Sequence[int],
+    seed: int,
+    progress: Callable[[int], object],
+) -> Optimum:
+    """The pace with which a motion costs least in its duration, confirmed by runs.
+
+    Where the stiffness of joints, by index, varies as well, the search begins with that which is best at the
+    pace as commanded. If there is none, the search for the fastest motion begins with the smallest slow-down
+    for which there is one. If that motion takes no longer than commanded, it is where the search for the
+    cheapest one begins; else the motion is slowed down so much.
+    """
+    ends = _ends(what, trajectory)
+    criterion = type(criterion)(repeating=ends.periods > 0)
+
+    def along(path: Trajectory, near: Pacing | None = None, slow_down: float = 1.0) -> Optimum:
+        bar = Countdown(progress)
+
+        def search(rule: Acceptance) -> CheapestPaceSearch:
+            duration = path.duration / max(ends.periods, 1)
+            motion = PacedMotion(what.robot, path, instants_of(path, duration, rule.between))
+            costed = _costed(rule, motion, criterion, _sizes(what, criterion, trajectory, path), varied)
+            return CheapestPaceSearch(motion, costed, varied, ends, seed, bar.count, near)
+
+        _, found, best = _confirmed(what, path, ends, search)
+        bar.finish()
+        joints = _joints(what.robot, criterion, found, trajectory, best)
+        return replace(
+            what,
+            joints=joints,
+            together=_together(criterion, joints),
+            slow_down=slow_down,
+            trajectory=best,
+            pace=_of_faster(found.pace(max(ends.periods, 1)), slow_down),
+        )
+
+    try:
+        if not varied:
+            return along(trajectory)
+        stiffness = CheapestStiffness(
+            Acceptance(what.robot, what.margin), trajectory, criterion, seed, progress
+        )
+        try:
+            return along(stiffness.confirmed(what).trajectory)
+        except ImpossibleError:
+            slower = _smallest_slow_down(what, trajectory)
+        path = with_raised_stiffness(trajectory, slower.constants)
+        _, near, quickest = _fastest(what, path, ends, varied, seed, Countdown(progress).count)
+        if quickest.duration <= path.duration:
+            return along(path, near)
+        return along(path.stretched(slower.factor), slow_down=slower.factor)
+    except ImpossibleError as error:
+        return replace(what, reasons=error.reasons)
+
+
+def _of_faster(pace: BSpline[np.float64], factor: float) -> BSpline[np.float64]:
+    """A pace along a path that was slowed down by a factor, as one along the path as it was."""
+    return pace if factor == 1 else type(pace)(pace.t / factor, factor * pace.c, pace.k)
+
+
+def _ends(what: Optimum, trajectory: Trajectory) -> Ends:
+    return Ends.of(trajectory, joint_loads(what.robot, trajectory, list(range(len(what.robot.joints)))))
+
+
+def _smallest_slow_down(what: Optimum, trajectory: Trajectory) -> Combination:
+    """The smallest slow-down with which other constants than commanded keep every limit, and these.
+
+    Raises:
+        ImpossibleError: there is none.
+    """
+    margin = what.margin + ROOM * (1 - what.margin)
+    found = CombinedSearch(Task(Acceptance(what.robot, margin), trajectory)).fastest()
+    if found is None:
+        raise ImpossibleError("no slow-down keeps every limit with any constant change of the stiffness")
+    return found
+
+
+def _confirmed(
+    what: Optimum, path: Trajectory, ends: Ends, search_by: Callable[[Acceptance], _Search]
+) -> tuple[_Search, Pacing, Trajectory]:
+    """Search until a run of what was found keeps every limit between its steps as well.
+
+    Args:
+        what: robot and margin.
+        path: of the motion.
+        ends: of the motion.
+        search_by: a search by a rule, whose instants between steps are places on the path.
+
+    Returns:
+        The last search, what it found, and the motion at that pace.
+
+    Raises:
+        ImpossibleError: nothing was found, or a run falls short between its steps whatever is tried.
+    """
+    count = max(ends.periods, 1)
+
+    def attempt(rule: Acceptance) -> tuple[tuple[_Search, Pacing, Trajectory], FloatArray | None]:
+        search = search_by(rule)
+        found = search.best()
+        best, short = _retimed(what, path, found, count)
+        if short is not None:
+            short = np.mod(path_at(short, found.pace(count), path.duration), path.duration / count)
+        return (search, found, best), short
+
+    found, kept = Acceptance(what.robot, what.margin).confirmed(attempt)
+    if not kept:
+        raise ImpossibleError("what keeps every limit at some instants exceeds one between them")
+    return found
+
+
+def _retimed(
+    what: Optimum, path: Trajectory, found: Pacing, count: int
+) -> tuple[Trajectory, FloatArray | None]:
+    """The motion at a pace, and when a run of it falls short, if it does.
+
+    At its own rate if its samples say what lies between them; else at a multiple of it.
+    """
+    name = as_name(f"{what.asked}-{what.minimised}")
+    parts = 1
+    while True:
+        best = retimed(path, found.pace(count), found.stiffness(count), name, parts)
+        last = 2 * parts * path.samples > MOST_DIVIDED
+        if last or reads_back(best):
+            short = falls_short(what, best)
+            if last or short is None:
+                return best, short
+        parts *= 2
+
+
+def _costed(
+    rule: Acceptance, motion: PacedMotion, criterion: Criterion, sizes: Sequence[float], varied: Sequence[int]
+) -> list[PacedJoint]:
+    """The joints with their share in the cost, which is about one for the motion these sizes are of."""
+    if criterion.relative:
+        share = 1 / len(sizes)
+    else:
+        share, sizes = 1.0, [math.fsum(sizes)] * len(sizes)
+    duration = float(motion.s[-1])
+    return [
+        PacedJoint(
+            motion,
+            index,
+            rule.near_singular,
+            criterion,
+            Scale(size, duration),
+            share,
+            rule.reserve,
+            varied=index in varied,
+        )
+        for index, size in enumerate(sizes)
+    ]
+
+
+def _sizes(what: Optimum, criterion: Criterion, *motions: Trajectory) -> list[float]:
+    """Scales of the cost of each joint, from the first motion along which it is finite."""
+    sizes = np.full(len(what.robot.joints), np.nan)
+    for motion in motions:
+        loads = joint_loads(what.robot, motion, list(range(len(sizes))))
+        pairs = zip(what.robot.joints, loads, strict=True)
+        found = np.array([asked_size(joint, load, criterion) for joint, load in pairs])
+        sizes = np.where(np.isfinite(sizes), sizes, found)
+    return [size if math.isfinite(size) and size > 0 else 1.0 for size in sizes.tolist()]
+
+
+def _joints(
+    robot: Robot, criterion: Criterion, found: Pacing, asked: Trajectory, best: Trajectory
+) -> dict[str, JointOptimum]:
+    """What each joint costs before and after, by name."""
+    criteria = dict.fromkeys(range(len(robot.joints)), criterion)
+    before, after = (run_costs(robot, each, criteria) for each in (asked, best))
+    return {
+        joint.name: JointOptimum(
+            before=before[index],
+            constant=math.nan,
+            after=after[index],
+            unit=criterion.quantity.unit(joint.type),
+            found=found.found,
+            starts=found.starts,
+            agreeing=found.agreeing,
+            bounding=found.bounding.get(joint.name, {}),
+        )
+        for index, joint in enumerate(robot.joints)
+    }
+
+
+def _together(criterion: Criterion, joints: Mapping[str, JointOptimum]) -> TotalCost:
+    """What all joints cost together."""
+    if not criterion.relative:
+        before, after = (
+            criterion.together([getattr(each, when) for each in joints.values()])
+            for when in ("before", "after")
+        )
+        return TotalCost(before, after, ENERGY.unit("revolute"))
+    shares = [each.after / each.before if each.before else 1.0 for each in joints.values()]
+    after = criterion.together(shares)
+    return TotalCost(math.nan if math.isnan(after) else 1.0, after, "")

@@ -1,0 +1,467 @@
+"""Search along a path over the pace, and the stiffness if that varies, for the least time or cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray, evenly
+from vsacli.base.signals import STIFFNESS
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.criteria import smoothed_minimum, trapezoidal
+from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum, minimise
+from vsacli.studies.search.loads import Ends
+from vsacli.studies.search.paced_motion import (
+    CLEARANCE,
+    FASTEST,
+    PACE_ORDERS,
+    Pace,
+    PacedJoint,
+    PacedMotion,
+    instants_of,
+    least_pace,
+)
+from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
+from vsacli.studies.search.splines import PacedSpaces, Pacing, of_rows
+from vsacli.trajectory.trajectory import Trajectory
+
+INSTANTS_PER_PIECE = 12
+"""Instants of a piece at which bounds are kept, at least."""
+
+MOST_ROUNDS = 12
+"""Rounds of adding instants at which bounds are missed: a motion with two dwells, bounded by the ends of its
+corridors alone, took seven."""
+
+ACTIVE = 1e-2
+"""How near a bound, relative to it, a motion runs along it: barriers keep the fastest a thousandth away."""
+
+STIFFER_STARTS = (1.0, 0.8, 1.5, 2.2)
+"""Multiples of the commanded stiffness to begin with, if it may vary."""
+
+DRAWN, LEVELS = 2, 6
+"""Paces that are drawn to begin with, and levels between which each of them is interpolated."""
+
+Start = tuple[FloatArray, FloatArray | None]
+"""Unknowns to begin near, and some that keep all bounds, if these are known."""
+
+
+class PacedSearch:
+    """What searches along a path have in common; those for the least time and the least cost derive from it.
+
+    Attributes:
+        pieces: of the splines, first with several starts, then finer.
+        same_cost: relative difference of costs up to which two starts came to the same optimum.
+        timed: whether time is the cost.
+        worth: share of the cost that finer pieces must gain for still finer ones.
+        nothing_kept: why nothing was found where no start led to anything, in a clause.
+
+    Args:
+        motion: along the path.
+        joints: cost and bounds of each.
+        varied: the joints whose stiffness varies as well, by index.
+        seed: of the starts that are drawn.
+        progress: called after each search.
+    """
+
+    pieces: ClassVar[tuple[int, ...]]
+    same_cost: ClassVar[float]
+    worth: ClassVar[float] = 0.0
+    timed: ClassVar[bool]
+    nothing_kept: ClassVar[str]
+
+    def __init__(
+        self,
+        motion: PacedMotion,
+        joints: Sequence[PacedJoint],
+        varied: Sequence[int],
+        seed: int,
+        progress: Callable[[], None],
+    ) -> None:
+        self._motion, self._joints, self._varied = motion, joints, varied
+        self._seed, self._progress = seed, progress
+        self._s = motion.s
+        self._span = float(motion.s[0]), float(motion.s[-1])
+        self._scale = self._span[1]
+
+    def _spaces(self, pieces: int) -> PacedSpaces:
+        """The splines of so many pieces among which is searched."""
+        raise NotImplementedError
+
+    def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
+        """Where to begin.
+
+        Raises:
+            ImpossibleError: there is no start.
+        """
+        raise NotImplementedError
+
+    def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
+        """Where to begin among finer splines: near the pace, None, and the stiffness of joints, by index."""
+        raise NotImplementedError
+
+    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
+        """Of the cost; bounds raise it at first by a gap."""
+        raise NotImplementedError
+
+    def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
+        """What was found, if it keeps all bounds at every instant."""
+        raise NotImplementedError
+
+    def best(self) -> Pacing:
+        """The best that is found from several starts.
+
+        Raises:
+            ImpossibleError: nothing was found.
+        """
+        pieces, *further = self.pieces
+        spaces = self._spaces(pieces)
+        starts = self._starts(spaces)
+        attempts = [self._attempt(spaces, pieces, *start) for start in starts]
+        kept = [attempt for attempt in attempts if attempt is not None]
+        if not kept:
+            raise ImpossibleError(self.nothing_kept)
+        best = min(kept, key=lambda minimum: minimum.cost)
+        agreeing = sum(minimum.cost <= best.cost + self.same_cost * abs(best.cost) for minimum in kept)
+        for pieces in further:
+            finer = self._spaces(pieces)
+            refined = self._attempt(finer, pieces, *self._refined_start(finer, self._rows(spaces, best)))
+            if refined is None or refined.cost > best.cost:
+                break
+            gained, spaces, best = best.cost - refined.cost, finer, refined
+            if gained <= self.worth * abs(best.cost):
+                break
+        return self._pacing(spaces, best, len(starts), agreeing)
+
+    def _rows(self, spaces: PacedSpaces, found: Minimum) -> dict[int | None, FloatArray]:
+        """Pace, None, and stiffness of joints, by index, at every instant."""
+        return {
+            key: space.offset + space.basis(self._s, 1)[0] @ found.unknowns[own]
+            for key, (space, own) in spaces.parts().items()
+        }
+
+    def _drawn(self, least: float, most: float) -> list[FloatArray]:
+        """Some paces between two, (instants,)."""
+        generator = np.random.default_rng(self._seed)
+        places = np.linspace(*self._span, LEVELS)
+        return [np.interp(self._s, places, generator.uniform(least, most, LEVELS)) for _ in range(DRAWN)]
+
+    def _attempt(
+        self, spaces: PacedSpaces, pieces: int, wanted: FloatArray, inside: FloatArray | None
+    ) -> Minimum | None:
+        """Search from what is wanted, with as many instants as it takes; None if nothing keeps all bounds."""
+        instants = evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
+        every, gap = self._groups(spaces, np.arange(len(self._s))), FIRST_GAP
+        for _ in range(MOST_ROUNDS):
+            problem = SeparableProblem(self._groups(spaces, instants))
+            begun = interior(problem, wanted, inside)
+            if begun is None:
+                return None
+            found, gap = self._minimum(problem, begun, gap), WARM_GAP
+            self._progress()
+            kept = self._accepted(spaces, every, found)
+            if kept is not None:
+                return kept
+            bounds = np.concatenate([group.bounds(group.rows(found.unknowns)) for group in every])
+            instants, wanted = np.union1d(instants, missed_instants(bounds - CLEARANCE / 2)), found.unknowns
+        return None
+
+    def _groups(self, spaces: PacedSpaces, instants: IndexArray) -> list[Group]:
+        """The pace by itself, and each joint, at some instants."""
+        s = self._s[instants]
+        pace = spaces.rows(None, s, PACE_ORDERS)
+        of_pace = Pace(self._motion.resting, self._scale)
+        groups = [of_rows(of_pace, instants, pace.first(), trapezoidal(s)[None] * self.timed, 1)]
+        for index, joint in enumerate(self._joints):
+            rows = pace
+            if index in spaces.stiffness:
+                size = float(np.median(self._motion.stiffness(index)))
+                rows = rows.beside(spaces.rows(index, s, STIFFNESS.orders, size))
+            if joint.criterion.levels:
+                rows = rows.beside(spaces.level(s))
+            groups.append(of_rows(joint, instants, rows, joint.weights(s), joint.bound_count))
+        return groups
+
+    def _pacing(self, spaces: PacedSpaces, best: Minimum, starts: int, agreeing: int) -> Pacing:
+        parts = spaces.parts()
+        return Pacing(
+            splines={key: (space, best.unknowns[own]) for key, (space, own) in parts.items()},
+            found=best.found,
+            starts=starts,
+            agreeing=agreeing,
+            bounding=self._bounding(spaces, best.unknowns),
+        )
+
+    def _bounding(self, spaces: PacedSpaces, unknowns: FloatArray) -> dict[str, dict[str, float]]:
+        """Share of the path along each bound, by joint and name of the bound."""
+        _, *groups = self._groups(spaces, np.arange(len(self._s)))
+        shares_of_path = trapezoidal(self._s) / self._span[1]
+        found: dict[str, dict[str, float]] = {}
+        for joint, group in zip(self._joints, groups, strict=True):
+            along = (group.bounds(group.rows(unknowns)) > -ACTIVE) @ shares_of_path
+            shares: dict[str, float] = {}
+            for name, share in zip(joint.bound_names, along.tolist(), strict=False):
+                if share:
+                    shares[name] = shares.get(name, 0.0) + share
+            if shares:
+                found[joint.name] = shares
+        return found
+
+
+FEW = 100
+"""Instants at which bounds are looked at in a first look."""
+
+SLOWEST, STRIDE = 1000.0, 1.1
+"""Factors of uniform slow-downs that are looked at: each so much larger than the one before."""
+
+HALVINGS = 16
+"""Halvings of the last stride: to 1e-6 of the factor."""
+
+UNBOUNDED = 1.1
+"""Multiple of the time that the least pace takes, below which nothing else holds the motion back."""
+
+SLACK = 1.02
+"""How much slower than the fastest uniform motion a search begins."""
+
+SLOWER = (0.0, 1e-5, 1e-4, 3e-4)
+"""By how much a motion may be slowed down so that it keeps all bounds between instants as well."""
+
+LAST_TIMING_GAP = 1e-4
+"""What bounds may raise the time by at the end, relative to a uniform motion: near them steps are short."""
+
+STALLED_TIMING = 3e-4
+"""Share of the time that some steps together must gain."""
+
+
+class NoStartError(ImpossibleError):
+    """No stiffness that was tried makes any slow-down feasible."""
+
+
+class TimingSearch(PacedSearch):
+    """A search for the fastest pace along the path of a trajectory, over a period of what repeats itself.
+
+    Args:
+        acceptance: the rule, with instants of the path that count as well.
+        trajectory: the path.
+        ends: of the motion.
+        varied: the joints whose stiffness varies as well, by index.
+        seed: of the starts that are drawn.
+        progress: called after each search.
+
+    Attributes:
+        uniform: duration of the fastest motion that is slowed down or sped up as a whole, s; NaN if there is
+            none, or its ends move at a given pace.
+    """
+
+    pieces = (12, 24)
+    same_cost = 1e-2
+    timed = True
+    nothing_kept = "no faster pace that was tried keeps every limit at all instants"
+
+    def __init__(
+        self,
+        acceptance: Acceptance,
+        trajectory: Trajectory,
+        ends: Ends,
+        varied: Sequence[int],
+        seed: int,
+        progress: Callable[[], None],
+    ) -> None:
+        robot, count = acceptance.robot, max(ends.periods, 1)
+        instants = instants_of(trajectory, trajectory.duration / count, acceptance.between)
+        motion = PacedMotion(robot, trajectory, instants)
+        joints = [
+            PacedJoint(
+                motion,
+                index,
+                acceptance.near_singular,
+                reserve=acceptance.reserve,
+                varied=index in varied,
+            )
+            for index in range(len(robot.joints))
+        ]
+        super().__init__(motion, joints, varied, seed, progress)
+        self._ends, self._count = ends, count
+        self.uniform = math.nan
+
+    def best(self) -> Pacing:
+        """The fastest pace that is found.
+
+        Raises:
+            ImpossibleError: none was found.
+        """
+        found = super().best()
+        shortest = np.trapezoid(least_pace(self._motion.resting), self._s)
+        held = any(self._ends.moving)
+        if not found.bounding if held else found.pace().integrate(*self._span) < UNBOUNDED * shortest:
+            raise ImpossibleError(
+                f"no limit keeps the motion from being {1 / FASTEST:g} times as fast; give some, such as "
+                "max_torque of the motors, or begin with a shorter duration"
+            )
+        return found
+
+    def _spaces(self, pieces: int) -> PacedSpaces:
+        return PacedSpaces.of(self._span, pieces, self._varied, self._ends)
+
+    def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
+        asked = {joint: self._motion.stiffness(joint) for joint in self._varied}
+        begun: list[Start] = []
+        for multiple in STIFFER_STARTS if self._varied else STIFFER_STARTS[:1]:
+            stiffness = {joint: multiple * row for joint, row in asked.items()}
+            factor = self._uniform(spaces, stiffness)
+            if factor is None:
+                continue
+            inside = spaces.even(self._s, SLACK * factor, stiffness)
+            begun.append((inside, inside))
+            if multiple == 1:
+                self._scale = factor * self._span[1]
+                self.uniform = math.nan if any(self._ends.moving) else self._count * self._scale
+                begun += [
+                    (spaces.fitted(self._s, factor * drawn, stiffness), inside)
+                    for drawn in self._drawn(SLACK, 2.0)
+                ]
+        if not begun:
+            raise NoStartError("no slow-down or speed-up of the whole motion keeps every limit")
+        return begun
+
+    def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
+        """A little slower, since the way out of a corner is long."""
+        stiffness = {key: row for key, row in rows.items() if key is not None}
+        slower = spaces.fitted(self._s, SLACK * rows[None], stiffness)
+        return slower, slower
+
+    def _uniform(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
+        """The least pace that is the same everywhere and keeps all bounds; None if none does."""
+        few = self._groups(spaces, evenly(len(self._s), FEW))
+        every = self._groups(spaces, np.arange(len(self._s)))
+
+        def kept(groups: Sequence[Group], factor: float) -> bool:
+            unknowns = spaces.even(self._s, factor, stiffness)
+            _, bounds = SeparableProblem(groups).values(unknowns)
+            return bool(np.all(bounds < 0))
+
+        factor = FASTEST
+        while not (kept(few, SLACK * factor) and kept(every, factor) and kept(every, SLACK * factor)):
+            factor *= STRIDE
+            if factor > SLOWEST:
+                return None
+        refused = factor / STRIDE
+        for _ in range(HALVINGS):
+            middle = math.sqrt(refused * factor)
+            refused, factor = (refused, middle) if kept(every, middle) else (middle, factor)
+        return factor
+
+    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
+        return minimise(problem, start, gap, LAST_TIMING_GAP, STALLED_TIMING)
+
+    def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
+        """The same so little slower that all bounds are kept at every instant; None if that takes more."""
+        for share in SLOWER:
+            unknowns = spaces.slowed(found.unknowns, share)
+            cost, bounds = SeparableProblem(every).values(unknowns)
+            if np.all(bounds <= CLEARANCE / 2):
+                return replace(found, unknowns=unknowns, cost=cost)
+        return None
+
+
+STIFFER = 1.0, 1.5, 2.0
+"""Multiples of that stiffness to begin with."""
+
+DRAWN_PACES = 0.6, 1.6
+"""Paces between which those that are drawn lie, before they are scaled to the duration."""
+
+LIFTED = 1.1
+"""Multiple of a stiffness with which a search begins: from an end of the corridor, where the best often is, a
+pendulum took more than two hundred steps, and from here fifty."""
+
+FIRST_LEVEL = 1.05
+"""Multiple of what a level bounds, to begin with."""
+
+
+class CheapestPaceSearch(PacedSearch):
+    """A search for the pace with which a motion costs least while it takes as long as commanded.
+
+    Args:
+        motion: along the path.
+        joints: cost and bounds of each.
+        varied: the joints whose stiffness varies as well, by index.
+        ends: of the motion.
+        seed: of the starts that are drawn.
+        progress: called after each search.
+        near: pace and stiffness to begin near, scaled to the duration, where the path itself is infeasible.
+    """
+
+    pieces = (12, 24, 48)
+    same_cost = 1e-3
+    worth = 1e-3
+    timed = False
+    nothing_kept = "no pace that was tried keeps every limit at all instants within the duration"
+
+    def __init__(
+        self,
+        motion: PacedMotion,
+        joints: Sequence[PacedJoint],
+        varied: Sequence[int],
+        ends: Ends,
+        seed: int,
+        progress: Callable[[], None],
+        near: Pacing | None = None,
+    ) -> None:
+        super().__init__(motion, joints, varied, seed, progress)
+        self._ends, self._near = ends, near
+
+    def _spaces(self, pieces: int) -> PacedSpaces:
+        return PacedSpaces.of(self._span, pieces, self._varied, self._ends).lasting_as_commanded()
+
+    def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
+        """The pace as commanded with some stiffnesses, and drawn paces with the first of these."""
+        asked = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
+        even = np.ones_like(self._s)
+        if self._near is not None:
+            even, asked = self._lasting(self._near.pace()(self._s)), self._near.stiffness_at(self._s)
+        first = self._levelled(spaces, spaces.fitted(self._s, even, asked))
+        inside = first if self._kept(spaces, first) else None
+        stiffer = [
+            {joint: multiple * row for joint, row in asked.items()}
+            for multiple in (STIFFER if self._varied else (1.0,))
+        ]
+        wanted = [spaces.fitted(self._s, even, stiffness) for stiffness in stiffer]
+        wanted += [
+            spaces.fitted(self._s, self._lasting(even * drawn), asked) for drawn in self._drawn(*DRAWN_PACES)
+        ]
+        return [(self._levelled(spaces, unknowns), inside) for unknowns in wanted]
+
+    def _lasting(self, pace: FloatArray) -> FloatArray:
+        """A pace scaled to the duration as commanded, (instants,)."""
+        scaled: FloatArray = pace * (self._span[1] / np.trapezoid(pace, self._s))
+        return scaled
+
+    def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
+        stiffness = {key: LIFTED * row for key, row in rows.items() if key is not None}
+        return self._levelled(spaces, spaces.fitted(self._s, rows[None], stiffness)), None
+
+    def _kept(self, spaces: PacedSpaces, unknowns: FloatArray) -> bool:
+        every = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
+        return bool(np.all(every.values(unknowns)[1] < 0))
+
+    def _levelled(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
+        """Unknowns with a level that bounds what it shall, if there are any."""
+        if not self._joints[0].criterion.levels:
+            return unknowns
+        without = np.append(unknowns, 0.0)
+        _, *groups = self._groups(spaces, np.arange(len(self._s)))
+        over = [
+            group.bounds(group.rows(without))[len(joint.bound_names) :]
+            for joint, group in zip(self._joints, groups, strict=True)
+        ]
+        return np.append(unknowns, FIRST_LEVEL * float(np.nan_to_num(np.concatenate(over)).max()))
+
+    def _minimum(self, problem: SeparableProblem, start: FloatArray, gap: float) -> Minimum:
+        return smoothed_minimum(problem, start, gap, self._joints)
+
+    def _accepted(self, _spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
+        _, bounds = SeparableProblem(every).values(found.unknowns)
+        return found if np.all(bounds <= CLEARANCE / 2) else None

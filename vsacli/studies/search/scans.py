@@ -1,0 +1,447 @@
+"""The smallest slow-down, stiffness offset or transition that is accepted, by scan and bisection.
+
+Each candidate is a whole number, so that the printed value is the one that was confirmed. A scan looks at
+some watched samples; a candidate that they accept is confirmed on all, and samples that refuse it join them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray, evenly
+from vsacli.base.signals import STIFFNESS
+from vsacli.robot.joint import Joint
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range, stiffness_text
+from vsacli.studies.search.changed_motion import rate_of, with_stiffness
+from vsacli.studies.search.fixed_text import changes_of_steps
+from vsacli.studies.search.loads import Load, Passage, joined
+from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.curves.steps import Chain, stepwise
+from vsacli.trajectory.trajectory import Trajectory
+
+
+class Candidates(Protocol):
+    """Whole numbers that stand for changes of growing size, judged on a few watched steps or on all."""
+
+    def stride(self, number: int) -> int:
+        """How far a scan goes from a refused number, at least 1."""
+
+    def accepts(self, number: int) -> bool:
+        """Whether the change is accepted at the watched steps."""
+
+    def confirms(self, number: int) -> bool:
+        """Whether it is accepted at all steps; some of those that refuse it are watched from now on."""
+
+
+def smallest_confirmed(candidates: Candidates, start: int, stop: int) -> int | None:
+    """The smallest number from `start` to `stop` that scan, bisection and confirmation find; None if none."""
+    number: int | None = start if start <= stop else None
+    while number is not None:
+        number = _smallest_accepted(candidates, number, stop)
+        if number is not None and candidates.confirms(number):
+            break
+    return number
+
+
+def _smallest_accepted(candidates: Candidates, start: int, stop: int) -> int | None:
+    """Go up in strides to the first accepted number, then bisect down to the last refused one.
+
+    Numbers between strides that are accepted while their neighbours are not may be missed.
+    """
+    refused, number = start - 1, start
+    while not candidates.accepts(number):
+        if number == stop:
+            return None
+        refused, number = number, min(number + candidates.stride(number), stop)
+    while number - refused > 1:
+        middle = (number + refused) // 2
+        if candidates.accepts(middle):
+            number = middle
+        else:
+            refused = middle
+    return number
+
+
+FACTOR_DENOMINATOR = 10_000
+"""Factors are whole multiples of 1/FACTOR_DENOMINATOR where recorded stamps are not even: steps get further
+apart."""
+
+WHOLE = 1e-9
+"""Relative difference from a whole number of steps that is rounding."""
+
+LARGEST_FACTOR = 1000
+"""Up to which slow-downs are tried; beyond, the units of the trajectory are more likely to be wrong."""
+
+WATCHED_STEPS = 1000
+"""Steps that the scan looks at to begin with, and how many a refused confirmation may add."""
+
+FIRST_STEPS = 20
+"""How many of them are tried at many factors before the scan, and how many of those refused even at rest."""
+
+FACTORS_AT_ONCE = 64
+"""Factors that are tried at once."""
+
+
+class Factors(NamedTuple):
+    """The factors of slow-downs that are tried: those with a whole number of steps at the rate of the task.
+
+    A controller has one rate; what lasts 577.74 of its periods ends between two of them.
+
+    Attributes:
+        denominator: numbers stand for themselves over this: steps of the task, which need not be whole.
+    """
+
+    denominator: float
+
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> Factors:
+        """Those of a task."""
+        rate = rate_of(trajectory)
+        return cls(float(FACTOR_DENOMINATOR) if rate is None else trajectory.duration * rate)
+
+    @property
+    def first(self) -> int:
+        """The number that stands for no slow-down."""
+        return round(self.denominator) if self._whole else math.floor(self.denominator)
+
+    @property
+    def last(self) -> int:
+        """The number of the largest factor."""
+        return math.floor(LARGEST_FACTOR * self.denominator)
+
+    @property
+    def _whole(self) -> bool:
+        return math.isclose(self.denominator, round(self.denominator), rel_tol=WHOLE)
+
+    def factor(self, number: int) -> float:
+        """What a number stands for."""
+        denominator = round(self.denominator) if self._whole else self.denominator
+        return 1.0 if number == self.first else number / denominator
+
+
+def smallest_slow_down(acceptance: Acceptance, trajectory: Trajectory) -> float:
+    """The smallest factor by which position, stiffness and wrench must be stretched together in time.
+
+    It is found by a scan upward in steps of 1 %, then bisection to one step, and confirmed on all steps of
+    the stretched trajectory.
+
+    Args:
+        acceptance: the rule, and the robot.
+        trajectory: one that is refused as it is.
+
+    Raises:
+        ImpossibleError: with the reason.
+    """
+    steps = acceptance.watched(trajectory, WATCHED_STEPS)
+    at_rest = steps.slowed(math.inf)
+    refused = np.flatnonzero(np.any(acceptance.refused(at_rest), axis=1))
+    few = np.union1d(evenly(len(steps.factor), FIRST_STEPS), refused[evenly(len(refused), FIRST_STEPS)])
+    factors = Factors.of(trajectory)
+    number = _scan_start(acceptance, steps.select(few), factors)
+    if number is not None:
+        candidates = SlowDownCandidates(acceptance, trajectory, steps)
+        number = smallest_confirmed(candidates, number, factors.last)
+    if number is not None:
+        return factors.factor(number)
+    if refused.size:
+        reasons = "; ".join(acceptance.reasons(at_rest))
+        raise ImpossibleError(f"even at rest, under gravity alone, {reasons}")
+    raise ImpossibleError(f"not even one by a factor {LARGEST_FACTOR} does")
+
+
+def _scan_start(acceptance: Acceptance, few: Passage, factors: Factors) -> int | None:
+    """A number up to which the scan would find one of a few steps refused; None if it always would.
+
+    It tries many factors at once, which costs hardly more than one of them.
+    """
+    numbers = [factors.first]
+    while numbers[-1] < factors.last:
+        numbers.append(min(numbers[-1] + _stride(numbers[-1]), factors.last))
+    for start in range(0, len(numbers), FACTORS_AT_ONCE):
+        tried = numbers[start : start + FACTORS_AT_ONCE]
+        refused = acceptance.refused(joined(few.slowed(factors.factor(number)) for number in tried))
+        accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
+        if accepted.size:
+            return numbers[max(start + int(accepted[0]) - 1, 0)]
+    return None
+
+
+class SlowDownCandidates:
+    """Stretching by the factors of a task, judged at watched steps; see `Candidates`."""
+
+    def __init__(self, acceptance: Acceptance, trajectory: Trajectory, watched: Passage) -> None:
+        self._acceptance, self._trajectory, self._watched = acceptance, trajectory, watched
+        self._factors = Factors.of(trajectory)
+
+    def stride(self, number: int) -> int:
+        """One percent."""
+        return _stride(number)
+
+    def accepts(self, number: int) -> bool:
+        """Whether every watched step is accepted."""
+        return not self._acceptance.refused(self._watched.slowed(self._factors.factor(number))).any()
+
+    def confirms(self, number: int) -> bool:
+        """Whether every step is accepted; those of the first block with others are watched from now on."""
+        factor = self._factors.factor(number)
+        for passage in self._acceptance.passages(self._trajectory.stretched(factor), factor):
+            steps = np.flatnonzero(np.any(self._acceptance.refused(passage), axis=1))
+            if steps.size:
+                further = passage.select(steps[evenly(len(steps), WATCHED_STEPS)])
+                self._watched = joined([self._watched, further.slowed(1 / factor)])
+                return False
+        return True
+
+
+def _stride(number: int) -> int:
+    return math.ceil(number / 100)
+
+
+LARGEST_RATIO = 100
+"""How many times stiffer or softer an offset may make a joint, where nothing else bounds it."""
+
+OFFSETS_AT_ONCE = 64
+"""Offsets that are tried at once: hardly dearer than one of them."""
+
+OFFSET_DIGITS = 4
+"""Decimal places of an offset behind the leading digit of the stiffness: so what is printed was confirmed."""
+
+ROUNDING = 1e-9
+"""Relative rise of a stiffness after which rounding leaves it no margin short."""
+
+GRID_ROUNDING = 1e-6
+"""By how much of its spacing a number may miss the grid; far less than any limit allows."""
+
+
+def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
+    """The constant closest to zero that mends a joint, N m/rad (N/m).
+
+    Where only the corridor and the limits of stiffness and deflection are at stake, its bounds are closed;
+    for the limits of the motors it is a scan outward in steps of 1 % of the stiffness, then bisection.
+
+    Args:
+        acceptance: the rule.
+        joint: the joint, at least one of whose steps is refused.
+        load: its steps.
+
+    Raises:
+        ImpossibleError: with the reason.
+    """
+    low, high = _bounds(acceptance, joint, load)
+    raised = OffsetCandidates(acceptance, joint, load, sign=1).smallest(low, high)
+    lowered = OffsetCandidates(acceptance, joint, load, sign=-1).smallest(-high, -low)
+    found = [offset for offset in (raised, lowered) if offset is not None]
+    if found:
+        return min(found, key=abs)
+    nearest = min(max(low, 0.0), high)
+    reason = acceptance.reason(joint, load.changed(nearest))
+    with_it = f"with {nearest:+.6g}" if nearest else "as it is"
+    raise ImpossibleError(f"none keeps every limit of {joint.name}; {with_it}, {reason}")
+
+
+def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
+    """The constant with which a joint is as soft as its load and its limit of stiffness admit, N m/rad (N/m).
+
+    Raises:
+        ImpossibleError: no stiffness mends the joint.
+    """
+    asked = load.command.commanded["stiffness"]
+    rise = checked_range(acceptance, joint, load).low - asked
+    hardest = int(rise.argmax())
+    return float(rise[hardest] + ROUNDING * (asked[hardest] + rise[hardest]))
+
+
+def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, float]:
+    """Smallest and largest offset that the corridor and the limits of stiffness and deflection admit."""
+    admissible = checked_range(acceptance, joint, load)
+    asked = load.command.commanded["stiffness"]
+    rise, fall = admissible.low - asked, admissible.high - asked
+    first, last = int(rise.argmax()), int(fall.argmin())
+    if rise[first] > fall[last]:
+        raise ImpossibleError(
+            f"none takes {joint.name} from {asked[first]:.6g} to at least "
+            f"{stiffness_text(joint, admissible.low[first])} at t = {load.time[first]:.3f} s "
+            f"and from {asked[last]:.6g} to at most "
+            f"{stiffness_text(joint, admissible.high[last])} at t = {load.time[last]:.3f} s"
+        )
+    return float(rise[first]), float(fall[last])
+
+
+class OffsetCandidates:
+    """Constants of one sign on a decimal grid, judged at watched steps; see `Candidates`."""
+
+    def __init__(self, acceptance: Acceptance, joint: Joint, load: Load, sign: int) -> None:
+        self._acceptance, self._joint, self._load, self._sign = acceptance, joint, load, sign
+        self._softest = float(load.command.commanded["stiffness"].min())
+        self._exponent = math.floor(math.log10(self._softest)) - OFFSET_DIGITS
+        self._watched = evenly(len(load.time), WATCHED_STEPS)
+
+    def value(self, number: int) -> float:
+        """The constant that a number stands for: the double nearest to the decimal."""
+        return float(f"{self._sign * number}e{self._exponent}")
+
+    def smallest(self, low: float, high: float) -> float | None:
+        """The constant closest to zero between two bounds on its size, or None."""
+        unit = 10.0**self._exponent
+        ratio = LARGEST_RATIO - 1 if self._sign > 0 else 1 - 1 / LARGEST_RATIO
+        start = math.ceil(max(low, 0.0) / unit - GRID_ROUNDING)
+        stop = math.floor(min(high, ratio * self._softest) / unit + GRID_ROUNDING)
+        near = self._scan_start(start, stop)
+        number = None if near is None else smallest_confirmed(self, near, stop)
+        return None if number is None else self.value(number)
+
+    def _scan_start(self, start: int, stop: int) -> int | None:
+        """A number up to which the scan would find some watched step refused; None if it always would.
+
+        Found by looking at a few steps, to which others are added as long as the watched ones refuse.
+        """
+        few = np.union1d(self._watched[evenly(len(self._watched), FIRST_STEPS)], self._hardest(start))
+        numbers = list(self._strides(start, stop))
+        first = 0
+        while (first := self._first_accepted(numbers, first, few)) < len(numbers):
+            refused = self._refused(self._load.at(self._watched), numbers[first])
+            if not refused.size:
+                return numbers[max(first - 1, 0)]
+            few = np.union1d(few, self._watched[refused[evenly(len(refused), FIRST_STEPS)]])
+        return None
+
+    def _hardest(self, number: int) -> IndexArray:
+        """Some of the watched steps that refuse a number."""
+        refused = self._watched[self._refused(self._load.at(self._watched), number)]
+        return refused[evenly(len(refused), FIRST_STEPS)]
+
+    def _strides(self, start: int, stop: int) -> Iterator[int]:
+        """The numbers at which the scan looks."""
+        number = start
+        while number < stop:
+            yield number
+            number += self.stride(number)
+        if start <= stop:
+            yield stop
+
+    def _first_accepted(self, numbers: Sequence[int], first: int, steps: IndexArray) -> int:
+        """Index, from `first` on, of a number that these steps accept; that behind the last if none is."""
+        for begin in range(first, len(numbers), OFFSETS_AT_ONCE):
+            tried = numbers[begin : begin + OFFSETS_AT_ONCE]
+            load = self._load.at(np.tile(steps, len(tried)))
+            values = np.repeat([self.value(number) for number in tried], len(steps))
+            refused = self._acceptance.refused_steps(self._joint, load.changed(values))
+            accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
+            if accepted.size:
+                return begin + int(accepted[0])
+        return len(numbers)
+
+    def stride(self, number: int) -> int:
+        """One percent of the stiffness."""
+        return math.ceil((self._softest / 10.0**self._exponent + max(self._sign * number, 0)) / 100)
+
+    def accepts(self, number: int) -> bool:
+        """Whether every watched step is accepted."""
+        return not self._refused(self._load.at(self._watched), number).size
+
+    def confirms(self, number: int) -> bool:
+        """Whether every step is accepted; steps that are not are watched from now on."""
+        refused = self._refused(self._load, number)
+        self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED_STEPS)])
+        return not refused.size
+
+    def _refused(self, load: Load, number: int) -> IndexArray:
+        changed = load.changed(self.value(number))
+        return np.flatnonzero(self._acceptance.refused_steps(self._joint, changed))
+
+
+DIGITS = 3
+"""Decimal places of a transition behind its leading digit, so that the printed one is the confirmed one."""
+
+
+def has_transitions(trajectory: Trajectory) -> bool:
+    """Whether the stiffness is given by levels with transitions between them."""
+    return bool(_changes(trajectory))
+
+
+def _changes(trajectory: Trajectory) -> list[RestToRest]:
+    """The changes from level to level, none if the stiffness is something else."""
+    stiffness = trajectory.commanded[STIFFNESS.key]
+    return (changes_of_steps(stiffness) or []) if isinstance(stiffness, Chain) else []
+
+
+def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple[float, float, Trajectory]:
+    """The transition as commanded, the shortest longer one that is accepted, and the trajectory with it.
+
+    Each change of level begins when it did. It is found by a scan in steps of 1 %, then bisection.
+
+    Args:
+        acceptance: the rule, and the robot.
+        trajectory: one that `has_transitions`.
+
+    Raises:
+        ImpossibleError: no transition that ends in time is accepted.
+    """
+    candidates = _Transitions(acceptance, trajectory)
+    number = smallest_confirmed(candidates, candidates.first, candidates.last)
+    if number is None:
+        raise ImpossibleError(f"none of up to {candidates.longest:.4g} s does; then the next change begins")
+    return candidates.shortest, candidates.length(number), candidates.trajectory(number)
+
+
+class _Transitions:
+    """Transitions on a decimal grid, judged at watched instants; see `Candidates`."""
+
+    def __init__(self, acceptance: Acceptance, trajectory: Trajectory) -> None:
+        self._acceptance, self._trajectory, self._changes = acceptance, trajectory, _changes(trajectory)
+        self._limits = [*(change.span[0] for change in self._changes[1:]), trajectory.duration]
+        self.shortest = min(change.span[1] - change.span[0] for change in self._changes)
+        self.longest = min(
+            limit - change.span[0] for change, limit in zip(self._changes, self._limits, strict=True)
+        )
+        self._exponent = math.floor(math.log10(self.shortest)) - DIGITS
+        self._steps = trajectory.times.block(0, trajectory.samples) - trajectory.start
+        watched = self._steps[evenly(len(self._steps), WATCHED_STEPS)]
+        self._watched = np.union1d(watched, acceptance.between)
+
+    @property
+    def first(self) -> int:
+        """The first number that stands for a longer transition."""
+        return math.floor(self.shortest / 10.0**self._exponent * (1 + 1e-9)) + 1
+
+    @property
+    def last(self) -> int:
+        """The number of the longest transition that ends before the next change, or the motion."""
+        return math.floor(self.longest / 10.0**self._exponent * (1 + 1e-9))
+
+    def length(self, number: int) -> float:
+        """The transition that a number stands for, s."""
+        return min(float(f"{number}e{self._exponent}"), self.longest)
+
+    def trajectory(self, number: int) -> Trajectory:
+        """The trajectory with transitions of that length."""
+        first, length = self._changes[0], self.length(number)
+        levels = [first.start, *(change.end for change in self._changes)]
+        spans = [
+            (change.span[0], min(change.span[0] + length, limit))
+            for change, limit in zip(self._changes, self._limits, strict=True)
+        ]
+        profile = stepwise(STIFFNESS, (0.0, self._trajectory.duration), first.degree, levels, spans)
+        return with_stiffness(self._trajectory, profile)
+
+    def stride(self, number: int) -> int:
+        """One percent."""
+        return math.ceil(number / 100)
+
+    def accepts(self, number: int) -> bool:
+        """Whether every watched instant is accepted."""
+        return not self._refused(number, self._watched).size
+
+    def confirms(self, number: int) -> bool:
+        """Whether every step is accepted; steps that are not are watched from now on."""
+        refused = self._refused(number, self._steps)
+        self._watched = np.union1d(self._watched, refused[evenly(len(refused), WATCHED_STEPS)])
+        return not refused.size
+
+    def _refused(self, number: int, elapsed: FloatArray) -> FloatArray:
+        passage = Passage.between(self.trajectory(number), elapsed)
+        return elapsed[np.any(self._acceptance.refused(passage), axis=1)]

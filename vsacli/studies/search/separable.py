@@ -1,0 +1,325 @@
+"""Problems whose cost and bounds are functions of a few rows at each instant, linear in the unknowns.
+
+The rows are, say, the stiffness of a joint and its two derivatives, the unknowns coefficients of a spline. So
+all derivatives by the unknowns follow from small ones, instant by instant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
+from vsacli.compute.duals import Dual, seeds, tangent_of, value_of
+from vsacli.studies.search.interior_point import minimise
+from vsacli.studies.search.nearest_profile import peaks
+
+DIFFERENCE = 1e-6
+"""Steps in the scale of a row by which exact gradients are differenced: half of the digits are left."""
+
+LEAST_CLEARANCE = 1e-5
+"""By which all bounds shall be kept at a start: the way out of a corner is long."""
+
+LEAST_RELIEF = 1e-3
+"""By which bounds, relative to them, are kept at a start, if they can be."""
+
+PULLS = (0.0, 1e-3, 1e-2, 0.1, 0.3, 0.6, 1.0)
+"""Shares of the way to a place inside, one of which leads inside."""
+
+TETHER = 1e-3
+"""What going as far as rows are large costs while bounds are relieved: else what is free would drift."""
+
+
+class Functions(Protocol):
+    """What a cost and bounds are made of: functions of rows at instants, which may carry derivatives."""
+
+    def __call__(
+        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
+    ) -> tuple[Sequence[Dual | FloatArray], Sequence[Dual | FloatArray]]:
+        """Integrands of the cost, and bounds, which shall not be positive; each (instants,).
+
+        Args:
+            rows: one array (instants,) each.
+            instants: which they are.
+        """
+
+
+class Sampled(NamedTuple):
+    """Functions at instants, (functions, instants), and gradients by rows, (functions, rows, instants)."""
+
+    values: FloatArray
+    gradients: FloatArray
+
+    def split(self, parts: int) -> tuple[Sampled, list[FloatArray]]:
+        """The first of so many equal parts of the instants, and the gradients of each of the others."""
+        instants = self.values.shape[1] // parts
+        first = Sampled(self.values[:, :instants], self.gradients[..., :instants])
+        return first, np.split(self.gradients[..., instants:], parts - 1, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Functions of the same rows.
+
+    Attributes:
+        functions: what they are.
+        instants: at which, (instants,), as the functions number them.
+        basis: of the rows, (rows, instants, own unknowns).
+        unknowns: places of its unknowns among all, (own unknowns,).
+        weights: of each integrand at each instant, (integrands, instants).
+        there: which bounds there are, (bounds, instants); others do not count.
+        scales: sizes of the rows, (rows,).
+        offsets: what the rows are without any unknown, (rows,); zero unless given.
+    """
+
+    functions: Functions
+    instants: IndexArray
+    basis: FloatArray
+    unknowns: IndexArray
+    weights: FloatArray
+    there: BoolArray
+    scales: FloatArray
+    offsets: FloatArray | None = None
+
+    def rows(self, unknowns: FloatArray) -> FloatArray:
+        """The rows of all unknowns of a problem, (rows, instants)."""
+        rows: FloatArray = self.basis @ unknowns[self.unknowns]
+        return rows if self.offsets is None else rows + self.offsets[:, None]
+
+    @cached_property
+    def by_instant(self) -> FloatArray:
+        """The basis in another order, (instants, rows, own unknowns)."""
+        return np.ascontiguousarray(self.basis.transpose(1, 0, 2))
+
+    def values(self, rows: FloatArray) -> tuple[float, FloatArray]:
+        """The cost and the bounds there are."""
+        integrands, bounds = self.functions(rows, self.instants)
+        cost = float(np.sum(self.weights * _stacked(integrands, rows)))
+        return cost, _stacked(bounds, rows)[self.there]
+
+    def bounds(self, rows: FloatArray) -> FloatArray:
+        """All bounds, (bounds, instants)."""
+        return _stacked(self.functions(rows, self.instants)[1], rows)
+
+    def sampled(self, rows: FloatArray, instants: IndexArray) -> tuple[Sampled, Sampled]:
+        """Integrands and bounds with their gradients."""
+        integrands, bounds = self.functions(seeds(list(rows)), instants)
+        return _sampled(integrands, rows), _sampled(bounds, rows)
+
+
+def _stacked(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> FloatArray:
+    shape = rows.shape[1:]
+    values = [np.broadcast_to(value_of(each), shape) for each in functions]
+    return np.stack(values) if values else np.zeros((0, *shape))
+
+
+def _sampled(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> Sampled:
+    gradients = [tangent_of(each, len(rows), rows.shape[1:]) for each in functions]
+    stacked = np.stack(gradients) if gradients else np.zeros((0, *rows.shape))
+    return Sampled(_stacked(functions, rows), stacked)
+
+
+class _Expanded:
+    """A group at unknowns: functions and gradients there, and where each row is displaced a little.
+
+    All are computed at once, since calls cost more than instants.
+    """
+
+    def __init__(self, group: Group, unknowns: FloatArray) -> None:
+        self.group, self.rows = group, group.rows(unknowns)
+        self._curved: FloatArray | None = None
+        self._steps = DIFFERENCE * group.scales
+        count = len(self.rows)
+        displaced = self.rows[:, None, :] + np.diag(self._steps)[:, :, None]
+        places = np.concatenate([self.rows[:, None, :], displaced], axis=1)
+        at = np.tile(group.instants, count + 1)
+        integrands, bounds = group.sampled(places.reshape(count, -1), at)
+        self.integrands, self._moved_integrands = integrands.split(count + 1)
+        bounds, self._moved_bounds = bounds.split(count + 1)
+        self.bounds = bounds._replace(gradients=np.where(group.there[:, None], bounds.gradients, 0.0))
+
+    def gradient(self) -> FloatArray:
+        """Of the cost by the own unknowns."""
+        return self._by_unknowns(_weighted(self.group.weights, self.integrands.gradients))
+
+    def pull(self, weights: FloatArray) -> FloatArray:
+        """The sum of the bounds' gradients by the own unknowns, (own unknowns,)."""
+        return self._by_unknowns(_weighted(self._of_all(weights), self.bounds.gradients))
+
+    def changes(self, step: FloatArray) -> FloatArray:
+        """What the bounds change by."""
+        moved = self.group.basis @ step[self.group.unknowns]
+        changes: FloatArray = np.sum(self.bounds.gradients * moved, axis=1)[self.group.there]
+        return changes
+
+    def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
+        """See `Point.newton_matrix`; (own unknowns, own unknowns)."""
+        if self._curved is None:  # asked for again where this is not positive definite
+            self._curved = self._curvature(self._of_all(multipliers))
+        curved = self._curved
+        if convex:
+            values, vectors = np.linalg.eigh(curved)
+            curved = np.einsum("iab,ib,icb->iac", vectors, np.maximum(values, 0.0), vectors)
+        slopes = self.bounds.gradients.transpose(2, 1, 0)
+        weighted = slopes * self._of_all(stiffening).T[:, None]
+        joined = (curved + weighted @ slopes.swapaxes(1, 2)) @ self.group.by_instant
+        size = joined.shape[2]
+        matrix: FloatArray = self.group.by_instant.reshape(-1, size).T @ joined.reshape(-1, size)
+        return matrix
+
+    def _curvature(self, multipliers: FloatArray) -> FloatArray:
+        """Second derivatives of cost and multiplied bounds by rows, (instants, rows, rows), differenced."""
+        moved = [
+            _weighted(self.group.weights, here) + _weighted(multipliers, of_bounds)
+            for here, of_bounds in zip(self._moved_integrands, self._moved_bounds, strict=True)
+        ]
+        here = _weighted(self.group.weights, self.integrands.gradients)
+        here = here + _weighted(multipliers, self.bounds.gradients)
+        second = (np.stack(moved, axis=1) - here[:, None, :]) / self._steps[None, :, None]
+        symmetric: FloatArray = (second + second.swapaxes(0, 1)).transpose(2, 0, 1) / 2
+        return symmetric
+
+    def _of_all(self, of_bounds: FloatArray) -> FloatArray:
+        """Numbers of the bounds there are, and zeros for the others, (bounds, instants)."""
+        spread = np.zeros(self.group.there.shape)
+        spread[self.group.there] = of_bounds
+        return spread
+
+    def _by_unknowns(self, by_rows: FloatArray) -> FloatArray:
+        summed: FloatArray = by_rows.T.ravel() @ self.group.by_instant.reshape(by_rows.size, -1)
+        return summed
+
+
+def _weighted(weights: FloatArray, gradients: FloatArray) -> FloatArray:
+    """The sum of gradients times weights, (rows, instants); what has no weight may be no number."""
+    kept = np.where(weights[:, None, :] != 0, gradients, 0.0)
+    summed: FloatArray = np.sum(weights[:, None, :] * kept, axis=0)
+    return summed
+
+
+class SeparablePoint:
+    """Cost and bounds of a separable problem at unknowns, with their derivatives; a `Point`."""
+
+    def __init__(self, groups: Sequence[Group], unknowns: FloatArray) -> None:
+        self._parts = [_Expanded(group, unknowns) for group in groups]
+        self._size = len(unknowns)
+        self.cost = sum(float(np.sum(part.group.weights * part.integrands.values)) for part in self._parts)
+        of_parts = [part.bounds.values[part.group.there] for part in self._parts]
+        self.bounds = np.concatenate(of_parts)
+        self._ends = np.cumsum([len(bounds) for bounds in of_parts])[:-1]
+        self.gradient = self._spread([part.gradient() for part in self._parts])
+
+    def changes(self, step: FloatArray) -> FloatArray:
+        """See `Point`."""
+        return np.concatenate([part.changes(step) for part in self._parts])
+
+    def pull(self, weights: FloatArray) -> FloatArray:
+        """See `Point`."""
+        return self._spread(
+            [part.pull(own) for part, own in zip(self._parts, np.split(weights, self._ends), strict=True)]
+        )
+
+    def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
+        """See `Point`."""
+        matrix = np.zeros((self._size, self._size))
+        pairs = (np.split(each, self._ends) for each in (multipliers, stiffening))
+        for part, *of_bounds in zip(self._parts, *pairs, strict=True):
+            own = part.group.unknowns
+            matrix[np.ix_(own, own)] += part.newton_matrix(*of_bounds, convex)
+        return matrix
+
+    def _spread(self, of_parts: Sequence[FloatArray]) -> FloatArray:
+        total = np.zeros(self._size)
+        for part, own in zip(self._parts, of_parts, strict=True):
+            total[part.group.unknowns] += own
+        return total
+
+
+@dataclass(frozen=True, eq=False)
+class SeparableProblem:
+    """The sum of the costs of groups under the bounds of all; a `Problem`."""
+
+    groups: Sequence[Group]
+
+    def values(self, unknowns: FloatArray) -> tuple[float, FloatArray]:
+        """Cost and bounds; not finite where they are not defined."""
+        found = [group.values(group.rows(unknowns)) for group in self.groups]
+        return sum(cost for cost, _ in found), np.concatenate([bounds for _, bounds in found])
+
+    def at(self, unknowns: FloatArray) -> SeparablePoint:
+        """The same with derivatives."""
+        return SeparablePoint(self.groups, unknowns)
+
+
+def interior(
+    problem: SeparableProblem, wanted: FloatArray, inside: FloatArray | None = None
+) -> FloatArray | None:
+    """Unknowns near to the wanted ones that keep all bounds; None if the search for them finds none.
+
+    On the way to a place inside, if one is known; else the largest bound is lowered until it is negative.
+    """
+    kept = None
+    for share in PULLS:
+        pulled = wanted if inside is None else wanted + share * (inside - wanted)
+        _, bounds = problem.values(pulled)
+        nearest = bounds.max(initial=-1.0) if np.isfinite(bounds).all() else np.inf
+        kept = pulled if nearest < 0 else kept
+        if nearest < -LEAST_CLEARANCE:
+            break
+    if kept is not None:
+        return kept
+    if not np.isfinite(bounds).all():
+        return None
+    relieved = SeparableProblem([_relieved(group, pulled) for group in problem.groups])
+    start = np.append(pulled, bounds.max() + LEAST_RELIEF)
+    found = minimise(relieved, start, enough=lambda unknowns: bool(unknowns[-1] < -LEAST_RELIEF))
+    return found.unknowns[:-1] if found.unknowns[-1] < 0 else None
+
+
+def _relieved(group: Group, start: FloatArray) -> Group:
+    """The same bounds less a further unknown, which is the cost, with a little more for going far."""
+    rows, instants, own = group.basis.shape
+    basis = np.zeros((rows + 1, instants, own + 1))
+    basis[:-1, :, :-1], basis[-1, :, -1] = group.basis, 1.0
+    return Group(
+        functions=_Relieved(group, group.rows(start)),
+        instants=np.arange(instants),
+        basis=basis,
+        unknowns=np.append(group.unknowns, len(start)),
+        weights=np.full((1, instants), 1 / instants),
+        there=group.there,
+        scales=np.append(group.scales, 1.0),
+        offsets=None if group.offsets is None else np.append(group.offsets, 0.0),
+    )
+
+
+class _Relieved:
+    """`Functions` whose cost is a further row, less which others are bounds."""
+
+    def __init__(self, group: Group, start: FloatArray) -> None:
+        self._group, self._start = group, start
+
+    def __call__(
+        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
+    ) -> tuple[list[Any], list[Any]]:
+        """The relief, and the bounds less that."""
+        *own, relief = rows
+        _, bounds = self._group.functions(own, self._group.instants[instants])
+        sizes = zip(own, self._start[:, instants], self._group.scales, strict=True)
+        away = [(row - begun) / size for row, begun, size in sizes]
+        return [relief + TETHER * sum(each * each for each in away)], [bound - relief for bound in bounds]
+
+
+def missed_instants(missed: FloatArray) -> IndexArray:
+    """Return where any bound, a row of values that are positive where it is missed, shall be kept as well.
+
+    At the worst instant of each stretch and beside it: with the former alone, the next minimum would miss the
+    bound there, and a search would follow it from instant to instant.
+    """
+    worst = np.concatenate([peaks(row) for row in missed])
+    around = worst[:, None] + np.array([-1, 0, 1])
+    return np.unique(np.clip(around, 0, missed.shape[1] - 1))

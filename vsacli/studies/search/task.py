@@ -1,0 +1,396 @@
+"""A task that is to be fixed, the fixes that follow from combinations of changes, and their full runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from vsacli.analysis.joint_report import JointReport
+from vsacli.analysis.run import Run
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray, evenly
+from vsacli.base.signals import STIFFNESS
+from vsacli.dynamics.inverse import usual_block
+from vsacli.robot.joint import Joint
+from vsacli.robot.model import Robot
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range
+from vsacli.studies.search.changed_motion import (
+    rate_of,
+    with_changed_stiffness,
+    with_kept_rate,
+    with_raised_stiffness,
+)
+from vsacli.studies.search.loads import Load, Passage, joint_loads
+from vsacli.studies.search.nearest_profile import Change, nearest_change
+from vsacli.studies.search.scans import (
+    WATCHED_STEPS,
+    smallest_offset,
+    smallest_transition,
+)
+from vsacli.studies.search.suggestions import (
+    JointChange,
+    LongerTransition,
+    Offset,
+    OtherPreload,
+    Remedy,
+    SlowDown,
+    StiffnessOffset,
+    StiffnessProfile,
+)
+from vsacli.trajectory.curves import ClosedForm
+from vsacli.trajectory.times import ResampledTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+
+class Cost(Protocol):
+    """How large changes are; the cost of all together is the root of the sum of the squares."""
+
+    def of_factor(self, factor: float) -> float:
+        """Of a slow-down: 0 for a factor of 1, and growing with it."""
+
+    def of_stiffness(self, asked: FloatArray, change: FloatArray) -> float:
+        """Of what is added to the stiffness of a joint, (samples,): 0 if that is nothing."""
+
+
+class _RelativeChange:
+    """What is changed, relative to what was asked for.
+
+    One part is the factor less 1, the others the root mean square of each joint's change over that of its
+    stiffness: a motion that takes 10 % longer counts as much as a joint that is 10 % stiffer throughout.
+    """
+
+    def of_factor(self, factor: float) -> float:
+        """How much longer the motion takes, relative to its duration."""
+        return factor - 1
+
+    def of_stiffness(self, asked: FloatArray, change: FloatArray) -> float:
+        """How much stiffer or softer the joint becomes, relative to its stiffness."""
+        return math.sqrt(float(np.mean(change**2) / np.mean(asked**2)))
+
+
+RELATIVE_CHANGE: Cost = _RelativeChange()
+
+
+Form = Callable[[Acceptance, Joint, Load], FloatArray]
+"""What to add to the stiffness of a joint so that its load is accepted, (samples,), or an ImpossibleError."""
+
+
+def constant_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray:
+    """The smallest that is the same at every sample."""
+    return np.full(len(load.time), smallest_offset(acceptance, joint, load))
+
+
+def least_change(acceptance: Acceptance, joint: Joint, load: Load) -> FloatArray:
+    """The smallest at each sample by itself, whatever the motors may do: no smooth profile has a smaller."""
+    low, high = checked_range(acceptance, joint, load)
+    if np.any(low > high):
+        raise ImpossibleError(f"corridor and limits leave {joint.name} no stiffness")
+    asked = load.command.commanded["stiffness"]
+    change: FloatArray = np.clip(0.0, low - asked, high - asked)
+    return change
+
+
+@dataclass(frozen=True, eq=False)
+class Combination:
+    """Changes that together mend a motion.
+
+    Attributes:
+        factor: of the slow-down, at least 1.
+        changes: what to add to the stiffness, (samples,), by index of the joint; joints that are fine are
+            left out.
+        preloads: what becomes of the preload, by index of the joint, where it is to be the other one.
+        size: by the cost that was asked for.
+    """
+
+    factor: float
+    changes: Mapping[int, FloatArray]
+    preloads: Mapping[int, str]
+    size: float
+
+    @property
+    def constants(self) -> dict[int, float]:
+        """The changes of stiffness by index of the joint, if they are constant."""
+        return {index: float(change[0]) for index, change in self.changes.items()}
+
+    def robot(self, robot: Robot) -> Robot:
+        """The robot with the preloads of the combination."""
+        return robot.replace(
+            {preload_path(robot, index): preload for index, preload in self.preloads.items()}
+        )
+
+
+AS_IT_IS = Combination(1.0, {}, {}, 0.0)
+
+
+def preload_path(robot: Robot, index: int) -> str:
+    """The path to the preload of a joint in the file of its robot."""
+    return f"joints.{index}.actuator.{robot.joints[index].actuator.preload_field}"
+
+
+_Found = TypeVar("_Found")
+
+REFUSED = ("infeasible", "singular", "over_limit")
+"""Verdicts that no remedy may have; what a record does not determine no remedy changes."""
+
+FINER = 10
+"""Parts into which each step of a remedy is divided to see whether it falls short between them."""
+
+MOST_INSTANTS = 300_000
+"""Instants of a remedy that are looked at: the steps of longer ones are divided into fewer parts."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a robot is asked to do, and the rule for every step.
+
+    Attributes:
+        acceptance: the rule, and the robot.
+        trajectory: what the robot is asked to do.
+        cost: how large a remedy is.
+        keeps_rate: whether a recording that becomes slower has steps at its rate, else at its samples.
+        impossible: numbers of factors at which nothing helps, by form and whether preloads change; they are
+            kept for the same task under a stricter rule.
+    """
+
+    acceptance: Acceptance
+    trajectory: Trajectory
+    cost: Cost = RELATIVE_CHANGE
+    keeps_rate: bool = True
+    impossible: dict[tuple[Form, bool], set[int]] = field(default_factory=dict, compare=False, repr=False)
+
+    def acceptance_with(self, found: Combination) -> Acceptance:
+        """The rule for the robot with the preloads of a combination."""
+        return replace(self.acceptance, robot=found.robot(self.acceptance.robot))
+
+    def with_constants(self, found: Combination) -> Remedy:
+        """The remedy of a combination whose changes of stiffness are constants."""
+        offsets = tuple(
+            Offset(joint.name, found.constants.get(index, 0.0), units.STIFFNESS.unit(joint.type))
+            for index, joint in enumerate(self.acceptance.robot.joints)
+            if "stiffness" in joint.actuator.commanded
+        )
+        changed = any(found.constants.values()) and not self._declares_stiffness
+        stretched, factor = self._stretched(found.factor, changed=changed)
+        raised = with_raised_stiffness(stretched, found.constants)
+        declared, factor = self._kept_rate(raised, factor, found)
+        return Remedy(
+            size=found.size,
+            robot=found.robot(self.acceptance.robot),
+            declared=declared,
+            factor=factor,
+            asked=self.trajectory,
+            slow_down=self._slow_down(found),
+            preload=self._preload(found),
+            stiffness_offset=StiffnessOffset(offsets) if found.changes else None,
+        )
+
+    def with_profiles(self, found: Combination) -> Remedy:
+        """The remedy with slow-down and preloads of a combination, and the nearest profiles that they admit.
+
+        Raises:
+            ImpossibleError: there is none for some joint.
+        """
+        slower, acceptance = self.trajectory.stretched(found.factor), self.acceptance_with(found)
+        robot = acceptance.robot
+        find = partial(_nearest_change, acceptance, slower)
+        changes = for_refused_joints(acceptance, slower, find, found.factor)
+        summaries = tuple(_summary(robot.joints[index], change) for index, (_, change) in changes.items())
+        stretched, factor = self._stretched(found.factor, changed=bool(changes))
+        scale = factor ** np.arange(STIFFNESS.orders)[:, None]
+        at_steps = {index: scale * change.rows[:, load.steps] for index, (load, change) in changes.items()}
+        declared, factor = self._kept_rate(with_changed_stiffness(stretched, at_steps), factor, found)
+        return Remedy(
+            size=self._size(found.factor, [(load, change.rows[0]) for load, change in changes.values()]),
+            robot=robot,
+            declared=declared,
+            factor=factor,
+            asked=self.trajectory,
+            slow_down=self._slow_down(found),
+            preload=self._preload(found),
+            stiffness_profile=StiffnessProfile(summaries) if summaries else None,
+        )
+
+    def with_transition(self) -> Remedy:
+        """The remedy with the shortest transitions between levels of stiffness that do.
+
+        Raises:
+            ImpossibleError: there are none.
+        """
+        before, after, longer = smallest_transition(self.acceptance, self.trajectory)
+        asked, changed = (
+            each.block(0, each.samples).commanded[STIFFNESS.key].T for each in (self.trajectory, longer)
+        )
+        sizes = [
+            self.cost.of_stiffness(old, new - old)
+            for old, new in zip(asked, changed, strict=True)
+            if not np.isnan(old).any()
+        ]
+        return Remedy(
+            size=math.hypot(*sizes),
+            robot=self.acceptance.robot,
+            declared=longer,
+            asked=self.trajectory,
+            transition=LongerTransition(before, after),
+        )
+
+    @property
+    def _declares_stiffness(self) -> bool:
+        return isinstance(self.trajectory.commanded[STIFFNESS.key], ClosedForm)
+
+    def _stretched(self, factor: float, *, changed: bool) -> tuple[Trajectory, float]:
+        """The trajectory passed more slowly by a factor, and by which factor it is still to be stretched.
+
+        A record is stretched after its fit only: that of slower samples could be another one, hum of mains at
+        other frequencies for example. Resampled steps with another stiffness are known as such, at the rate
+        that the stretched ones have.
+
+        Args:
+            factor: how much longer it lasts.
+            changed: whether the stiffness will be recorded at the steps.
+        """
+        resampled = isinstance(self.trajectory.times, ResampledTimes)
+        if self.trajectory.estimates and not (changed and resampled):
+            return self.trajectory, factor
+        return self.trajectory.stretched(factor), 1.0
+
+    def _kept_rate(self, declared: Trajectory, factor: float, found: Combination) -> tuple[Trajectory, float]:
+        """What is declared and is still slower by a factor, at the rate of the task if it can be."""
+        if found.factor == 1 or not self.keeps_rate:
+            return declared, factor
+        return with_kept_rate(declared, factor, rate_of(self.trajectory))
+
+    def constants(self) -> Combination:
+        """The smallest constant changes of stiffness that mend the task by themselves.
+
+        Raises:
+            ImpossibleError: there is none for some joint.
+        """
+        changes = for_refused_joints(
+            self.acceptance,
+            self.trajectory,
+            lambda joint, load: constant_change(self.acceptance, joint, _counting(load, self.trajectory)),
+        )
+        size = self._size(
+            1.0, [(_counting(load, self.trajectory), change) for load, change in changes.values()]
+        )
+        return Combination(1.0, {index: change for index, (_, change) in changes.items()}, {}, size)
+
+    def _size(self, factor: float, changes: Iterable[tuple[Load, FloatArray]]) -> float:
+        sizes = [
+            self.cost.of_stiffness(load.command.commanded["stiffness"], change) for load, change in changes
+        ]
+        return math.hypot(self.cost.of_factor(factor), *sizes)
+
+    def _slow_down(self, found: Combination) -> SlowDown | None:
+        return SlowDown(found.factor, self.trajectory.duration) if found.factor > 1 else None
+
+    def _preload(self, found: Combination) -> OtherPreload | None:
+        names = self.acceptance.robot.joint_names
+        preloads = {names[index]: preload for index, preload in found.preloads.items()}
+        return OtherPreload(preloads) if preloads else None
+
+    def falls_short(self, remedy: Remedy) -> FloatArray | None:
+        """Instants at which a run over the whole of what is suggested misses margin or limits; None if none.
+
+        They are times since the start of the task as it is, s: the worst ones of the run, which looks between
+        its steps, and those of a grid `FINER` times as fine.
+        """
+        run = Run(remedy.robot, remedy.trajectory, near_singular=self.acceptance.near_singular)
+        for _ in run:
+            pass
+        report = run.report()
+        counted = (each for index, each in enumerate(report.joints) if index not in self.acceptance.ignored)
+        short = [joint for joint in counted if self._is_short(joint)]
+        refused = self._refused_between(remedy)
+        if report.self_check.passed and not short and not refused.size:
+            return None
+        worst = [time for joint in short for time in (joint.margin_time, *_times(joint))]
+        elapsed = (np.array(worst) - remedy.trajectory.start) / (1 + remedy.longer)
+        return np.union1d(elapsed[np.isfinite(elapsed)], refused)
+
+    def _is_short(self, joint: JointReport) -> bool:
+        """Whether the report of a joint shows what no remedy may have."""
+        return joint.margin < self.acceptance.near_singular or any(map(joint.shows, REFUSED))
+
+    def _refused_between(self, remedy: Remedy) -> FloatArray:
+        """Some of the instants between the steps of a remedy that are not accepted."""
+        trajectory, factor = remedy.trajectory, 1 + remedy.longer
+        # what is allowed for the noise of a recording is known at its steps; between them the run looks
+        if not trajectory.known_between or trajectory.estimates:
+            return np.empty(0)
+        acceptance = replace(self.acceptance, robot=remedy.robot, between=np.empty(0))
+        steps = (trajectory.times.block(0, trajectory.samples) - trajectory.start) / factor
+        parts = max(1, min(FINER, MOST_INSTANTS // len(steps)))
+        elapsed = (steps[:-1, None] + np.diff(steps)[:, None] * np.arange(1, parts) / parts).ravel()
+        refused = [
+            part[acceptance.refused(Passage.between(trajectory, part, factor)).any(axis=1)]
+            for part in np.array_split(elapsed, 1 + len(elapsed) // usual_block(trajectory.joints))
+        ]
+        found = np.concatenate(refused)
+        return found[evenly(len(found), WATCHED_STEPS)]
+
+
+def _times(joint: JointReport) -> Iterator[float]:
+    """When each kind of trouble of a joint is worst."""
+    yield from (worst.time for worst in (*joint.worst.values(), *joint.between.values()))
+
+
+def for_refused_joints(
+    acceptance: Acceptance,
+    trajectory: Trajectory,
+    find: Callable[[Joint, Load], _Found],
+    factor: float = 1.0,
+) -> dict[int, tuple[Load, _Found]]:
+    """Load, and what is found for it, of each joint with any step that is not accepted, by index.
+
+    Args:
+        acceptance: the rule, and the robot.
+        trajectory: a task, or one that was stretched.
+        find: what is looked for.
+        factor: of the stretching.
+
+    Raises:
+        ImpossibleError: with the reason of each joint for which nothing was found.
+    """
+    refused = np.flatnonzero(acceptance.refused_joints(trajectory, factor)).tolist()
+    found: dict[int, tuple[Load, _Found]] = {}
+    reasons: list[str] = []
+    loads = joint_loads(acceptance.robot, trajectory, refused, factor, acceptance.between)
+    for index, load in zip(refused, loads, strict=True):
+        try:
+            found[index] = load, find(acceptance.robot.joints[index], load)
+        except ImpossibleError as error:
+            reasons += error.reasons
+    if reasons:
+        raise ImpossibleError(*reasons)
+    return found
+
+
+def _counting(load: Load, trajectory: Trajectory) -> Load:
+    """The load where it is known: at the steps alone, if the trajectory is known there alone."""
+    return load if trajectory.known_between else load.at(load.steps)
+
+
+def _nearest_change(acceptance: Acceptance, trajectory: Trajectory, joint: Joint, load: Load) -> Change:
+    """The nearest profile, or the constant if that is nearer."""
+    try:
+        constant = smallest_offset(acceptance, joint, _counting(load, trajectory))
+    except ImpossibleError:
+        constant = None
+    return nearest_change(acceptance, joint, load, constant)
+
+
+def _summary(joint: Joint, change: Change) -> JointChange:
+    largest = int(np.abs(change.rows[0]).argmax())
+    return JointChange(
+        joint=joint.name,
+        largest=float(change.rows[0, largest]),
+        time=float(change.time[largest]),
+        rms=change.rms,
+        unit=units.STIFFNESS.unit(joint.type),
+    )

@@ -1,0 +1,179 @@
+"""Columns of the table of a study: scalars of the report of each run, and variables over time.
+
+Each is declared once as a `Column`. The values of a run stand in a row of numbers, those of one column after
+those of another: `scalars` and `Recorder` make such rows, `arrays_of` and `filled` turn many of them into
+arrays by name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vsacli.analysis.joint_report import JointReport
+from vsacli.analysis.report import Report
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.base.units import Quantity
+from vsacli.base.variables import MOTORS, UNCERTAIN, VARIABLES, Block, deviation
+
+JOINT, MOTOR = ("joint",), ("joint", "motor")
+STEP, TIME = "step", "time"
+
+
+class Column(NamedTuple):
+    """A column of the table.
+
+    Attributes:
+        name: in study files and tables.
+        dims: dimensions after `run`.
+        quantity: its unit.
+        long_name: a few words.
+        of: gives its value, or those of two motors, from what it is kept of; None takes the attribute `name`.
+        whole: whether it is NaN at a joint with infeasible or singular steps, since it would be that of the
+            others alone.
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    quantity: Quantity
+    long_name: str
+    of: Callable[[Any], Any] | None = None
+    whole: bool = False
+
+    def shape(self, joints: int) -> tuple[int, ...]:
+        """Return the shape of its values in one run, or at one step."""
+        return (joints, len(MOTORS))[: len(self.dims) - self.dims.count(STEP)]
+
+    def scalar(self, joint: JointReport) -> float | tuple[float, float]:
+        """Return its value in the report of a joint, or those of its motors."""
+        if self.whole and (joint.steps.get("infeasible") or joint.steps.get("singular")):
+            return (math.nan, math.nan) if self.dims == MOTOR else math.nan
+        found: float | tuple[float, float] = (self.of or attrgetter(self.name))(joint)
+        return found
+
+
+KEPT = {
+    each.name: each
+    for each in (
+        Column("margin", JOINT, units.DIMENSIONLESS, "smallest relative margin to an end of the corridor"),
+        Column("margin_time", JOINT, units.TIME, "when the margin is smallest"),
+        Column(
+            "infeasible_steps",
+            JOINT,
+            units.DIMENSIONLESS,
+            "number of infeasible steps",
+            lambda joint: float(joint.steps.get("infeasible", 0)),
+        ),
+        Column(
+            "first_infeasible",
+            JOINT,
+            units.TIME,
+            "time of the first infeasible step",
+            lambda joint: joint.first_time.get("infeasible", math.nan),
+        ),
+        Column("peak_tau_e", JOINT, units.TORQUE, "largest size of the elastic torque"),
+        Column("peak_tau_motor", MOTOR, units.TORQUE, "largest size of the motor torque", whole=True),
+        Column("peak_dtheta", MOTOR, units.VELOCITY, "largest size of the motor velocity", whole=True),
+        *(
+            Column(name, JOINT, quantity, long_name, attrgetter(f"energy.{attribute}"), whole=True)
+            for name, attribute, quantity, long_name in (
+                ("energy_spent", "spent", units.ENERGY, "energy that the motors spend"),
+                ("energy_recovered", "recovered", units.ENERGY, "energy that the motors take back"),
+                ("elastic_peak", "elastic_peak", units.ENERGY, "largest energy in the springs"),
+                (
+                    "co_contraction",
+                    "co_contraction",
+                    units.TORQUE,
+                    "root mean square of half the difference of the spring torques",
+                ),
+            )
+        ),
+    )
+}
+"""Scalars of the report of each joint, or of each of its motors, by name."""
+
+_NOT_OVER_TIME = {"flags", *(deviation(name) for name in UNCERTAIN)}
+
+OVER_TIME = {
+    name: Column(name, (STEP, *variable.dims), variable.quantity, variable.long_name)
+    for name, variable in VARIABLES.items()
+    if variable.dims in ((), JOINT, MOTOR) and name not in _NOT_OVER_TIME
+}
+"""Variables of results that may be kept over time, by name; `time` is kept with them."""
+
+
+def over_time(names: Sequence[str]) -> tuple[Column, ...]:
+    """Return the variables of these names, after the time; none if there are no names."""
+    return tuple(OVER_TIME[name] for name in dict.fromkeys((TIME, *names))) if names else ()
+
+
+def scalars(kept: Sequence[Column], report: Report) -> FloatArray:
+    """Return the values of a run one after the other, (columns,)."""
+    values = ([each.scalar(joint) for joint in report.joints] for each in kept)
+    return np.concatenate([np.array(each, dtype=float).ravel() for each in values])
+
+
+def width(columns: Sequence[Column], joints: int) -> int:
+    """Return how many numbers a row has."""
+    return sum(math.prod(each.shape(joints)) for each in columns)
+
+
+def arrays_of(columns: Sequence[Column], rows: FloatArray, joints: int) -> dict[str, FloatArray]:
+    """Return rows (..., width) as arrays (..., joints[, 2]) by name."""
+    ends = np.cumsum([math.prod(each.shape(joints)) for each in columns])
+    parts = np.split(rows, ends[:-1], axis=-1)
+    return {
+        each.name: part.reshape(*rows.shape[:-1], *each.shape(joints))
+        for each, part in zip(columns, parts, strict=True)
+    }
+
+
+class Recorder:
+    """Gathers variables from the blocks of a run, in order.
+
+    Args:
+        kept: the variables.
+        every: of so many steps one is kept, from the first on.
+    """
+
+    def __init__(self, kept: Sequence[Column], every: int) -> None:
+        self._kept, self._every = kept, every
+        self._step = 0
+        self._rows: list[FloatArray] = []
+
+    def add(self, block: Block) -> None:
+        """Gather what is kept of the next steps."""
+        if self._kept:
+            first, count = -self._step % self._every, len(block.time)
+            columns = [
+                np.reshape(getattr(block, each.name), (count, -1))[first :: self._every]
+                for each in self._kept
+            ]
+            self._rows.append(np.concatenate(columns, axis=1))
+            self._step += count
+
+    @property
+    def curves(self) -> FloatArray:
+        """What was gathered, one step after the other, all variables of each; flat."""
+        return np.concatenate(self._rows).ravel() if self._rows else np.empty(0)
+
+
+def steps_of(curves: FloatArray, kept: Sequence[Column], joints: int) -> int:
+    """Return how many steps were gathered."""
+    return len(curves) // width(kept, joints) if kept else 0
+
+
+def filled(
+    rows: Sequence[FloatArray], kept: Sequence[Column], steps: int, joints: int
+) -> dict[str, FloatArray]:
+    """Return curves of several runs as arrays (runs, steps, ...) by name, NaN after the end of a run."""
+    table = np.full((len(rows), steps, width(kept, joints)), np.nan)
+    for place, curves in enumerate(rows):
+        count = steps_of(curves, kept, joints)
+        table[place, :count] = curves.reshape(count, -1) if count else np.nan
+    return arrays_of(kept, table, joints)

@@ -1,0 +1,267 @@
+"""Declarations of a trajectory file: of which signals, in which fields, and the curve that follows."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, make_dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeAlias
+
+import numpy as np
+
+from vsacli.base import units
+from vsacli.base.errors import FieldProblem, InputError
+from vsacli.base.signals import POSITION, WRENCH, Signal
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_FRAMES
+from vsacli.documents.fields import (
+    POSITIVE,
+    Check,
+    Items,
+    PerJoint,
+    Vector,
+    boolean,
+    check_fields,
+    choice,
+    number,
+    text,
+    value,
+)
+from vsacli.trajectory.curves.closed_form import ClosedForm
+
+if TYPE_CHECKING:
+    from vsacli.documents.column_mapping import ColumnMapping
+    from vsacli.documents.columns_file import ColumnSource
+    from vsacli.trajectory.fits import FitChoice
+
+
+SAME_TIME = 1e-9
+"""Times whose difference is a smaller share than this are the same, but for rounding in a file."""
+
+Values: TypeAlias = tuple[float | None, ...]
+"""A number for each joint or axis, None for joints that do not take the signal."""
+
+_TIMES = ("not", "once", "twice", "three times", "four times")
+
+
+@dataclass(frozen=True)
+class Use:
+    """What something is declared for.
+
+    Attributes:
+        signal: what is declared.
+        rigid: whether all joints are rigid, so that torques do not depend on jerk and snap.
+    """
+
+    signal: Signal
+    rigid: bool = False
+
+    @property
+    def smoothness(self) -> int:
+        """How many continuous derivatives the signal must have."""
+        return 2 if self.rigid else self.signal.orders - 1
+
+    def one(self, role: str, **options: Any) -> Any:
+        """The field of a value, e.g. `role` "at the start"."""
+        return self._field(self._kind, f"{self.signal.key} {role}", **options)
+
+    def several(self, role: str) -> Any:
+        """The field of a list of values, e.g. `role` "to pass"."""
+        plural = self.signal.key + ("es" if self.signal.key.endswith(("s", "ch")) else "s")
+        return self._field(Items(self._kind), plural + role)
+
+    def size(self, doc: str) -> Any:
+        """The field of a positive value in the unit of the signal, which may be absent."""
+        return value(self._kind, doc, check=POSITIVE, default=None)
+
+    def frame(self) -> dict[str, Any]:
+        """The field that says along whose axes a wrench is given; none for other signals."""
+        if self.signal is not WRENCH:
+            return {}
+        doc = f"along whose axes `{' '.join(WRENCH_AXES)}` are given"
+        return {"frame": choice(WRENCH_FRAMES, doc)}
+
+    def degree(self, degrees: range) -> Check:
+        """Which of these degrees make it smooth enough if it begins and ends at rest."""
+        signal = self.signal
+        subject, vanishing = signal.key, "its rate"
+        if signal is POSITION:
+            subject = "motion"
+            vanishing = "its velocity" if self.rigid else "all derivatives up to the third"
+        smooth = f"the {subject} must be {_TIMES[self.smoothness]} differentiable"
+        return odd(degrees, 2 * self.smoothness - 1, f"{smooth}, so {vanishing} must vanish at the ends")
+
+    @property
+    def _kind(self) -> PerJoint | Vector:
+        unit = self.signal.quantities[0]
+        if self.signal.components is not None:
+            return Vector(self.signal.components, unit)
+        return PerJoint(unit, self.signal.key)
+
+    def _field(self, kind: Any, doc: str, **options: Any) -> Any:
+        return value(kind, doc, check=POSITIVE if self.signal.positive else None, **options)
+
+
+def odd(degrees: range, lowest: int, reason: str) -> Check:
+    """The odd degrees from the lowest on that is smooth enough."""
+    allowed = range(max(lowest, degrees.start), degrees.stop, degrees.step)
+    words = f"odd, {allowed[0]} to {allowed[-1]} ({reason})"
+    return Check(lambda degree: degree in allowed, words, {"enum": list(allowed)})
+
+
+class Declaration(ABC):
+    """A type that a signal may be of in a trajectory file: what is declared, for each of its uses.
+
+    Attributes:
+        use: of the records that `record` makes.
+        frame: along whose axes a wrench is given; other signals have none.
+    """
+
+    use: ClassVar[Use]
+    frame: str
+
+    @classmethod
+    @abstractmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+
+    @classmethod
+    def meaning(cls, _use: Use) -> str:
+        """What it does, for users."""
+        return cls.__doc__ or ""
+
+    @classmethod
+    def record(cls, use: Use) -> type[Self]:
+        """The record class in which it is declared for a use."""
+        made: type[Self] = _record(cls, use)
+        return made
+
+    def __post_init__(self) -> None:
+        check_fields(self, *self._problems())
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        """What is wrong with the record beyond its fields."""
+        return iter(())
+
+
+@cache
+def _record(cls: type[Declaration], use: Use) -> Any:
+    fields = [(name, Any, field) for name, field in cls.fields(use).items()]
+    name = f"{'Rigid' if use.rigid else ''}{use.signal.key.capitalize()}{cls.__name__}"
+    namespace = {"__doc__": cls.meaning(use), "use": use}
+    return make_dataclass(name, fields, bases=(cls,), namespace=namespace, frozen=True)
+
+
+class Recorded(Declaration):
+    """Samples from a CSV table, whose times are those of the trajectory."""
+
+    file: str
+    fit: str | None
+    noise: Values | None
+    bandwidth: float | None
+    columns: Mapping[str, ColumnSource] | None
+    ignore: str | tuple[str | int, ...] | None
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        from vsacli.documents.columns_file import columns_field, ignore_field
+        from vsacli.trajectory.fits import METHODS
+
+        doc = (
+            "spline for derivatives that are not given: through the samples, or near noisy ones by least"
+            " squares, or a smoothing one for noise of any colour; by default what their noise asks for"
+        )
+        file = text("path of the CSV file, relative to the trajectory file")
+        bandwidth = "frequency in Hz above which there is no motion; by default the record tells"
+        fields = {
+            **use.frame(),
+            "file": file,
+            "fit": choice(METHODS, doc, default=None),
+            "noise": use.size("standard deviation of the noise of a sample; by default the record tells"),
+            "bandwidth": number(units.RATE, bandwidth, check=POSITIVE, default=None),
+            "columns": columns_field(),
+            "ignore": ignore_field(),
+        }
+        if use.signal is POSITION:
+            fields["unwrap"] = boolean("take jumps by 2 pi out of revolute joints' angles", default=False)
+        return fields
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        from vsacli.trajectory.fits import SMOOTH
+
+        if self.bandwidth is not None and self.fit not in (None, SMOOTH):
+            message = f"only smoothing splines have one; leave it out, or fit: {self.fit}"
+            yield FieldProblem(("bandwidth",), message)
+
+    @property
+    def chosen(self) -> FitChoice:
+        """What is said of the spline."""
+        from vsacli.trajectory.fits import FitChoice
+
+        return FitChoice(self.fit, self.noise, self.bandwidth)
+
+    @property
+    def mapping(self) -> ColumnMapping:
+        """What is said of the columns of the file."""
+        from vsacli.documents.column_mapping import ColumnMapping
+
+        return ColumnMapping(self.columns or {}, self.ignore or ())
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        columns = f"Samples from a CSV table with the columns {', '.join(WRENCH_AXES)}."
+        return columns if use.signal is WRENCH else super().meaning(use)
+
+
+class Formula(Declaration):
+    """A signal that is given by a formula."""
+
+    @property
+    def signal(self) -> Signal:
+        """What is declared."""
+        return self.use.signal
+
+    @property
+    def lasts(self) -> float | None:
+        """The duration that follows from what is declared, s; None if any will do."""
+        return None
+
+    @abstractmethod
+    def over(self, span: tuple[float, float]) -> ClosedForm:
+        """The profile from the first to the last time of a span, in s."""
+
+    def problems_over(self, duration: float) -> Iterator[FieldProblem]:
+        """What keeps it from lasting so long, in s."""
+        if self.lasts is not None and not same_time(self.lasts, duration):
+            yield FieldProblem((), f"lasts {self.lasts:.10g} s, but the trajectory {duration:.10g} s")
+            return
+        try:
+            self.over((0.0, duration)).at(np.zeros(1))
+        except InputError as error:
+            yield FieldProblem((), str(error))
+
+    def warnings_over(self, _span: tuple[float, float], _joints: Mapping[str, str], /) -> Iterator[str]:
+        """Why it may not be what was meant over a span, in clauses.
+
+        Args:
+            _span: in s.
+            _joints: name and type of each.
+        """
+        return iter(())
+
+    def notes_over(self, _span: tuple[float, float], /) -> Iterator[str]:
+        """What follows from it over a span, in s, that the user did not give, in clauses."""
+        return iter(())
+
+
+def same_time(one: float, other: float) -> bool:
+    """Whether two times are the same but for rounding."""
+    return math.isclose(one, other, rel_tol=SAME_TIME)
+
+
+def numbers(values: Values) -> tuple[float, ...]:
+    """NaN in place of None."""
+    return tuple(math.nan if value is None else value for value in values)

@@ -1,0 +1,171 @@
+"""Polynomials from rest to rest, and values that are held: their curves, and how a file declares them."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import Any, Self
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
+from vsacli.base.signals import POSITION, WRENCH
+from vsacli.base.wrench import WRENCH_AXES
+from vsacli.documents.fields import integer
+from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, Constant, added
+from vsacli.trajectory.curves.declaration import Formula, Use, Values, numbers
+
+
+@dataclass(frozen=True, kw_only=True)
+class RestToRest(ClosedForm):
+    """Polynomial whose derivatives up to (degree-1)/2 vanish at both ends of the span.
+
+    Attributes:
+        degree: odd, 3 to 15.
+        start, end: one value a component, taken exactly at the ends.
+    """
+
+    degree: int
+    start: tuple[float, ...]
+    end: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.degree not in DEGREES:
+            raise InputError.one(f"the degree must be odd, {DEGREES[0]} to {DEGREES[-1]}, not {self.degree}")
+        if len(self.start) != len(self.end):
+            raise InputError.one(f"start has {len(self.start)} values, end has {len(self.end)}")
+
+    @property
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+        return len(self.start)
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples)."""
+        first, last = self.span
+        elapsed, remaining = time - first, last - time
+        late = remaining < elapsed
+        start, end = np.array(self.start), np.array(self.end)
+
+        rows = np.empty((self.signal.orders, self.components, len(time)))
+        rise = _rise(np.minimum(elapsed, remaining) / (last - first), self.degree)
+        np.multiply.outer(end - start, np.where(late, -rise, rise), out=rows[0])
+        rows[0] += np.where(late, end[:, None], start[:, None])
+        for row, rate in zip(rows[1:], _rates(elapsed, remaining, last - first, self.degree), strict=False):
+            np.multiply.outer(end - start, rate, out=row)
+        return rows
+
+    def raised(self, by: Sequence[float]) -> Self:
+        """The same profile with a constant added to each component."""
+        return replace(self, start=added(self.start, by), end=added(self.end, by))
+
+
+def _rise(u: FloatArray, degree: int) -> FloatArray:
+    """The polynomial from 0 at u = 0 to 1 at u = 1: a sum of positive terms, so accurate for small u.
+
+    With m = (degree-1)/2 it is u^(m+1) sum over k = 0..m of binomial(m+k, k) (1-u)^k.
+    """
+    m = (degree - 1) // 2
+    series = np.polyval([math.comb(m + k, k) for k in range(m, -1, -1)], 1 - u)
+    return series * _power(u, m + 1)
+
+
+def _rates(elapsed: FloatArray, remaining: FloatArray, total: float, degree: int) -> Iterator[FloatArray]:
+    """Derivatives 1, 2, ... of that polynomial by time.
+
+    The first is c p^m / T with p = s (1-s), s = elapsed / T, m = (degree-1)/2 and
+    c = degree! / m!^2. Since dp/ds = 1-2s and d(1-2s)/ds = -2, the others are sums of p^i (1-2s)^j as well.
+    """
+    m = (degree - 1) // 2
+    p, slope = elapsed / total * (remaining / total), (remaining - elapsed) / total
+    terms = {(m, 0): math.factorial(degree) / math.factorial(m) ** 2}
+    scale = total
+    while True:
+        rate = np.zeros_like(p)
+        for (i, j), c in terms.items():
+            rate += c / scale * _power(p, i) * _power(slope, j)
+        yield rate
+        terms, scale = _derivative(terms), scale * total
+
+
+def _derivative(terms: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+    """d/ds of the sum of c p^i (1-2s)^j, given and returned as {(i, j): c}."""
+    result: dict[tuple[int, int], float] = defaultdict(float)
+    for (i, j), c in terms.items():
+        if i:
+            result[i - 1, j + 1] += i * c
+        if j:
+            result[i, j - 1] -= 2 * j * c
+    return result
+
+
+def _power(base: FloatArray, exponent: int) -> FloatArray:
+    """base^exponent by multiplication, much faster than `**` on arrays."""
+    return reduce(np.multiply, [base] * exponent, np.ones_like(base))
+
+
+AXES = f", `[{', '.join(WRENCH_AXES)}]`"
+
+
+class Polynomial(Formula):
+    """From one value to another, at rest before and after."""
+
+    degree: int
+    start: Values
+    end: Values
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        degree = "degree of the polynomial"
+        if use.signal is not POSITION:
+            degree += f", odd, {DEGREES[0]} to {DEGREES[-1]}"
+        elif not use.rigid:
+            degree += "; from 3 on if all joints are rigid"
+        return {
+            **use.frame(),
+            "degree": integer(degree, check=use.degree(DEGREES)),
+            "start": use.one("at the start" + (AXES if use.signal is WRENCH else "")),
+            "end": use.one("at the end"),
+        }
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        if use.rigid:
+            same = "The same for a robot whose joints are all rigid"
+            return f"{same}: its torques do not depend on jerk and snap."
+        way = "Rest to rest" if use.signal is POSITION else f"From one {use.signal.key} to another"
+        return f"{way}: all derivatives up to (degree-1)/2 vanish at both ends."
+
+    def over(self, span: tuple[float, float]) -> RestToRest:
+        """The profile from the first to the last time of a span, in s."""
+        start, end = numbers(self.start), numbers(self.end)
+        return RestToRest(signal=self.signal, span=span, degree=self.degree, start=start, end=end)
+
+
+class Hold(Formula):
+    """The same value all the time."""
+
+    value: Values
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        return {**use.frame(), "value": use.one("all the time" + (AXES if use.signal is WRENCH else ""))}
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        if use.signal is POSITION:
+            return "The robot stands still."
+        return f"The same {use.signal.key} all the time."
+
+    def over(self, span: tuple[float, float]) -> Constant:
+        """The profile from the first to the last time of a span, in s."""
+        return Constant(signal=self.signal, span=span, value=numbers(self.value))

@@ -1,0 +1,301 @@
+"""Motions one after the other, as a file declares them; each begins where the one before ends."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import FieldProblem, InvalidRecordError
+from vsacli.base.signals import POSITION
+from vsacli.documents.fields import POSITIVE, Items, OneOf, check_fields, integer, number, value
+from vsacli.trajectory.curves.closed_form import DEGREES, LONGEST, SHORTEST, ClosedForm, Constant
+from vsacli.trajectory.curves.declaration import Declaration, Formula, Use, same_time
+from vsacli.trajectory.curves.polynomial import RestToRest
+from vsacli.trajectory.curves.sinusoids import SumOfSinusoids
+from vsacli.trajectory.curves.steps import Chain, Jump
+from vsacli.trajectory.curves.via_points import Via
+
+Position: TypeAlias = tuple[float, ...]
+
+
+class Part(Declaration):
+    """A motion with a duration of its own; what is declared may leave open where it begins."""
+
+    opening: ClassVar[tuple[str | int, ...]]
+    """Path to where the position at its start is declared."""
+
+    @property
+    @abstractmethod
+    def lasts(self) -> float:
+        """The duration, s."""
+
+    @property
+    @abstractmethod
+    def begins(self) -> Position | None:
+        """The position at the start; None if it is where the part before ends."""
+
+    @abstractmethod
+    def placed(self, span: tuple[float, float], here: Position) -> ClosedForm:
+        """The profile over a span, in s, after a part that ends here."""
+
+    def own_problems(self) -> Iterator[FieldProblem]:
+        """What keeps it from being executed."""
+        return iter(())
+
+
+class _Timed(Part):
+    """A part with a required duration."""
+
+    duration: float
+
+    @classmethod
+    def fields(cls, _use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        return {"duration": number(units.TIME, "duration of the part", check=POSITIVE)}
+
+    @property
+    def lasts(self) -> float:
+        """The duration, s."""
+        return self.duration
+
+
+class Dwell(_Timed):
+    """The robot stands still where the part before ends; at the beginning, where the next part starts."""
+
+    opening = ()
+    begins = None
+
+    def placed(self, span: tuple[float, float], here: Position) -> Constant:
+        """The profile over a span, in s, after a part that ends here."""
+        return Constant(signal=POSITION, span=span, value=here)
+
+
+class PolynomialPart(_Timed):
+    """Rest to rest: all derivatives up to (degree-1)/2 vanish at both ends."""
+
+    opening = ("start",)
+    degree: int
+    start: Position | None
+    end: Position
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        degree = "degree of the polynomial"
+        if not use.rigid:
+            degree += ": from 9 on next to another part; from 5 on if all joints are rigid"
+        return {
+            **super().fields(use),
+            "degree": integer(degree, check=use.degree(DEGREES)),
+            "start": use.one("at the start; where the part before ends, if absent", default=None),
+            "end": use.one("at the end"),
+        }
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
+
+    @property
+    def begins(self) -> Position | None:
+        """The position at the start; None if it is where the part before ends."""
+        return self.start
+
+    def placed(self, span: tuple[float, float], here: Position) -> RestToRest:
+        """The profile over a span, in s, after a part that ends here."""
+        start = here if self.start is None else self.start
+        return RestToRest(signal=POSITION, span=span, degree=self.degree, start=start, end=self.end)
+
+
+class _Standalone(Formula, Part):
+    """A formula that is a part as well: it knows by itself where it begins."""
+
+    @property
+    @abstractmethod
+    def lasts(self) -> float:
+        """The duration, s."""
+
+    @property
+    def begins(self) -> Position:
+        """The position at the start."""
+        start: Position = tuple(self.over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
+        return start
+
+    def placed(self, span: tuple[float, float], _here: Position) -> ClosedForm:
+        """The profile over a span, in s."""
+        return self.over(span)
+
+    def own_problems(self) -> Iterator[FieldProblem]:
+        """What keeps it from being executed."""
+        return self.problems_over(self.lasts)
+
+
+class ViaPart(Via, _Standalone):
+    """A spline through points as above."""
+
+    opening = ("points", 0)
+    duration: float | None
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        doc = "duration of the part, if there are no times"
+        return {**super().fields(use), "duration": number(units.TIME, doc, check=POSITIVE, default=None)}
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        return "The same for a robot whose joints are all rigid." if use.rigid else cls.__doc__ or ""
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        yield from super()._problems()
+        if self.duration is None and self.times is None:
+            yield FieldProblem((), "missing key 'duration' or 'times' (s)")
+        elif self.duration is not None and self.times and not same_time(self.duration, self.times[-1]):
+            message = (
+                f"is {self.duration:.10g} s, but the last of the times {self.times[-1]:.10g} s; leave it out"
+            )
+            yield FieldProblem(("duration",), message)
+
+    @property
+    def lasts(self) -> float:
+        """The duration, s."""
+        duration = self.duration if self.times is None else self.times[-1]
+        assert duration is not None, "see _problems"
+        return duration
+
+
+class SinusoidsPart(SumOfSinusoids, _Standalone):
+    """A sum of sinusoids as above; it needs a `ramp` where another part precedes or follows."""
+
+    opening = ("offset",)
+    duration: float
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        duration = number(units.TIME, "duration of the part", check=POSITIVE)
+        return {**super().fields(use), "duration": duration}
+
+    @property
+    def lasts(self) -> float:
+        """The duration, s."""
+        return self.duration
+
+
+PARTS: dict[str, type[Part]] = {
+    "polynomial": PolynomialPart,
+    "via": ViaPart,
+    "sinusoids": SinusoidsPart,
+    "dwell": Dwell,
+}
+
+
+class Sequence(Formula):
+    """Parts one after the other. Each begins as the one before ends, to the fourth derivative."""
+
+    parts: tuple[Part, ...]
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        parts = {name: part.record(use) for name, part in PARTS.items()}
+        return {"parts": value(Items(OneOf(parts)), "what happens, in this order")}
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """What it does, for users."""
+        return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        problems = list(self._problems()) or list(self._discontinuities())
+        if problems:
+            raise InvalidRecordError(type(self).__name__, problems)
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        unfit = [
+            problem.inside("parts", index)
+            for index, part in enumerate(self.parts)
+            for problem in part.own_problems()
+        ]
+        yield from unfit or self._order_problems()
+
+    def _order_problems(self) -> Iterator[FieldProblem]:
+        moving = [index for index, part in enumerate(self.parts) if not isinstance(part, Dwell)]
+        if not moving:
+            yield FieldProblem(("parts",), "no part moves; take `type: constant`")
+        elif self.parts[moving[0]].begins is None:
+            message = (
+                "missing key 'start' (position at the start), since no part before says where the robot is"
+            )
+            yield FieldProblem(("parts", moving[0]), message)
+        ends = self._ends()
+        if not (ends[-1] <= LONGEST and np.all(np.diff(ends) >= SHORTEST)):
+            durations = [part.lasts for part in self.parts]
+            message = f"durations from {min(durations):g} to {max(durations):g} s cannot follow one another"
+            yield FieldProblem(("parts",), message)
+
+    def _discontinuities(self) -> Iterator[FieldProblem]:
+        with np.errstate(all="ignore"):  # numbers that are too large are noticed elsewhere
+            jumps = list(self.over((0.0, self.lasts)).jumps(self.use.smoothness + 1))
+        for jump in jumps:
+            part = ("parts", jump.part)
+            if jump.order == 0:
+                path = (*part, *self.parts[jump.part].opening, jump.component)
+                yield FieldProblem(path, _elsewhere(jump, path), jump.component)
+            else:
+                name = self.signal.names[jump.order]
+                change = f"{name} jumps from {jump.before:.4g} to {jump.after:.4g} where this part begins"
+                yield FieldProblem(part, f"{change}; {self._remedy()}", jump.component)
+
+    def _remedy(self) -> str:
+        smooth = "twice" if self.use.rigid else "four times"
+        remedy = f"the motion must be {smooth} continuously differentiable, so that parts meet at rest"
+        return f"{remedy}: take degree {2 * self.use.smoothness + 1} or more, and a ramp for sinusoids"
+
+    def _ends(self) -> FloatArray:
+        """Where the parts end, from the start of the first on, s; (parts+1,)."""
+        with np.errstate(over="ignore"):  # an infinite sum is refused
+            return np.concatenate(([0.0], np.cumsum([part.lasts for part in self.parts])))
+
+    @property
+    def lasts(self) -> float:
+        """The sum of the durations, s."""
+        return float(self._ends()[-1])
+
+    def over(self, span: tuple[float, float]) -> Chain:
+        """The profile from the first to the last time of a span, in s."""
+        return Chain(signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span)))
+
+    def _placed(self, span: tuple[float, float]) -> Iterator[tuple[Part, ClosedForm]]:
+        """Each part with its profile."""
+        ends = [*(span[0] + (span[1] - span[0]) * self._ends()[:-1] / self.lasts).tolist(), span[1]]
+        here = next(part.begins for part in self.parts if part.begins is not None)
+        for part, piece in zip(self.parts, pairwise(ends), strict=True):
+            profile = part.placed(piece, here)
+            here = tuple(profile.at(np.array(piece[1:]))[0, :, 0].tolist())
+            yield part, profile
+
+    def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
+        """Those of the parts."""
+        for part, profile in self._placed(span):
+            if isinstance(part, Formula):
+                yield from part.warnings_over(profile.span, joints)
+
+    def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
+        """Those of the parts."""
+        for part, profile in self._placed(span):
+            if isinstance(part, Formula):
+                yield from part.notes_over(profile.span)
+
+
+def _elsewhere(jump: Jump, path: tuple[str | int, ...]) -> str:
+    remedy = "leave this key out" if "start" in path else "begin there"
+    return f"begins at {jump.after:.12g}, but the part before ends at {jump.before:.12g}; {remedy}"

@@ -1,0 +1,201 @@
+"""Curves one after the other, and levels that are held with rest-to-rest changes between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from vsacli.base import units
+from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import FieldProblem, InputError
+from vsacli.base.signals import WRENCH, Signal
+from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, Number, integer, number, value
+from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, Constant
+from vsacli.trajectory.curves.declaration import SAME_TIME, Formula, Use, Values, numbers, odd
+from vsacli.trajectory.curves.polynomial import AXES, RestToRest
+from vsacli.trajectory.times import stretch
+
+CONTINUOUS = 1e-9
+"""Largest jump that passes for none, relative to the peak of the value or derivative in both parts."""
+
+PROBES = 101
+"""Times at which the peak is looked for in each part."""
+
+
+class Jump(NamedTuple):
+    """Where one part does not begin as the one before ends.
+
+    Attributes:
+        part: index of the later part.
+        order: of the derivative, the lowest that jumps there.
+        component: index; the first that jumps, if the value itself is continuous.
+        before, after: what it jumps from and to.
+    """
+
+    part: int
+    order: int
+    component: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chain(ClosedForm):
+    """Several profiles, each of which begins when the one before ends.
+
+    Attributes:
+        parts: of the same signal and components; their spans adjoin and fill that of the whole.
+    """
+
+    parts: tuple[ClosedForm, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        ends = [self.span[0], *(end for part in self.parts for end in part.span), self.span[1]]
+        if ends[::2] != ends[1::2]:
+            raise InputError.one("the parts of a profile must adjoin and fill its span")
+        if len({part.components for part in self.parts}) > 1:
+            raise InputError.one("the parts of a profile must have the same number of components")
+
+    @property
+    def components(self) -> int:
+        """Number of components: one a joint, or six of a wrench."""
+        return self.parts[0].components
+
+    @cached_property
+    def breakpoints(self) -> FloatArray:
+        """Those of the parts."""
+        return np.unique(np.concatenate([part.breakpoints for part in self.parts]))
+
+    def at(self, time: FloatArray) -> FloatArray:
+        """Value and derivatives at any times of the span, shape (orders, components, samples).
+
+        Where two parts meet, those of the later one.
+        """
+        starts = [part.span[0] for part in self.parts]
+        which = np.searchsorted(starts[1:], time, side="right")
+        rows = np.empty((self.signal.orders, self.components, len(time)))
+        for index in np.unique(which).tolist():
+            chosen = which == index
+            rows[:, :, chosen] = self.parts[index].at(time[chosen])
+        return rows
+
+    def stretched(self, factor: float) -> Self:
+        """The same profile, every part slower by a factor."""
+
+        def later(span: tuple[float, float]) -> tuple[float, float]:
+            start, end = (stretch(time, self.span[0], factor) for time in span)
+            return start, end
+
+        parts = tuple(replace(part, span=later(part.span)) for part in self.parts)
+        return replace(self, span=later(self.span), parts=parts)
+
+    def raised(self, by: Sequence[float]) -> Self:
+        """The same profile with a constant added to each component of every part."""
+        return replace(self, parts=tuple(part.raised(by) for part in self.parts))
+
+    def jumps(self, orders: int) -> Iterator[Jump]:
+        """Between which parts the value or a derivative, `orders` functions in all, is discontinuous."""
+        for index, (before, after) in enumerate(pairwise(self.parts), start=1):
+            left, right = before.at(np.array(before.span)), after.at(np.array(after.span))
+            difference = np.abs(right[:orders, :, 0] - left[:orders, :, 1])
+            peaks = np.maximum(_peaks(before), _peaks(after))[:orders]
+            found = np.argwhere(difference > CONTINUOUS * peaks).tolist()
+            lowest = [(order, component) for order, component in found if order == found[0][0]]
+            for order, component in lowest if lowest and lowest[0][0] == 0 else lowest[:1]:
+                sides = left[order, component, 1], right[order, component, 0]
+                yield Jump(index, order, component, *map(float, sides))
+
+
+def _peaks(profile: ClosedForm) -> FloatArray:
+    """Largest absolute value of each order and component, (orders, components)."""
+    peaks: FloatArray = np.abs(profile.at(np.linspace(*profile.span, PROBES))).max(axis=2)
+    return peaks
+
+
+def stepwise(
+    signal: Signal,
+    span: tuple[float, float],
+    degree: int,
+    levels: Sequence[tuple[float, ...]],
+    changes: Sequence[tuple[float, float]],
+) -> Chain:
+    """Levels that are held, with rest-to-rest changes from each to the next.
+
+    Args:
+        signal: what steps.
+        span: of the whole, s.
+        degree: of the changes.
+        levels: one value a component each.
+        changes: when each change begins and ends, s; one less than levels.
+    """
+    parts: list[ClosedForm] = []
+    held_from = span[0]
+    for (before, after), (start, end) in zip(pairwise(levels), changes, strict=True):
+        if start > held_from:
+            parts.append(Constant(signal=signal, span=(held_from, start), value=before))
+        parts.append(RestToRest(signal=signal, span=(start, end), degree=degree, start=before, end=after))
+        held_from = end
+    if span[1] > held_from:
+        parts.append(Constant(signal=signal, span=(held_from, span[1]), value=levels[-1]))
+    return Chain(signal=signal, span=span, parts=tuple(parts))
+
+
+_SMOOTH = (
+    "it must be twice continuously differentiable, so two derivatives must vanish where it begins to change"
+)
+
+
+class Steps(Formula):
+    """Levels that are held, with rest-to-rest changes from each to the next."""
+
+    degree: int
+    levels: tuple[Values, ...]
+    times: tuple[float, ...]
+    transition: float
+
+    @classmethod
+    def fields(cls, use: Use) -> dict[str, Any]:
+        """The declared fields by name."""
+        degree = "degree of the polynomials that lead from level to level"
+        times = "when the change to each further level begins, from the start on; one less than levels"
+        axes = f" {AXES.removeprefix(', ')}" if use.signal is WRENCH else ""
+        return {
+            **use.frame(),
+            "degree": integer(degree, check=odd(DEGREES, 2 * use.smoothness + 1, _SMOOTH)),
+            "levels": use.several(f"{axes}, the first from the start on"),
+            "times": value(Items(Number(units.TIME)), times, check=NON_NEGATIVE),
+            "transition": number(units.TIME, "how long each change lasts", check=POSITIVE),
+        }
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        if len(self.times) != len(self.levels) - 1:
+            expected = f"{len(self.levels) - 1}, one for each level but the first"
+            yield FieldProblem(("times",), f"expected {expected}, found {len(self.times)}")
+        for index, (before, after) in enumerate(pairwise(self.times), start=1):
+            if not before + self.transition <= after * (1 + SAME_TIME):
+                message = f"{after:g} s is before the change that begins at {before:g} s ends"
+                yield FieldProblem(("times", index), f"{message}, {self.transition:g} s later")
+
+    def problems_over(self, duration: float) -> Iterator[FieldProblem]:
+        """What keeps it from lasting so long, in s."""
+        end = self.times[-1] + self.transition
+        if not end <= duration * (1 + SAME_TIME):
+            message = f"the last change ends at {end:.10g} s, the trajectory at {duration:.10g} s"
+            yield FieldProblem(("times", len(self.times) - 1), message)
+        else:
+            yield from super().problems_over(duration)
+
+    def over(self, span: tuple[float, float]) -> Chain:
+        """The profile from the first to the last time of a span, in s."""
+        starts = [span[0] + time for time in self.times]
+        ends = [
+            min(start + self.transition, after) for start, after in pairwise([*starts, span[1]])
+        ]  # rounding must not make them overlap
+        levels, changes = list(map(numbers, self.levels)), list(zip(starts, ends, strict=True))
+        return stepwise(self.signal, span, self.degree, levels, changes)
