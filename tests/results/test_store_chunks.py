@@ -7,10 +7,13 @@ import os
 import threading
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import h5py
 import numpy as np
 import pytest
+from h5py._objects import phil
 from samples.marks import slow
 from samples.results import (
     REPORT,
@@ -123,6 +126,25 @@ def test_compressed_chunks_are_those_of_the_library(tmp_path: Path, flags: np.nd
         for start in (0, 40, 80):
             ours, theirs = (file[name].id.read_direct_chunk((start, 0)) for name in ("ours", "theirs"))
             assert ours == theirs
+
+
+def test_no_other_thread_uses_hdf5_while_a_chunk_is_written() -> None:
+    free: list[bool] = []
+
+    def try_lock() -> None:
+        free.append(phil.acquire(False))
+        if free[-1]:
+            phil.release()
+
+    def write_direct_chunk(_start: tuple[int, ...], _values: np.ndarray) -> None:
+        other = threading.Thread(target=try_lock)
+        other.start()
+        other.join()
+
+    low_level = SimpleNamespace(write_direct_chunk=write_direct_chunk)
+    dataset = SimpleNamespace(id=low_level, chunks=(4,), dtype="f8", compression_opts=None)
+    ChunkFiller(cast(h5py.Dataset, dataset), lambda task, _: task()).append(np.ones(4))
+    assert free == [False]
 
 
 @pytest.mark.usefixtures("small_chunks", "in_a_thread")

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
+from h5py._objects import phil
 
 from vsacli.base.arrays import AnyArray
 from vsacli.base.interrupts import interrupts_deferred
@@ -293,4 +294,5 @@ class ChunkFiller:
     def _write(self, start: int, values: AnyArray) -> None:
         """Write a chunk past the library's cache."""
         content = values if self._level is None else zlib.compress(values.data, self._level)
-        self._dataset.id.write_direct_chunk((start, *(0 for _ in values.shape[1:])), content)
+        with phil:  # which h5py takes in every call, but in this one only from version 3.16 on
+            self._dataset.id.write_direct_chunk((start, *(0 for _ in values.shape[1:])), content)
