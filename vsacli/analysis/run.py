@@ -19,9 +19,10 @@ from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import NEAR_SINGULAR_MARGIN, Flag, check_near_singular, has
+from vsacli.base.progress import Tell, unheard
 from vsacli.base.units import time_text
 from vsacli.base.variables import Block
-from vsacli.compute.engine import Engine, Tell, choose, unheard
+from vsacli.compute.engine import Engine, choose
 from vsacli.dynamics.balances import BALANCES, BalancedDynamics
 from vsacli.dynamics.energy import RunEnergy
 from vsacli.dynamics.inverse import block_of, fitted, usual_block

@@ -1,4 +1,4 @@
-"""How long work tells how far it is, if anybody asked."""
+"""How long work shows its progress and passes sentences to the user, if anybody listens."""
 
 from __future__ import annotations
 
@@ -36,3 +36,11 @@ def unseen(steps: int) -> AbstractContextManager[NoBar]:
     """A bar for work of so many steps that nobody watches."""
     del steps
     return nullcontext(NoBar())
+
+
+Tell: TypeAlias = Callable[[str], object]
+"""Receives a sentence for the user."""
+
+
+def unheard(_sentence: str) -> None:
+    """Drop the sentence: nobody listens."""

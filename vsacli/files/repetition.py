@@ -15,9 +15,9 @@ from vsacli.analysis.run import Run
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
+from vsacli.base.progress import Tell, unheard
 from vsacli.base.storage import reading_copies, reporting_temporary_errors, temporary_folder
 from vsacli.base.variables import Block
-from vsacli.compute.engine import Tell, unheard
 from vsacli.results.exports.selection import check_rate, stride_of
 from vsacli.results.store import study_table
 from vsacli.results.store.inputs import StoredInput

@@ -1,7 +1,7 @@
 """Who carries out a computation on rows of samples: NumPy, or code from a C compiler."""
 
 from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, Settled, choose, processors, settle
-from vsacli.compute.engine.engines import Engine, Kernel, Tell, samples_per_pass, unheard
+from vsacli.compute.engine.engines import Engine, Kernel, samples_per_pass
 
 __all__ = [
     "NAMES",
@@ -10,10 +10,8 @@ __all__ = [
     "Engine",
     "Kernel",
     "Settled",
-    "Tell",
     "choose",
     "processors",
     "samples_per_pass",
     "settle",
-    "unheard",
 ]

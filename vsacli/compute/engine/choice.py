@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
+from vsacli.base.progress import Tell, unheard
 from vsacli.compute.engine.engines import (
     SAMPLES_PER_PASS,
     Engine,
     Kernel,
     NumPyEngine,
-    Tell,
     TracedEngine,
     samples_per_pass,
-    unheard,
 )
 
 if TYPE_CHECKING:

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from functools import lru_cache, partial
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.progress import Tell
 from vsacli.compute.engine.compiler import Compiler, Library
-from vsacli.compute.engine.engines import Kernel, Tell, kernel_program
+from vsacli.compute.engine.engines import Kernel, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.engine.libraries import Code, Loaded, Worthwhile, load
 from vsacli.compute.tracing import Program, Symbol

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -62,14 +62,6 @@ def passes(rows: Sequence[FloatArray]) -> Iterator[slice]:
     samples = samples_per_pass(len(rows))
     for start in range(0, len(rows[0]), samples):
         yield slice(start, start + samples)
-
-
-Tell = Callable[[str], None]
-"""Receives a sentence for the user."""
-
-
-def unheard(_sentence: str) -> None:
-    """Nobody is told."""
 
 
 class Engine(Protocol):

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from vsacli.base.errors import StorageError
+from vsacli.base.progress import Tell
 from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.compute.engine.cache import LIBRARY, Cache, CacheError, key_of, open_cache
 from vsacli.compute.engine.compiler import TIMEOUT, Compiler, CompilerError
-from vsacli.compute.engine.engines import Tell
 
 COMPILER_START_SECONDS = 0.25
 COMPILER_SECONDS_PER_OPERATION = 4.5e-5

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.progress import Tell, unheard
 from vsacli.compute.engine.choice import check_engine, compiled_as_asked
 from vsacli.compute.engine.compiler import CompilerError, system_compiler
-from vsacli.compute.engine.engines import Tell, unheard
 from vsacli.compute.engine.libraries import Code, Worthwhile, load
 from vsacli.compute.tracing.python_functions import number_function
 from vsacli.control.simulation.boundaries import Boundary

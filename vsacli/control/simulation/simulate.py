@@ -16,7 +16,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has
-from vsacli.compute.engine import Tell, unheard
+from vsacli.base.progress import Tell, unheard
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, LinearizingFeedback

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from vsacli.base.errors import InputError, check_path
 from vsacli.base.outputs import Outputs
-from vsacli.base.progress import Progress, unseen
-from vsacli.compute.engine import unheard
+from vsacli.base.progress import Progress, unheard, unseen
 from vsacli.results.store.study_table import StoredStudy
 from vsacli.studies.sweeps.executors import executor
 from vsacli.studies.sweeps.journal import Journal
