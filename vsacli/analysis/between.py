@@ -64,7 +64,7 @@ class Minima(NamedTuple):
     crossed: BoolArray
 
     def where(self, chosen: BoolArray) -> Minima:
-        """Some of them."""
+        """Return some of them."""
         return Minima(
             self.block.taken(chosen),
             self.quantity[chosen],
@@ -203,7 +203,7 @@ class Between:
             self._keep(found.where(lower), steps.first + nearest[lower], crossed[lower])
 
     def _chosen(self, given: Brackets, steps: FloatArray) -> Brackets:
-        """The worst of each quantity in a run so far, of those whose minimum is not at a step and counts.
+        """Return the brackets with the lowest minima of each quantity so far that lie between samples.
 
         A minimum counts if more may be flagged there than in the middle, or if it may be the least.
         """
@@ -223,7 +223,7 @@ class Between:
         return given.where(chosen)
 
     def _flagged_below(self, quantity: IndexArray, clearance: FloatArray) -> FloatArray:
-        """The clearance next below others at which quantities get a further flag; -inf if they have all."""
+        """Return the clearance below which each quantity gets a further flag; -inf if it has all."""
         first = self._flagged[quantity]
         return np.where(clearance >= first, first, np.where(clearance >= 0, 0.0, -np.inf))
 
@@ -239,7 +239,7 @@ class Between:
             self._found.append(Minima(block.replaced(**own), *rows))
 
     def _evaluated(self, quantity: IndexArray, times: FloatArray) -> FloatArray:
-        """The clearances of quantities (n,) at times of their own, (n, times)."""
+        """Return the clearances of quantities (n,) at times of their own, (n, times)."""
         wanted = np.repeat(quantity, times.shape[1])
         parts = [
             values[wanted[part], np.arange(values.shape[1])] for part, values in self._computed(times.ravel())
@@ -247,7 +247,7 @@ class Between:
         return np.concatenate(parts).reshape(times.shape)
 
     def _computed(self, time: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
-        """The clearances of all quantities at any times, in blocks."""
+        """Yield the clearances of all quantities at any times, in blocks."""
         for part in self._parts(len(time)):
             block = self._compute(self._trajectory.at(time[part]))
             yield part, clearances(self.quantities, block)
@@ -259,5 +259,5 @@ class Between:
 
 
 def _of_joints(block: Block) -> dict[str, AnyArray]:
-    """The variables of joints, by name."""
+    """Return the variables of joints, by name."""
     return {name: array for name, array in block.arrays().items() if "joint" in block.declared[name].dims}

@@ -212,7 +212,7 @@ def _energy_balances(kernel: BalancedDynamics, block: Block) -> Iterator[FloatAr
 
 
 def _on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> FloatArray:
-    """A variable of a block of the shape (scales, offsets, times), (*shape, joints, motors or 1)."""
+    """Return a variable of a block of the shape (scales, offsets, times), (*shape, joints, motors or 1)."""
     values: FloatArray = getattr(block, name).reshape(*shape, len(robot.joints), -1)
     return np.where([_compared(joint.actuator, name) for joint in robot.joints], values, 0.0)
 
@@ -281,7 +281,7 @@ class _RungErrors:
         self._peak = np.maximum(self._peak, np.max(size, axis=0, where=valid, initial=0.0))
 
     def relative(self) -> tuple[FloatArray, FloatArray]:
-        """The error nearest to its bound of any joint at each time, and that bound, (times,) each.
+        """Return the error nearest to its bound of any joint at each time, and that bound, (times,) each.
 
         Of the steps that counts at which error and noise are least: noise grows as steps shrink, and a
         wrong derivative is wrong at each of them.
@@ -309,13 +309,13 @@ class _RungErrors:
 
 
 def _combined(weights: FloatArray, values: FloatArray) -> FloatArray:
-    """A weighted sum over the offsets of values (scales, offsets, ...)."""
+    """Return a weighted sum over the offsets of values (scales, offsets, ...)."""
     scales, offsets, *rest = values.shape
     return (weights @ values.reshape(scales, offsets, -1)).reshape(scales, *rest)
 
 
 def _largest_near(noise: FloatArray) -> FloatArray:
-    """The largest of each time (axis 1) and its neighbors."""
+    """Return the largest of each time (axis 1) and its neighbors."""
     largest = noise.copy()
     for shift in range(1, min(NEIGHBORS + 1, noise.shape[1])):
         np.maximum(largest[:, shift:], noise[:, :-shift], out=largest[:, shift:])
@@ -396,7 +396,7 @@ class BalanceCheck:
         self._damped_size = np.maximum(self._damped_size, block.damped_size.max(axis=0))
 
     def residuals(self) -> tuple[float, float]:
-        """The largest of springs and of shafts, scaled; NaN if a number is missing at a regular step."""
+        """Return the largest scaled residual of springs and of shafts; NaN if a number is missing."""
         probed = {name: np.concatenate([each[name] for each in self._excerpts]) for name in self._excerpts[0]}
         of_joints = [of_joint(probed, index) for index in range(len(self._joints))]
         apart = balances(self._joints, of_joints)

@@ -180,7 +180,7 @@ class DryFrictionSummary:
 
 
 def dry_frictions(motors: Sequence[JointMotor]) -> list[DryFrictionSummary]:
-    """A summary of each motor of a joint whose friction is that of the sign function."""
+    """Return a summary of each motor of a joint whose friction is that of the sign function."""
     return [
         DryFrictionSummary(number, motor)
         for number, motor in enumerate(motors, 1)

@@ -181,7 +181,7 @@ class JointReport(Stored):
     }
 
     def shows(self, verdict: str) -> bool:
-        """Whether the joint is a reason for a verdict that is not ok."""
+        """Return whether the joint is a reason for a verdict that is not ok."""
         if verdict == "doubtful":
             return self.uncertainty is not None and bool(self.uncertainty.undetermined)
         return bool(self.steps.get(verdict))

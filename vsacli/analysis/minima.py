@@ -55,7 +55,7 @@ class Bounded(NamedTuple):
         return np.fmax(gap, -np.inf)
 
     def at(self, block: Block, step: int) -> Worst:
-        """A step of a block as a report has it: the value, and the nearer bound."""
+        """Return a step of a block as a report has it: the value, and the nearer bound."""
         of_joint, limit = block.of_joint(self.number), self.limit
         if limit is None:
             kind, motor, unit = MARGIN, None, units.STIFFNESS.unit(self.joint.type)
@@ -125,7 +125,7 @@ class Known(NamedTuple):
         return self.first + len(self.time)
 
     def last(self, count: int) -> Known:
-        """The last so many."""
+        """Return the last so many."""
         dropped = max(0, len(self.time) - count)
         return Known(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
 
@@ -193,7 +193,7 @@ class Brackets(NamedTuple):
         return lowest
 
     def where(self, chosen: BoolArray | IndexArray) -> Brackets:
-        """Some of them."""
+        """Return some of them."""
         return Brackets(self.function[chosen], self.time[chosen], self.value[chosen])
 
 
@@ -210,7 +210,7 @@ def brackets(known: Known) -> Brackets:
 
 
 def narrowed(given: Brackets, evaluate: Evaluate) -> Brackets:
-    """The brackets, so narrow that each minimum is known; all of them are computed together, in rounds."""
+    """Return the brackets narrowed until each minimum is known; every round computes all of them together."""
     function, time, value = given.function, given.time.copy(), given.value.copy()
     open_ = np.flatnonzero(given.unknown)
     for _ in range(ROUNDS):
@@ -222,7 +222,7 @@ def narrowed(given: Brackets, evaluate: Evaluate) -> Brackets:
 
 
 def _round(given: Brackets, evaluate: Evaluate) -> Brackets:
-    """The lowest of the three times and of new ones between them, with its neighbours."""
+    """Return the lowest of the three times and of new ones between them, with its neighbours."""
     left, middle, right = np.hsplit(given.time, 3)
     close = given.lowest_of_parabola + CLOSE * (right - left)
     new = np.hstack(

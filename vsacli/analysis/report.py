@@ -70,7 +70,7 @@ class Report(Stored):
         return "integrate" if self.drifts else "root"
 
     def as_text(self) -> ReportText:
-        """The report in its parts, as people read it."""
+        """Return the report in its parts, as people read it."""
         lines = [
             *text.warnings_and_notes(self.warnings, self.notes),
             *sentences(self.joints),
@@ -88,7 +88,7 @@ class Report(Stored):
         return ReportText(self._headline(), text.joint_rows(self.joints), lines)
 
     def __str__(self) -> str:
-        """The lines that the commands print, without a final newline."""
+        """Return the lines that the commands print, without a final newline."""
         return str(self.as_text())
 
     def _headline(self) -> str:

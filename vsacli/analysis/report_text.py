@@ -66,7 +66,7 @@ TROUBLE = ("doubtful", "infeasible", "singular", "over_limit")
 
 
 def warnings_and_notes(warnings: Iterable[str], notes: Iterable[str]) -> Iterator[str]:
-    """A line each, marked as what it is."""
+    """Yield a line each, marked as what it is."""
     yield from (f"warning: {warning}" for warning in warnings)
     yield from (f"note: {note}" for note in notes)
 
@@ -81,7 +81,7 @@ def headline(left: str, verdict: str, joints: Sequence[JointReport]) -> str:
 
 
 def joint_rows(joints: Iterable[JointReport]) -> list[tuple[str, ...]]:
-    """A table of peaks, stiffness, and what of it can be reached, below its header."""
+    """Return a table of peaks, stiffness, and what of it can be reached, below its header."""
     header = ("joint", "peak tau_e", "peak motor 1 / 2", "stiffness", "reachable", "margin")
     return [header, *map(_row, joints)]
 
@@ -191,7 +191,7 @@ def _positions(joint: JointReport, theta: tuple[float, float], step: str) -> str
 def _moving(
     label: str, joints: Sequence[JointReport], velocities: Sequence[tuple[float, float]]
 ) -> Iterator[str]:
-    """The joints whose motors do not rest at an end of the motion, and how fast they are."""
+    """Yield the joints whose motors do not rest at an end of the motion, and how fast they are."""
     fastest = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
     moving = {
         number: f"{_signed(of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
@@ -252,7 +252,7 @@ def of_joints(label: str, said: Mapping[int, str], names: Sequence[str]) -> str:
 
 
 def self_check_line(check: SelfCheck) -> str:
-    """Whether the self-check passed, and by how much."""
+    """Return whether the self-check passed, and by how much."""
     if check.passed:
         return f"self-check passed ({check.ladder:.1g}, bound {check.ladder_bound:.0e})"
     return (

@@ -120,7 +120,7 @@ class Result(Shown, Block):
         return figures
 
     def to_xarray(self) -> xarray.Dataset:
-        """The variables as an `xarray.Dataset`, with named dimensions, units and flags as in the file.
+        """Return the variables as an `xarray.Dataset`, with named dimensions, units and flags as in the file.
 
         Raises:
             ModuleNotFoundError: xarray is not installed; the sentence says how to get it.
@@ -165,7 +165,7 @@ class ResultFile(Shown, StoredResult):
         return sorted({*super().__dir__(), *self.variables})
 
     def arrays(self) -> Mapping[str, Any]:
-        """All variables of the file by name, `time` first."""
+        """Return all variables of the file by name, `time` first."""
         return {name: getattr(self, name) for name in ("time", *self.variables)}
 
     def plot(
@@ -189,7 +189,7 @@ class ResultFile(Shown, StoredResult):
         return figures
 
     def to_xarray(self) -> xarray.Dataset:
-        """All variables of the file as an `xarray.Dataset`; see `Result.to_xarray`."""
+        """Return all variables of the file as an `xarray.Dataset`; see `Result.to_xarray`."""
         from vsacli.results.exports.formats import labelled_dataset
 
         return labelled_dataset(self.arrays(), self.joint_names, self.joint_types)

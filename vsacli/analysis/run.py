@@ -178,7 +178,7 @@ class Run:
         return {**self.choice.provenance, "options": json.dumps(options)}
 
     def report(self) -> Report:
-        """The verdict on the blocks so far, with the self-check of the whole."""
+        """Return the verdict on the blocks so far, with the self-check of the whole."""
         complete = self._samples == self.trajectory.samples
         found = zip(self._energy.report(), self._between.reports(), self._uncertainties(), strict=True)
         return Report(
@@ -222,7 +222,7 @@ class Run:
 
 
 def _is_long(robot: Robot) -> bool:
-    """Whether memory bounds the blocks of a chain, so that none is computed beside another."""
+    """Return whether memory bounds the blocks of a chain, so that none is computed beside another."""
     return usual_block(len(robot.joints)) < usual_block(1)
 
 
@@ -265,7 +265,7 @@ def inverse_dynamics(
 def _integrated(
     deflections: str | IntegratedDeflections, robot: Robot, trajectory: Trajectory
 ) -> IntegratedDeflections | None:
-    """The deflections to use instead of the root of (14) at each step; None if the root shall be used."""
+    """Return the deflections to use instead of the root of (14) at each step; None for the root."""
     if not isinstance(deflections, str):
         return deflections
     if deflections not in DEFLECTIONS:

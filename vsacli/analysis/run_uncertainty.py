@@ -27,7 +27,7 @@ WITHIN = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR}
 
 
 def judged_variables(names: Iterable[str], robot: Robot) -> tuple[str, ...]:
-    """The variables whose uncertainty decides whether what was asked for is determined.
+    """Return the variables whose uncertainty decides whether what was asked for is determined.
 
     Whether steps can be done, `flags`, depends on elastic torques, and on what the limits of the robot bound.
     What has no deviation of its own is judged by the motor torques, which depend on everything.
@@ -75,7 +75,7 @@ class RunUncertainty:
         return Uncertainty(self._robot, self._trajectory, self._engine)
 
     def add(self, block: Block) -> Block:
-        """The block with its deviations, and without limits that may be kept; merged into the report."""
+        """Return the block with its deviations and limit flags, and merge it into the report."""
         deviations = self._deviations.at(block.time)
         self._count_steps(block, deviations.pop(MARGIN))
         inside = (block.time >= self._inside[0]) & (block.time <= self._inside[1])
@@ -89,7 +89,7 @@ class RunUncertainty:
         return self._with(deviations, block)
 
     def judged(self, block: Block) -> Block:
-        """A block of other times than steps with its deviations, and without limits that may be kept."""
+        """Return a block of times between the steps with its deviations and limit flags."""
         deviations = self._deviations.at(block.time)
         del deviations[MARGIN]
         return self._with(deviations, block)

@@ -259,6 +259,6 @@ def _pair(values: FloatArray) -> tuple[float, float]:
 
 
 def _worst_step(hit: BoolArray, badness: FloatArray) -> Iterator[int]:
-    """The step with the largest badness among those hit, if there is one."""
+    """Yield the step with the largest badness among those hit, if there is one."""
     if hit.any():
         yield int(np.where(hit, badness, -np.inf).argmax())

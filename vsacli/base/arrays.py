@@ -31,18 +31,18 @@ def over_time(rows: FloatArray) -> FloatArray:
 
 
 def by_joint(array: ArrayLike) -> FloatArray:
-    """The inverse of `over_time`, with contiguous samples; copies only an array laid out otherwise."""
+    """Return the inverse of `over_time`, with contiguous samples; copies only an array laid out otherwise."""
     return np.ascontiguousarray(np.moveaxis(np.asarray(array, dtype=np.float64), 0, -1))
 
 
 def contiguous_rows(array: FloatArray) -> list[FloatArray]:
-    """The rows (samples,) of an array over time, each contiguous; copies only what is laid out otherwise."""
+    """Return the rows (samples,) of an array over time, contiguous; copy only where they are not."""
     rows = np.moveaxis(array, 0, -1).reshape(-1, len(array))
     return list(map(np.ascontiguousarray, rows))
 
 
 def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:
-    """The array as float64, if it has this shape, or one axis of samples before it.
+    """Return the array as float64, if it has this shape, or one axis of samples before it.
 
     Raises:
         InputError: it has another shape, or holds something else than numbers.

@@ -9,13 +9,13 @@ MOST_NEAR = 3
 
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:
-    """The valid word that is most like this one or alone begins with it, or None if none is close."""
+    """Return the valid word that is most like this one or alone begins with it, or None if none is close."""
     close = _near(word, list(valid))
     return close[0] if len(close) == 1 else None
 
 
 def did_you_mean(word: str, valid: Iterable[str]) -> str:
-    """A clause to append to an error: `; did you mean 'x'?`, or the list of what is valid."""
+    """Return a clause to append to an error: `; did you mean 'x'?`, or the list of what is valid."""
     options = list(valid)
     if 0 < len(near := _near(word, options)) <= MOST_NEAR:
         return f"; did you mean {' or '.join(map(repr, near))}?"
@@ -23,7 +23,7 @@ def did_you_mean(word: str, valid: Iterable[str]) -> str:
 
 
 def _near(word: str, options: list[str]) -> list[str]:
-    """The word most like this one, or those that begin with it."""
+    """Return the word most like this one, or those that begin with it."""
     import difflib  # which a command that has nothing to complain of need not load
 
     close = difflib.get_close_matches(word, options, n=1, cutoff=0.6)

@@ -41,7 +41,7 @@ class InputError(VsacliError, ValueError):
 
     @classmethod
     def one(cls, message: str, file: str | Path = "", line: int = 0) -> Self:
-        """An error with a single problem."""
+        """Return an error with a single problem."""
         return cls([Problem(str(file), line, message)])
 
 
@@ -104,7 +104,7 @@ class FieldProblem(NamedTuple):
         return self._sentence(map(str, self.path), None if self.joint is None else str(self.joint + 1))
 
     def in_file(self, joints: Sequence[str]) -> str:
-        """The same sentence with names of joints, and without indices in lists, since the line is known."""
+        """Return the sentence with names of joints, and without list indices: the line is known."""
         keys = (step for step in self.path if isinstance(step, str))
         return self._sentence(keys, None if self.joint is None else joints[self.joint])
 
@@ -113,7 +113,7 @@ class FieldProblem(NamedTuple):
         return f"{where}: {self.message}" if where else self.message
 
     def inside(self, *outer: str | int) -> FieldProblem:
-        """The same, seen from a record that holds this one; `outer` leads to it."""
+        """Return the same, seen from a record that holds this one; `outer` leads to it."""
         return self._replace(path=(*outer, *self.path))
 
 

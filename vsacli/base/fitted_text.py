@@ -27,7 +27,7 @@ HARD_BLANK = "\N{NO-BREAK SPACE}"
 
 
 def fitted(text: str, width: int) -> str:
-    """A report with no line longer than a terminal is wide, as far as words and cells of tables allow.
+    """Return a report with no line longer than a terminal is wide, as far as words and cells of tables allow.
 
     Below the first line, tables are lines with cells that are apart by three blanks or more, as
     `tables.aligned` makes them. One that is too wide follows in parts, each with the first column. Lines that
@@ -53,7 +53,7 @@ def _has_cells(line: str) -> bool:
 
 
 def _joined(lines: Sequence[str]) -> list[str]:
-    """The lines, with those that go on below a label joined to it."""
+    """Return the lines, with those that go on below a label joined to it."""
     joined: list[str] = []
     for line in lines:
         if joined and joined[-1].endswith(",") and line.startswith(INDENT):
@@ -64,7 +64,7 @@ def _joined(lines: Sequence[str]) -> list[str]:
 
 
 def _broken(line: str, width: int) -> list[str]:
-    """A line between its words; what is set to the right of it, as a verdict, in a line of its own."""
+    """Return a line between its words; what is set to the right of it, as a verdict, in a line of its own."""
     if len(line) <= width:
         return [line]
     if _has_cells(line):
@@ -90,7 +90,7 @@ def _indent(line: str, width: int) -> str:
 
 
 def _parts_of_table(lines: Sequence[str], width: int) -> Iterator[str]:
-    """The table in as many parts as it takes, a part one below the other, each with the first column."""
+    """Yield the table in parts that fit, one below the other, each with the first column."""
     first, *columns = _columns(lines)
     while columns:
         taken, room = 1, width - len(first[0]) - len(BETWEEN_CELLS) - len(columns[0][0])
@@ -102,7 +102,7 @@ def _parts_of_table(lines: Sequence[str], width: int) -> Iterator[str]:
 
 
 def _columns(lines: Sequence[str]) -> list[list[str]]:
-    """The cells of a table, by column: these are apart where three blanks or more stand in every line."""
+    """Return the cells of a table by column; three blanks or more in every line separate columns."""
     longest = max(map(len, lines))
     padded = [line.ljust(longest) for line in lines]
     blank = [all(line[place] == " " for line in padded) for place in range(longest)]

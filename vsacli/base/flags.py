@@ -61,7 +61,7 @@ class Flag(enum.IntFlag):
     )
 
     def __new__(cls, bit: int, meaning: str, quantity: str | None) -> Self:
-        """A bit with all that is said of it, none of which can be left out."""
+        """Return a bit with all that is said of it, none of which can be left out."""
         flag = int.__new__(cls, bit)
         flag._value_ = bit
         flag.meaning, flag.quantity = meaning, quantity
@@ -78,7 +78,7 @@ class Flag(enum.IntFlag):
 
     @classmethod
     def labelled(cls, label: str) -> Flag:
-        """The bit of a label."""
+        """Return the bit of a label."""
         return cls[label.upper()]
 
 
@@ -93,7 +93,7 @@ def has(flags: FlagArray, bits: Flag) -> BoolArray:
 
 
 def marked(flag: Flag, where: BoolArray) -> FlagArray:
-    """The bit where it shall be set, else 0."""
+    """Return the bit where it shall be set, else 0."""
     return where.astype(np.uint16) * np.uint16(flag)
 
 

@@ -18,7 +18,7 @@ OPTIONAL = "?"
 
 
 def named(*attributes: str) -> dict[str, str]:
-    """The shape of attributes that stand under their own names."""
+    """Return the shape of attributes that stand under their own names."""
     return {name: name for name in attributes}
 
 
@@ -80,7 +80,7 @@ def _shape_of(cls: Any) -> Shape:
 
 @cache
 def _types_of(cls: type) -> dict[str, Any]:
-    """The type of each field of a dataclass."""
+    """Return the type of each field of a dataclass."""
     types = get_type_hints(cls)
     return {field.name: types[field.name] for field in dataclasses.fields(cls)}
 
@@ -95,7 +95,7 @@ def _written(record: Published, shape: Shape) -> dict[str, Any]:
 
 
 def _found(content: JsonObject, shape: Shape) -> Iterator[tuple[str, Any]]:
-    """The attributes of a shape for which there are values, and those."""
+    """Yield the attributes of a shape for which there are values, and those."""
     for key, inner in shape.items():
         key = key.removesuffix(OPTIONAL)
         if key not in content:
@@ -107,7 +107,7 @@ def _found(content: JsonObject, shape: Shape) -> Iterator[tuple[str, Any]]:
 
 
 def _read(expected: Any, content: Any) -> Any:
-    """A value of a type of fields: a number, a tuple, a mapping, a record, any of those or None."""
+    """Return a value of a type of fields: a number, a tuple, a mapping, a record, any of those or None."""
     types = get_args(expected)
     match get_origin(expected) or expected:
         case origin if type(None) in types:
@@ -126,7 +126,7 @@ def _read(expected: Any, content: Any) -> Any:
 
 
 def _read_entry(expected: Any, key: str, content: Any) -> Any:
-    """The value under a key of a mapping, which may have the key as a field."""
+    """Return the value under a key of a mapping, which may have the key as a field."""
     if isinstance(expected, type) and issubclass(expected, Stored) and expected.key:
         return expected.from_json(content, **{expected.key: key})
     return _read(expected, content)

@@ -24,7 +24,7 @@ class LazyRegistry(Mapping[str, Any]):
         return getattr(importlib.import_module(module), thing)
 
     def name_of(self, cls: type) -> str:
-        """The name of a class that is one of the things; imports nothing.
+        """Return the name of a class that is one of the things; imports nothing.
 
         Raises:
             KeyError: it is none of them.
@@ -76,7 +76,7 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
 
 
 def _imported_for_types(path: str) -> Iterator[tuple[str, str]]:
-    """Each name that a module imports under `if TYPE_CHECKING:`, with the module it comes from."""
+    """Yield each name that a module imports under `if TYPE_CHECKING:`, with the module it comes from."""
     import ast
 
     with open(path, encoding="utf-8") as file:

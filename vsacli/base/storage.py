@@ -174,7 +174,7 @@ def size_of(path: Path) -> int:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether a path is a folder itself, no link to one."""
+    """Return whether a path is a folder itself, no link to one."""
     return path.is_dir() and not path.is_symlink()
 
 

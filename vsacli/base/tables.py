@@ -11,7 +11,7 @@ BETWEEN_CELLS = "   "
 
 
 def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """The lines of a table: the first column to the left, the others to the right."""
+    """Yield the lines of a table: the first column to the left, the others to the right."""
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows:
         name, *cells = (
@@ -40,7 +40,7 @@ class ReportText(NamedTuple):
 
 
 def html_table(title: str, rows: Sequence[tuple[str, ...]]) -> str:
-    """A title and a table whose first row is its header, as HTML; the texts are escaped."""
+    """Return a title and a table whose first row is its header, as HTML; the texts are escaped."""
     header, *body = rows
     lines = "".join(_html_row(row, "td") for row in body)
     table = f"<table><thead>{_html_row(header, 'th')}</thead><tbody>{lines}</tbody></table>"

@@ -27,7 +27,7 @@ def as_name(text: str) -> str:
 
 
 def for_terminal(text: str) -> str:
-    """The lines of a text, each as in `one_line`."""
+    """Return the lines of a text, each as in `one_line`."""
     return "\n".join(map(one_line, text.split("\n")))
 
 
@@ -57,7 +57,7 @@ FEWEST_IN_A_ROW = 3
 
 
 def together(numbers: Sequence[int], names: Sequence[str]) -> str:
-    """The names with these numbers, which ascend; of those in a row the first and the last."""
+    """Return the names with these numbers, which ascend; of those in a row the first and the last."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and runs[-1][-1] == number - 1:

@@ -38,12 +38,12 @@ class WrenchQuantity(Quantity):
 
 
 def time_text(time: float) -> str:
-    """A time with its unit: milliseconds, or microseconds where steps are that short."""
+    """Return a time with its unit: milliseconds, or microseconds where steps are that short."""
     return f"{time:.3f} s" if abs(time - round(time, 3)) < 5e-7 else f"{time:.6f} s"
 
 
 def constant(unit: str) -> Quantity:
-    """A quantity whose unit is the same at every joint."""
+    """Return a quantity whose unit is the same at every joint."""
     return Quantity(unit, unit)
 
 

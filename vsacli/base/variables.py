@@ -231,27 +231,27 @@ class Block:
         raise AttributeError(f"{type(self).__name__!r} has no variable {name!r}")
 
     def of_joint(self, index: int) -> dict[str, AnyArray]:
-        """The variables of one joint by name, (samples,), those of its motors (2, samples)."""
+        """Return the variables of one joint by name, (samples,), those of its motors (2, samples)."""
         joints = {name: array for name, array in vars(self).items() if "joint" in self.declared[name].dims}
         return of_joint(joints, index)
 
     def arrays(self) -> dict[str, AnyArray]:
-        """The variables there are, by name."""
+        """Return the variables there are, by name."""
         return {name: vars(self)[name] for name in self.declared if name in vars(self)}
 
     def taken(self, steps: slice | AnyArray) -> Self:
-        """Some of its steps."""
+        """Return some of its steps."""
         return type(self)(**{name: array[steps] for name, array in self.arrays().items()})
 
     def replaced(self, **arrays: AnyArray) -> Self:
-        """The same with some variables that are other or further ones."""
+        """Return the same with some variables that are other or further ones."""
         return type(self)(**{**self.arrays(), **arrays})
 
 
 def select_variables(
     names: Iterable[str], declared: Mapping[str, Variable] = VARIABLES
 ) -> tuple[Variable, ...]:
-    """The variables of these names, in declared order, `time` left out.
+    """Return the variables of these names, in declared order, `time` left out.
 
     Raises:
         InputError: for each name that is no variable, the nearest one that is.

@@ -47,12 +47,12 @@ class Wrench:
 
     @classmethod
     def constant(cls, wrench: ArrayLike, frame: str = "end_effector") -> Wrench:
-        """A wrench ([samples,] 6) that does not change over time: its derivatives are zero."""
+        """Return a wrench ([samples,] 6) that does not change over time: its derivatives are zero."""
         components = np.asarray(wrench, dtype=np.float64)
         return cls(components, np.zeros_like(components), np.zeros_like(components), frame=frame)
 
     def mapped(self, function: Callable[[FloatArray, int], FloatArray]) -> Wrench:
-        """The wrench with a function applied to each array and its order of derivation."""
+        """Return the wrench with a function applied to each array and its order of derivation."""
         arrays = (function(getattr(self, name), order) for order, name in enumerate(WRENCH_NAMES))
         return Wrench(*arrays, frame=self.frame)
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def words_of(example: str) -> Callable[..., tuple[str, ...] | None]:
-    """A callback for words separated by commas, such as the example."""
+    """Return a callback for words separated by commas, such as the example."""
 
     def words(_context: click.Context, _parameter: click.Parameter, text: str | None) -> Any:
         if text is None:
@@ -53,7 +53,7 @@ def variables_option(default: str) -> Callable[[Any], Any]:
 def numbers(
     _context: click.Context, _parameter: click.Parameter, written: str | None
 ) -> tuple[float, ...] | None:
-    """A callback for numbers separated by commas."""
+    """Return a callback for numbers separated by commas."""
     if written is None:
         return None
     try:
@@ -63,7 +63,7 @@ def numbers(
 
 
 def example(command: str) -> str:
-    """The end of a help text: a command line that works."""
+    """Return the end of a help text: a command line that works."""
     return f"\b\nExample:\n  {command}"
 
 
@@ -211,7 +211,7 @@ def run_stem(robot_path: str, trajectory_path: str) -> str:
 
 
 def result_line(result: StoredResult) -> str:
-    """A result file in one line, for `--verbose`."""
+    """Return a result file in one line, for `--verbose`."""
     names = f"{result.robot_name}, {result.trajectory_name}"
     return f"{result.path}: {names}, {result.samples} steps, {result.verdict}"
 

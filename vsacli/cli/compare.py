@@ -106,7 +106,7 @@ def _draw(comparison: Comparison, stem: str, folder: str, file_format: str, outp
 
 
 def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
-    """A page of the report and all variables, as HTML."""
+    """Return a page of the report and all variables, as HTML."""
     from vsacli.base.texts import one_line
     from vsacli.base.version import __version__
     from vsacli.results.pages import measured_page
@@ -126,7 +126,7 @@ def _page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
 
 
 def _curves(comparison: Comparison) -> dict[str, list[MeasuredCurve]]:
-    """The signals that were compared, by variable."""
+    """Return the signals that were compared, by variable."""
     import numpy as np
 
     from vsacli.results.charts.measured import MeasuredCurve

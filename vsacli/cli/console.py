@@ -54,7 +54,7 @@ class Exit(enum.IntEnum):
     TERMINATED = 143, "ended by SIGTERM, as batch systems do; the target is untouched"
 
     def __new__(cls, code: int, meaning: str) -> Self:
-        """A code with what it means, which cannot be left out."""
+        """Return a code with what it means, which cannot be left out."""
         member = int.__new__(cls, code)
         member._value_ = code
         member.meaning = meaning
@@ -131,7 +131,7 @@ def say_text(text: str, verdict: str = "") -> None:
 
 
 def for_width(text: str) -> str:
-    """A text as it fits the terminal that standard output is; as it is where that is none."""
+    """Return a text as it fits the terminal that standard output is; as it is where that is none."""
     width = _terminal_width(sys.stdout)
     if not width:
         return text
@@ -167,7 +167,7 @@ def _terminal_width(stream: TextIO | None) -> int:
 
 
 def _colored() -> bool:
-    """Whether standard output is a terminal whose user has nothing against colours, see no-color.org."""
+    """Return whether standard output is a terminal whose user wants colors (no-color.org)."""
     wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
     return wanted and sys.stdout.isatty()
 
@@ -197,21 +197,21 @@ class Talk:
     def progress(
         self, steps: int, *, shown_from: int = PROGRESS_FROM, label: str = "computing"
     ) -> AbstractContextManager[Any]:
-        """A progress bar over steps, shown only for long work on a terminal; click's takes time to import."""
+        """Return a progress bar over steps, shown only for long work on a terminal."""
         if self.quiet or steps < shown_from or not sys.stderr.isatty():
             return unseen(steps)
         return click.progressbar(length=steps, label=label, file=sys.stderr)
 
     def fitting(self, samples: int) -> AbstractContextManager[Any]:
-        """The same over the samples of all components that splines are fitted to."""
+        """Return the same over the samples of all components that splines are fitted to."""
         return self.progress(samples, label="fitting")
 
     def looking(self, size: int) -> AbstractContextManager[Any]:
-        """The same over the bytes of a recording that is looked at."""
+        """Return the same over the bytes of a recording that is looked at."""
         return self.progress(size, shown_from=LOOKING_FROM, label="looking")
 
     def writing(self, samples: int) -> AbstractContextManager[Any]:
-        """The same over the samples of all variables that are written."""
+        """Return the same over the samples of all variables that are written."""
         return self.progress(samples, shown_from=WRITING_FROM, label="writing")
 
 

@@ -130,7 +130,7 @@ def export(
 
 
 def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind: FileKind) -> str:
-    """The format that is meant, by --format or the name of the output; of results CSV if neither says."""
+    """Return the format named by --format or by the ending of the output; CSV without either."""
     words, name = ", ".join(formats), output or ""
     if form is not None and form not in formats:
         raise InputError.one(f"is a {kind}, which --format {form} is not for; there is {words}", file)
@@ -187,7 +187,7 @@ def _inputs(robot: Robot, start: str | None) -> list[str]:
 
 
 def _read_start(path: str, robot: Robot) -> Start:
-    """The first step of a result of the robot."""
+    """Return the first step of a result of the robot."""
     from vsacli.results.store.reader import StoredResult
     from vsacli.robot.models.mjcf_drives import Start
 

@@ -52,7 +52,7 @@ KNOWN = frozenset(ending for endings in ENDINGS.values() for ending in endings)
 
 
 def ending_of(name: str) -> str:
-    """The ending of a name in small letters, if it is one that says what a file holds; else empty."""
+    """Return the ending of a name in small letters, if it is one that says what a file holds; else empty."""
     ending = PurePath(name).suffix.lower()
     return ending if ending in KNOWN else ""
 

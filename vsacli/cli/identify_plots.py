@@ -30,7 +30,7 @@ def draw_figures(found: Identification, robot: str, folder: str, file_format: st
 
 
 def identification_page(found: Identification, columns: str | None) -> str:
-    """A page of the report and all records, as HTML.
+    """Return a page of the report and all records, as HTML.
 
     Args:
         found: what is shown.
@@ -63,7 +63,7 @@ def identification_page(found: Identification, columns: str | None) -> str:
 
 
 def _curves(found: Identification) -> dict[str, list[MeasuredCurve]]:
-    """The torques of each record, by its path."""
+    """Return the torques of each record, by its path."""
     from vsacli.results.charts.measured import MeasuredCurve
 
     curves: dict[str, list[MeasuredCurve]] = {}

@@ -123,7 +123,7 @@ def _extract(file: str, folder: str, talk: Talk) -> None:
 
 
 def _found(description: dict[str, Any], field: str) -> str:
-    """The value at a path as a script wants it: texts without quotes, everything else as JSON."""
+    """Return the value at a path as a script wants it: texts without quotes, everything else as JSON."""
     from vsacli.files.info import described_value
 
     try:

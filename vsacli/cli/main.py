@@ -60,7 +60,7 @@ class SectionedGroup(click.Group):
         self.sections = sections
 
     def list_commands(self, _context: click.Context) -> list[str]:
-        """The names of all commands."""
+        """Return the names of all commands."""
         return [name for names in self.sections.values() for name in names]
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:

@@ -36,7 +36,7 @@ CHANGE, PACE = "optimum", "pace"
 
 
 def _share(_context: click.Context, _parameter: click.Parameter, text: str | None) -> float | None:
-    """A share such as `3%` or `0.03`."""
+    """Return a share such as `3%` or `0.03`."""
     if text is None:
         return None
     try:

@@ -163,7 +163,7 @@ class _Shown(NamedTuple):
     variables: tuple[str, ...] | None
 
     def of(self, stored: StoredResult) -> StoredResult:
-        """The part of an open file that is drawn; the file itself if that is all of it."""
+        """Return the part of an open file that is drawn; the file itself if that is all of it."""
         from vsacli.results.store.excerpt import Excerpt
 
         everything = not self.joints and self.span == _EVERYTHING.span
@@ -174,7 +174,7 @@ _EVERYTHING = _Shown((), (-math.inf, math.inf), None)
 
 
 def _span(start: float | None, end: float | None) -> tuple[float, float]:
-    """The times between which is drawn.
+    """Return the times between which is drawn.
 
     Raises:
         click.UsageError: there are none.
@@ -186,7 +186,7 @@ def _span(start: float | None, end: float | None) -> tuple[float, float]:
 
 
 def _are_studies(paths: list[Path]) -> bool:
-    """Whether the first file is the table of a study; then all have to be."""
+    """Return whether the first file is the table of a study; then all have to be."""
     from vsacli.results.store.reader import stored_format
     from vsacli.results.store.study_table import FORMAT
 

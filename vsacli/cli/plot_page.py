@@ -39,7 +39,7 @@ def write_page(
 
 
 def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
-    """The file of a page, before anything is computed for it.
+    """Return the file of a page, before anything is computed for it.
 
     Raises:
         InputError: what a page needs is not installed.
@@ -53,7 +53,7 @@ def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
 
 
 def page_asked_for(folder: str | None, file_format: str, stem: str, outputs: Outputs) -> Staged | None:
-    """The file of the page that `--plot` and `--format` ask for; None if they ask for none.
+    """Return the file of the page that `--plot` and `--format` ask for; None if they ask for none.
 
     Raises:
         InputError, StorageError: as `staged_page`.
@@ -158,7 +158,7 @@ def _command(result: StoredResult, suggestions: Suggestions) -> tuple[str, str]:
 
 
 def _named(path: str) -> str:
-    """A path that a command takes for no option; of "-", standard input, it stays as it is."""
+    """Return a path that a command takes for no option; of "-", standard input, it stays as it is."""
     return f"./{path}" if path.startswith("-") and path != "-" else path
 
 

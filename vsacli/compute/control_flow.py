@@ -23,7 +23,7 @@ Function = Callable[..., Values]
 
 
 def repeat(step: Step, state: Values, constants: Values, limit: int) -> Values:
-    """The state of each sample after as many steps as it needs, at most `limit`.
+    """Return the state of each sample after as many steps as it needs, at most `limit`.
 
     Args:
         step: from a state and the constants to the next state, and whether the sample is done with it.

@@ -87,7 +87,7 @@ class Dual(NDArrayOperatorsMixin):
         return len(self.value)
 
     def __bool__(self) -> bool:
-        """Whether it is more than nothing: a zero that a parameter may change is not left out."""
+        """Return whether it is more than nothing: a zero that a parameter may change is not left out."""
         return bool(self.value) or any(np.any(tangent) for tangent in self.tangents.values())
 
     @property
@@ -126,12 +126,12 @@ def seeds(values: Sequence[Any], first: int = 0) -> list[Dual]:
 
 
 def value_of(array: Any) -> Any:
-    """The values of an array, dual or not."""
+    """Return the values of an array, dual or not."""
     return array.value if isinstance(array, Dual) else array
 
 
 def tangent_of(array: Any, directions: int, shape: tuple[int, ...]) -> FloatArray:
-    """The derivatives of an array, (directions, *shape); zero if it is an ordinary one."""
+    """Return the derivatives of an array, (directions, *shape); zero if it is an ordinary one."""
     derivatives = np.zeros((directions, *shape))
     for direction, tangent in tangents_of(array).items():
         derivatives[direction] = tangent
@@ -139,7 +139,7 @@ def tangent_of(array: Any, directions: int, shape: tuple[int, ...]) -> FloatArra
 
 
 def tangents_of(array: Any) -> Tangents:
-    """The derivatives of an array by direction; none if it is an ordinary one."""
+    """Return the derivatives of an array by direction; none if it is an ordinary one."""
     return array.tangents if isinstance(array, Dual) else {}
 
 
@@ -148,7 +148,7 @@ def _spread(tangent: Any, shape: tuple[int, ...]) -> FloatArray:
 
 
 def _sum_of(first: Any, second: Any) -> Dual:
-    """A sum; what has no tangent adds nothing to it."""
+    """Return a sum; what has no tangent adds nothing to it."""
     if not isinstance(second, Dual):
         return Dual(add(first.value, second), first.tangents)
     if not isinstance(first, Dual):
@@ -157,7 +157,7 @@ def _sum_of(first: Any, second: Any) -> Dual:
 
 
 def _difference_of(first: Any, second: Any) -> Dual:
-    """A difference."""
+    """Return a difference."""
     if not isinstance(second, Dual):
         return Dual(sub(first.value, second), first.tangents)
     tangents = dict(tangents_of(first))
@@ -167,7 +167,7 @@ def _difference_of(first: Any, second: Any) -> Dual:
 
 
 def _product_of(first: Any, second: Any) -> Dual:
-    """A product, by Leibniz's rule."""
+    """Return a product, by Leibniz's rule."""
     if not isinstance(second, Dual):
         return Dual(mul(first.value, second), _scaled(first.tangents, second))
     if not isinstance(first, Dual):
@@ -195,7 +195,7 @@ def _scaled(tangents: Tangents, factor: Scalar) -> Tangents:
 
 
 def _chained(slopes: Sequence[Callable[[], Any]], inputs: Sequence[Any]) -> Tangents:
-    """The chain rule: the sum of slope times tangent over the inputs that have one."""
+    """Return the chain rule: the sum of slope times tangent over the inputs that have one."""
     total: Tangents = {}
     for slope, each in zip(slopes, inputs, strict=True):
         if isinstance(each, Dual):
@@ -205,7 +205,7 @@ def _chained(slopes: Sequence[Callable[[], Any]], inputs: Sequence[Any]) -> Tang
 
 @exact.register
 def _(number: Dual) -> Dual:
-    """The value folds, whatever its derivatives."""
+    """Return the value folds, whatever its derivatives."""
     return Dual(exact(number.value), number.tangents)
 
 
@@ -258,7 +258,7 @@ def _joined(function: Callable[..., Any]) -> Callable[..., Dual]:
 
 
 def _by_direction(arrays: Sequence[Any]) -> Iterator[tuple[int, list[Any]]]:
-    """Each direction in which one of several arrays has a tangent, with those of all of them."""
+    """Yield each direction in which one of several arrays has a tangent, with those of all of them."""
     tangents = [tangents_of(each) for each in arrays]
     for direction in dict.fromkeys(at for each in tangents for at in each):
         yield direction, [each.get(direction, 0.0) for each in tangents]

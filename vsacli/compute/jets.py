@@ -47,7 +47,7 @@ class Truncation:
         }
 
     def product(self, first: Terms, second: Terms) -> dict[Order, Scalar]:
-        """The coefficients of a product."""
+        """Return the coefficients of a product."""
         terms: dict[Order, Scalar] = {}
         for a, left in first.items():
             for b, right in second.items():
@@ -57,7 +57,7 @@ class Truncation:
         return terms
 
     def linear(self, value: Scalar, slopes: Sequence[int]) -> Jet:
-        """A linear function of the variables, such as one of them, by its value and its slopes."""
+        """Return a linear function of the variables, such as one of them, by its value and its slopes."""
         units = [
             tuple(int(axis == other) for other in range(self.variables)) for axis in range(self.variables)
         ]
@@ -84,7 +84,7 @@ class Jet:
         return self._terms.get(self._truncation.zeroth, 0)
 
     def derivative(self, order: Order) -> Scalar:
-        """A derivative; the number zero where it vanishes whatever the point is."""
+        """Return a derivative; the number zero where it vanishes whatever the point is."""
         return mul(prod(map(factorial, order)), self._terms.get(order, 0))
 
     def _joined(self, other: Any, join: Callable[[Scalar, Scalar], Scalar]) -> Jet:

@@ -31,7 +31,7 @@ class OfRounding(float):
         return new
 
     def in_single_precision(self) -> float:
-        """The tolerance there."""
+        """Return the tolerance there."""
         return float(self * COARSER**self.power)
 
 

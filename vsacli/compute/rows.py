@@ -28,18 +28,18 @@ class RowLayout:
         self._places = dict(zip(self.shapes, (slice(*place) for place in pairwise(ends)), strict=True))
 
     def unpack(self, rows: Sequence[_Row]) -> dict[str, Sequence[_Row]]:
-        """The rows of each array; what lies beyond the last one is passed over."""
+        """Return the rows of each array; what lies beyond the last one is passed over."""
         return {name: rows[place] for name, place in self._places.items()}
 
     def arrays(self, rows: AnyArray) -> dict[str, AnyArray]:
-        """Each array in its shape, followed by what axes a row has."""
+        """Return each array in its shape, followed by what axes a row has."""
         return {
             name: rows[place].reshape((*self.shapes[name], *rows.shape[1:]))
             for name, place in self._places.items()
         }
 
     def pack(self, rows: Mapping[str, Iterable[_Row]]) -> list[_Row]:
-        """The rows of all arrays."""
+        """Return the rows of all arrays."""
         return [row for name in self.shapes for row in rows[name]]
 
 

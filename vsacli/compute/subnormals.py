@@ -42,7 +42,7 @@ def subnormals_as_zero() -> Iterator[None]:
 
 @cache
 def _mathematics() -> ctypes.CDLL | None:
-    """The library with the functions of fenv.h, where their data are as above.
+    """Return the library with the functions of fenv.h, where their data are as above.
 
     NumPy finds the limits of numbers when it is first asked for them: here, before the smallest are zero.
     """

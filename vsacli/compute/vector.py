@@ -21,7 +21,7 @@ Scalar = Any
 
 @singledispatch
 def exact(number: Scalar) -> Scalar:
-    """The number, as a Python integer if it is one of the constants that fold; other scalars as they are."""
+    """Return a constant that folds as a Python integer, and any other scalar as it is."""
     plain = isinstance(number, float | int | complex | Rational)
     return int(number) if plain and number in (0, 1, -1) else number
 
@@ -44,7 +44,7 @@ def _(angle: float | int, name: str) -> Scalar:
 
 
 def add(a: Scalar, b: Scalar) -> Scalar:
-    """The sum a + b."""
+    """Return the sum a + b."""
     if type(a) is int and a == 0:
         return b
     if type(b) is int and b == 0:
@@ -53,7 +53,7 @@ def add(a: Scalar, b: Scalar) -> Scalar:
 
 
 def sub(a: Scalar, b: Scalar) -> Scalar:
-    """The difference a - b."""
+    """Return the difference a - b."""
     if type(b) is int and b == 0:
         return a
     if type(a) is int and a == 0:
@@ -62,7 +62,7 @@ def sub(a: Scalar, b: Scalar) -> Scalar:
 
 
 def mul(a: Scalar, b: Scalar) -> Scalar:
-    """The product a b."""
+    """Return the product a b."""
     if type(a) is int:
         return _times_integer(a, b)
     if type(b) is int:
@@ -126,7 +126,7 @@ class SymmetricTensor(NamedTuple):
     yz: Scalar
 
     def times(self, v: Vector) -> Vector:
-        """The tensor applied to a vector."""
+        """Return the tensor applied to a vector."""
         return Vector(
             add(add(mul(self.xx, v.x), mul(self.xy, v.y)), mul(self.xz, v.z)),
             add(add(mul(self.xy, v.x), mul(self.yy, v.y)), mul(self.yz, v.z)),
@@ -169,7 +169,7 @@ class Matrix(NamedTuple):
     z: Vector
 
     def times(self, v: Vector) -> Vector:
-        """The matrix applied to a vector."""
+        """Return the matrix applied to a vector."""
         return Vector(self.x.dot(v), self.y.dot(v), self.z.dot(v))
 
     def transposed(self) -> Matrix:

@@ -218,7 +218,7 @@ def position_order(robot: Robot, plant: Plant) -> int:
 
 
 def control_law(plant: Plant, gains: Gains) -> Decoupling | ComputedTorque:
-    """The law for a robot all of whose joints, or none, have springs."""
+    """Return the law for a robot all of whose joints, or none, have springs."""
     return Decoupling(plant, gains) if plant.drivetrain.sprung.all() else ComputedTorque(plant, gains)
 
 

@@ -60,7 +60,7 @@ class MappedColumn:
         return target if unit is None else f"{target} [{unit}]"
 
     def doubt(self, own: str) -> str | None:
-        """A unit that the heading in the file speaks of but nobody gave."""
+        """Return a unit that the heading in the file speaks of but nobody gave."""
         if self.unit is not None or self.nanoseconds is not None or split_heading(own)[1] is not None:
             return None
         last, camel = _LAST_WORD.search(own), _CAMEL.search(own)
@@ -114,7 +114,7 @@ class ColumnMapping:
         return numbers if len(numbers) == len(self.columns) else ()
 
     def applied(self, header: Header, known: Collection[str] | None, file: str) -> ChosenColumns:
-        """The columns of a table to read.
+        """Return the columns of a table to read.
 
         Args:
             header: of the table.

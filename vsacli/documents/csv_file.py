@@ -127,7 +127,7 @@ def cells_of(line: str, separator: str) -> list[str]:
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell holds a finite number in ASCII."""
+    """Return whether a cell holds a finite number in ASCII."""
     try:
         return math.isfinite(float(cell)) and cell.isascii() and "_" not in cell
     except ValueError:
@@ -237,7 +237,7 @@ def read_integers(rows: Rows) -> npt.NDArray[np.int64] | None:
 def _loaded(
     rows: Rows, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
 ) -> tuple[npt.NDArray[Any], object]:
-    """The rows, and why there are none; from the file as it is, or from cells that were cleaned."""
+    """Return the rows, and why there are none; from the file as it is, or from cells that were cleaned."""
     header, used = rows.header, None if rows.all_used else rows.used
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # NumPy's way to say that there are no rows, or no whole numbers
@@ -258,7 +258,7 @@ def _loaded(
 
 
 def _is_regular(rows: Rows) -> bool:
-    """Whether each line has as many cells as the header, so that columns may be picked by their places.
+    """Return whether each line has as many cells as the header, so that columns can be picked by place.
 
     NumPy's reader does not count what it leaves out. Quotes and comments are left to a look at each line.
     """
@@ -308,7 +308,7 @@ class _Decimals:
         self._sign = ""
 
     def with_points(self, cell: str) -> str:
-        """A cell with a decimal point."""
+        """Return a cell with a decimal point."""
         if "," not in cell and "." not in cell:
             return cell
         sign = "," if "," in cell else "."

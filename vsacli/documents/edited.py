@@ -121,7 +121,7 @@ def _edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
 
 
 def _replacement(node: yaml.Node, here: yaml.Node, written: str) -> tuple[int, int, str]:
-    """A text in place of an entry of a node; behind the key if that is a block of lines."""
+    """Return a text in place of an entry of a node; behind the key if that is a block of lines."""
     block = isinstance(here, yaml.CollectionNode) and not here.flow_style
     if block and isinstance(node, yaml.MappingNode):
         key = next(key for key, entry in node.value if entry is here)
@@ -138,14 +138,14 @@ def _end(node: yaml.Node) -> int:
 
 
 def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
-    """A further entry before the first one of a mapping."""
+    """Return a further entry before the first one of a mapping."""
     first = node.value[0][0].start_mark
     start = first.index
     return start, start, f"{entry}, " if node.flow_style else f"{entry}\n{' ' * first.column}"
 
 
 def _written(value: Any) -> str:
-    """A value on one line: words plain, other texts in quotes."""
+    """Return a value on one line: words plain, other texts in quotes."""
     match value:
         case Mapping():
             return "{" + ", ".join(f"{key}: {_written(each)}" for key, each in value.items()) + "}"

@@ -108,7 +108,7 @@ class Expression(NamedTuple):
         functions: Mapping[str, Callable[[Any], Any]],
         number: Callable[[float], Any] = float,
     ) -> Any:
-        """The value for anything that has the operators.
+        """Return the value for anything that has the operators.
 
         Args:
             names: their values.
@@ -128,7 +128,7 @@ class Expression(NamedTuple):
 
 
 def parse(text: str, grammar: Grammar) -> Expression:
-    """The steps of an expression.
+    """Return the steps of an expression.
 
     Raises:
         ExpressionError: it is none, with the reason and the place.
@@ -170,14 +170,14 @@ class _Parser:
         self._steps: dict[Hashable, int] = {}
 
     def parsed(self) -> Expression:
-        """All of it."""
+        """Return all of it."""
         self._expression(binding=1)
         if self._next.kind != "end":
             self._refuse("an operator")
         return Expression(tuple(self._steps))  # type: ignore[arg-type]
 
     def _expression(self, binding: int) -> int:
-        """The step of what operators join that bind at least as tightly."""
+        """Return the step of what operators join that bind at least as tightly."""
         self._nesting += 1
         if self._nesting > MAX_NESTING:
             raise ExpressionError(f"nested deeper than {MAX_NESTING} levels", self._next.place)
@@ -194,12 +194,12 @@ class _Parser:
         return left
 
     def _operator(self) -> str:
-        """The operator that comes next; between units it may be left out."""
+        """Return the operator that comes next; between units it may be left out."""
         juxtaposed = self._grammar.of_units and (self._next.kind == "name" or self._next.text == "(")
         return "*" if juxtaposed else self._next.text
 
     def _operand(self) -> int:
-        """The step of a number, a name, a function, what is in parentheses, or one of these with signs."""
+        """Return the step of a number, name, function call or parenthesis, with its signs."""
         negative = signed = False
         while self._next.text in ("+", "-"):
             negative, signed = negative ^ (self._take().text == "-"), True
@@ -215,7 +215,7 @@ class _Parser:
         return self._parentheses("a number, a word or (")
 
     def _unit(self) -> int:
-        """The step of a unit or of what is in parentheses, with an exponent if one follows."""
+        """Return the step of a unit or of what is in parentheses, with an exponent if one follows."""
         unit = self._word() if self._next.kind == "name" else self._parentheses("a unit or (")
         if self._next.text == "^":
             self._take()
@@ -245,7 +245,7 @@ class _Parser:
         return inner
 
     def _step(self, operation: str, *operands: Any) -> int:
-        """The number of a step, which is there once."""
+        """Return the number of a step, which is there once."""
         return self._steps.setdefault(Step(operation, operands), len(self._steps))
 
     def _take(self) -> _Token:
@@ -280,7 +280,7 @@ _REFUSED_FORMS = {
 
 
 def evaluate(text: str, unit: str) -> float:
-    """The number a text stands for.
+    """Return the number a text stands for.
 
     Args:
         text: e.g. `1e-5`, `-(pi/2 + 0.1)`, `90 deg`.

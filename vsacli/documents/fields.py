@@ -95,12 +95,12 @@ def _declare(field: Field, default: Any, **options: Any) -> Any:
 def number(
     unit: Quantity, doc: str, *, check: Check = FINITE, default: Any = REQUIRED, compare: bool = True
 ) -> Any:
-    """A number; `compare=False` keeps it out of the equality of two records."""
+    """Return a number; `compare=False` keeps it out of the equality of two records."""
     return _declare(Field(Number(unit), doc, check), default, compare=compare)
 
 
 def integer(doc: str, *, check: Check, default: Any = REQUIRED) -> Any:
-    """A whole number."""
+    """Return a whole number."""
     return _declare(Field(Integer(), doc, check), default)
 
 
@@ -110,7 +110,7 @@ def boolean(doc: str, *, default: Any = REQUIRED) -> Any:
 
 
 def text(doc: str, *, identifier: bool = False, default: Any = REQUIRED) -> Any:
-    """A text."""
+    """Return a text."""
     return _declare(Field(Text(identifier), doc), default)
 
 
@@ -122,15 +122,15 @@ def choice(
 
 
 def vector(length: int, unit: Quantity, doc: str, *, default: Any = REQUIRED) -> Any:
-    """A list of finite numbers."""
+    """Return a list of finite numbers."""
     return _declare(Field(Vector(length, unit), doc, FINITE), default)
 
 
 def interval(unit: Quantity, doc: str, *, lowest: float | None = None, default: Any = REQUIRED) -> Any:
-    """A lower and an upper bound, in this order; one number x is [-x, x], or [lowest, x] if that is given."""
+    """Return a lower and an upper bound; one number x means [-x, x], or [lowest, x] with `lowest`."""
     return _declare(Field(Interval(unit, lowest), doc), default)
 
 
 def value(kind: Kind, doc: str, *, check: Check | None = None, default: Any = REQUIRED) -> Any:
-    """A nested value: Record, OneOf, Items, Pair or PerJoint; `check` is for the numbers in it."""
+    """Return a nested value: Record, OneOf, Items, Pair or PerJoint; `check` is for the numbers in it."""
     return _declare(Field(kind, doc, check), default)

@@ -121,7 +121,7 @@ class Pair(Kind):
         return super().problems(path, check, tuple(content))
 
     def _names_sides(self, node: tree.Mapping) -> bool:
-        """Whether mappings stand under keys of their own, as in `{flexor: {...}, extensor: {...}}`."""
+        """Return whether mappings stand under keys of their own, as in `{flexor: {...}, extensor: {...}}`."""
         if not node.entries or not all(isinstance(value, tree.Mapping) for value in node.entries.values()):
             return False
         known = {"type", *(name for cls in self.records.values() for name in declared(cls))}

@@ -68,7 +68,7 @@ def _indices(names: Iterable[str]) -> dict[str, int]:
 
 
 def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputError:
-    """The error of a word that is none of those there are at a place."""
+    """Return the error of a word that is none of those there are at a place."""
     words = list(there)
     where = f"{_joined(place)} has" if place else "there is"
     hint = did_you_mean(word, words) if words else "; it is a single value"
@@ -87,7 +87,7 @@ def replace(
     exempt: Mapping[str, Mapping[str, str]] | None = None,
     file: str = "",
 ) -> _Record:
-    """A record of declared fields with another value at a path; the given record stays as it is.
+    """Return a record of declared fields with another value at a path; the given record stays as it is.
 
     `replace(robot, "joints.elbow.actuator.spring.k", 500)`, for example, which `Robot.replace` offers. Of a
     pair of sides that are the same, a path without side changes both; if they differ, it needs 0, 1 or `*`.
@@ -111,7 +111,7 @@ def replace(
 
 
 def _node(value: Any) -> tree.Node:
-    """A value as if it had been read from a file; texts as if in quotes."""
+    """Return a value as if it had been read from a file; texts as if in quotes."""
     match value:
         case str():
             return tree.Scalar(0, value, plain=False)
@@ -136,7 +136,7 @@ class _Replacement(NamedTuple):
     scope: Scope
 
     def in_record(self, record: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """A record with the value in it."""
+        """Return a record with the value in it."""
         word, *rest = words
         fields = declared(type(record))
         if word not in fields:
@@ -151,7 +151,7 @@ class _Replacement(NamedTuple):
             raise InputError(Problem("", 0, message) for message in problems) from None
 
     def in_value(self, kind: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """A value of a kind with this in it, or this in its place."""
+        """Return a value of a kind with this in it, or this in its place."""
         if not words:
             return self._read(kind, place)
         if content is None:
@@ -189,7 +189,7 @@ class _Replacement(NamedTuple):
         return self._in_list(kind, kind.item, content, words, place)
 
     def _in_list(self, kind: Kind, each: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """The entry of a list that a word names, or all of them."""
+        """Return the entry of a list that a word names, or all of them."""
         word, *rest = words
         names = entry_names(kind, content, self.scope.members)
         indices = _indices(names)
@@ -216,7 +216,7 @@ def _written(record: Any) -> tree.Mapping:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Whether two records are the same in every declared field, also those that do not count as equality."""
+    """Return whether two records agree in every declared field, also those without part in equality."""
     if type(one) is not type(other):
         return False
     return one is other or all(getattr(one, name) == getattr(other, name) for name in declared(type(one)))

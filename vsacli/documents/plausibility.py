@@ -97,11 +97,11 @@ class Rule(NamedTuple, Generic[_Subject]):
     explained_by: tuple[str, ...] = ()
 
     def admits(self, size: float) -> bool:
-        """Whether a size is as usual, or nothing is known of it."""
+        """Return whether a size is as usual, or nothing is known of it."""
         return math.isnan(size) or self.low <= size < self.high
 
     def slip(self, measured: Measured) -> Slip | None:
-        """The unit in which the number would be nearest to a common one; None if it would be in none."""
+        """Return the unit in which the number would be nearest to a common one; None without such a unit."""
         sizes = {
             slip: measured.size * slip.factor**slip.power
             for slip in self.slips
@@ -111,7 +111,7 @@ class Rule(NamedTuple, Generic[_Subject]):
         return min(fitting, key=lambda slip: abs(math.log(sizes[slip] / self.usual)), default=None)
 
     def sentence(self, measured: Measured, slip: Slip | None) -> str:
-        """The warning: field and value, what it is, and what it looks like."""
+        """Return the warning: field and value, what it is, and what it looks like."""
         path = _of_slip(measured.path, slip)
         known = path == measured.path and not math.isnan(measured.value)
         value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if known else ""
@@ -155,7 +155,7 @@ class Written:
             return tree.Mapping(0, {}, {})
 
     def at(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
-        """The deepest node on the way along a path, and the steps that do not lead into it."""
+        """Return the deepest node on the way along a path, and the steps that do not lead into it."""
         steps = path if self._moved is None else self._moved(self._root, path)
         node = self._root
         for taken, step in enumerate(steps):
@@ -166,11 +166,11 @@ class Written:
         return node, ()
 
     def line(self, path: NumberPath) -> int:
-        """The line of the file on which a path ends."""
+        """Return the line of the file on which a path ends."""
         return self.at(path)[0].line
 
     def said(self, measured: Measured) -> Measured | None:
-        """The number as the file says it, once if for all joints or both ends; None if it says another."""
+        """Return the number as written, once if equal for all joints or both ends; None if it differs."""
         node, left = self.at(measured.path)
         if not isinstance(node, tree.Scalar) or math.isnan(measured.value):
             return measured
@@ -183,7 +183,7 @@ class Written:
         return measured._replace(path=measured.path[: len(measured.path) - len(left)], value=value)
 
     def in_angles(self, measured: Measured) -> bool:
-        """Whether it says this number with `deg` or `pi`."""
+        """Return whether it says this number with `deg` or `pi`."""
         node, _ = self.at(measured.path)
         if not isinstance(node, tree.Scalar) or self.said(measured) is None:
             return False
@@ -205,7 +205,7 @@ def strange(
     written: Written | None = None,
     known: Collection[str] = (),
 ) -> dict[str, list[Measured]]:
-    """The numbers that rules find, by name of the rule; of rules that find nothing there is no entry.
+    """Return the numbers that rules find, by name of the rule; of rules that find nothing there is no entry.
 
     Args:
         rules: a rule comes after those that explain what it finds.
@@ -230,7 +230,7 @@ def findings(
     written: Written | None = None,
     known: Collection[str] = (),
 ) -> tuple[Problem, ...]:
-    """The warnings of what `strange` finds; with file and line if the file is given and still says it."""
+    """Return the warnings for strange values, with file and line where the file still has the value."""
     named = {rule.name: rule for rule in rules}
     found = strange(rules, subject, written, known)
     problems = (_problem(named[name], each, written) for name, several in found.items() for each in several)
@@ -238,7 +238,7 @@ def findings(
 
 
 def _problem(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem:
-    """The warning about a number."""
+    """Return the warning about a number."""
     slip = rule.slip(measured)
     said = written.said(measured) if written is not None else None
     if written is None or said is None:

@@ -133,7 +133,7 @@ def _factor(name: str, unit: str | None, kind: Kind, line: int, problems: Proble
 def _record(
     cells: Sequence[str], columns: _Columns, cls: type[_Record], scope: Scope, line: int
 ) -> _Record | None:
-    """The record of a row; None if its problems were noted."""
+    """Return the record of a row; None if its problems were noted."""
     if len(cells) != columns.width:
         hint = "; names with the separator in them go in double quotes" if len(cells) > columns.width else ""
         scope.problems.add(
@@ -157,7 +157,7 @@ def _record(
 
 
 def _in_si(cell: str, factor: float) -> str:
-    """The text of a number, converted; what is none stays, and is told of by who reads it."""
+    """Return the text of a number, converted; what is none stays, and is told of by who reads it."""
     if factor == 1:
         return cell
     try:

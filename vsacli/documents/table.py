@@ -74,7 +74,7 @@ class Table:
         return self.lines.of(row)
 
     def without_empty_rows(self) -> Table:
-        """The rows in which any column but the time has a number: others are of another topic of a log."""
+        """Return the rows with a number in any column but the time; others are of another topic of a log."""
         signals = [index for index, name in enumerate(self.columns) if split_heading(name)[0] != TIME]
         there = ~np.isnan(self.values[:, signals]).all(axis=1)
         if there.all() or not there.any():

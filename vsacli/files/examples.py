@@ -56,14 +56,14 @@ class Example:
         return load_robot(self.path)
 
     def files(self) -> Iterator[Path]:
-        """Every file it takes, tables of its springs and trajectories included."""
+        """Yield every file it takes, tables of its springs and trajectories included."""
         yield from (Path(source.path) for source in self.robot.sources)
         for trajectory in self.trajectories:
             yield from (Path(source.path) for source in load_trajectory(trajectory.path, self.robot).sources)
 
 
 def examples(names: Iterable[str] = ()) -> list[Example]:
-    """The robots of these names, by default all, in alphabetical order.
+    """Return the robots of these names, by default all, in alphabetical order.
 
     Raises:
         InputError: for each name that is no robot's, the nearest one that is.
@@ -108,7 +108,7 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
 
 
 def example_tables() -> list[Path]:
-    """The tables that robots name, as springs measured and profiles of cams."""
+    """Return the tables that robots name, as springs measured and profiles of cams."""
     return sorted((examples_root() / "robots").rglob("*.csv"))
 
 
@@ -124,7 +124,7 @@ def _every_file() -> list[Path]:
 
 
 def examples_root() -> Path:
-    """The folder of `robots` and `trajectories`: the package, or beside it in a clone of the repository."""
+    """Return the folder of `robots` and `trajectories`: in the package, or next to it in a clone."""
     package = Path(str(files("vsacli")))
     return package if (package / "robots").is_dir() else package.parent
 

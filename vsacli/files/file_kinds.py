@@ -80,7 +80,7 @@ _BEGINNING_BYTES = 64
 
 
 def recognise(path: str | os.PathLike[str]) -> FileKind:
-    """The kind of a file.
+    """Return the kind of a file.
 
     Raises:
         InputError: it cannot be read, or is none of the kinds.
@@ -139,6 +139,6 @@ def _document_kind(path: str | os.PathLike[str]) -> FileKind:
 
 
 def _hint(word: str) -> str:
-    """The nearest format, if one is near."""
+    """Return the nearest format, if one is near."""
     near = nearest(word, _DOCUMENT_KINDS)
     return f"; did you mean {near!r}?" if near else ""

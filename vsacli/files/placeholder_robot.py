@@ -46,7 +46,7 @@ class PlaceholderRobot(NamedTuple):
 
 
 def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
-    """A robot of revolute joints that a trajectory would fit if it fits any.
+    """Return a robot of revolute joints that a trajectory would fit if it fits any.
 
     Names and number of the joints are those that the file speaks of; one joint if it says nothing. Joints
     without stiffness are elastic, all rigid if there is neither stiffness nor damping. Those with a damping
@@ -85,7 +85,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
 
 
 def _tables(root: tree.Mapping) -> dict[str, list[str]]:
-    """The CSV files of a document, each with the names that columns are given in it."""
+    """Return the CSV files of a document, each with the names that columns are given in it."""
     files: dict[str, list[str]] = {}
     for key in ("position", *COMMANDED):
         match root.entries.get(key):
@@ -145,7 +145,7 @@ def _numbered(count: int) -> tuple[str, ...]:
 def _taking(
     nodes: Sequence[tree.Node], columns: Iterable[str], suffix: str, names: Sequence[str]
 ) -> tuple[str, ...]:
-    """The joints to which values per joint give a signal, or to which columns of this suffix do."""
+    """Return the joints to which values per joint give a signal, or to which columns of this suffix do."""
     if not nodes:
         return _of_suffix(columns, suffix, names) or tuple(names)
     for node in nodes:

@@ -164,7 +164,7 @@ class Extracted(NamedTuple):
 
 
 def extract(path: str | Path) -> Extracted:
-    """The inputs of a result, or of the table of a study.
+    """Return the inputs of a result, or of the table of a study.
 
     Raises:
         InputError: it is neither, or does not hold one of them.
@@ -250,7 +250,7 @@ def _function_of_time(result: StoredResult) -> tuple[Robot, Trajectory] | None:
 
 
 def _sampled(trajectory: Trajectory, rate: float) -> Trajectory:
-    """The trajectory at whole periods of a rate; if its end is none, up to the last one before."""
+    """Return the trajectory at whole periods of a rate; if its end is none, up to the last one before."""
     periods = int(trajectory.duration * rate + ROUNDING)
     time = trajectory.start + np.arange(periods + 1) / rate
     return trajectory.sampled(RecordedTimes(np.minimum(time, trajectory.times.span[1])))

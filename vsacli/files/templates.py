@@ -25,7 +25,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str]:
-    """The duration of a trajectory file that the robot can execute, and a remark if it is not the usual one.
+    """Return the duration of a trajectory file that the robot can execute, and a remark if it is longer.
 
     Args:
         robot: the robot.
@@ -100,7 +100,7 @@ START_TO_LOWEST, END_TO_LOWEST = 1.15, 1.35
 
 
 def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-robot") -> str:
-    """The text of a robot file.
+    """Return the text of a robot file.
 
     Args:
         joints: a letter for each joint from the base to the tip, R (revolute) or P (prismatic).
@@ -124,7 +124,7 @@ def robot_template(joints: str, actuator: str = "antagonistic", name: str = "my-
 
 
 def _joint(number: int, joint_type: str, actuator: str) -> Values:
-    """A joint whose axis is vertical if it is the first, otherwise horizontal."""
+    """Return a joint whose axis is vertical if it is the first, otherwise horizontal."""
     alpha: Any = "pi/2" if number == 1 else 0
     link = {"mass": 2.0, "inertia": {"xx": 0.002, "yy": 0.015, "zz": 0.015}}
     geometry = _by_type(
@@ -146,7 +146,7 @@ def _by_type(joint_type: str, revolute: Any, prismatic: Any) -> Any:
 
 
 def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory") -> str:
-    """The text of a trajectory file.
+    """Return the text of a trajectory file.
 
     Args:
         robot: the robot that is to execute it, whose limits and springs decide on the numbers; without one
@@ -192,7 +192,7 @@ def _position(robot: Robot) -> Values:
 
 
 def _written(joint: Joint, position: float) -> str:
-    """The position in a few digits; in all, if fewer would round it beyond a limit."""
+    """Return the position in a few digits; in all, if fewer would round it beyond a limit."""
     low, high = joint.limits.position
     shown, unit = (math.degrees(position), " deg") if joint.is_revolute else (position, "")
     short = f"{shown:.3g}"

@@ -84,12 +84,12 @@ class Checked:
 
 
 def _failed(path: str, error: InputError) -> Checked:
-    """A file that cannot be used."""
+    """Return a file that cannot be used."""
     return Checked(path, "", tuple(Message(ERROR, *problem) for problem in error.problems))
 
 
 def _usable(path: str, summary: str, warnings: Iterable[Problem] = (), notes: Iterable[str] = ()) -> Checked:
-    """A file that can be used, with what is to be known about it."""
+    """Return a file that can be used, with what is to be known about it."""
     messages = [Message(WARNING, path, warning.line, warning.message) for warning in warnings]
     return Checked(path, summary, (*messages, *(Message(NOTE, path, 0, text) for text in notes)))
 
@@ -211,7 +211,7 @@ def _stored(path: str, _: Robots) -> Checked:
 
 
 def _study(path: str, _: Robots) -> Checked:
-    """A study with the files it names, which no other can stand for."""
+    """Return a study with the files it names, which no other can stand for."""
     study = load_study(path)
     return _usable(path, f"study {study.file.name}, {_count(study.runs, 'run')} of {study.robot.name}")
 

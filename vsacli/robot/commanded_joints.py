@@ -53,7 +53,7 @@ class CommandedJoints:
         return tuple(each for each in COMMANDED.values() if each.device and each.key not in self.taken)
 
     def taking(self, signal: Signal) -> dict[int, str]:
-        """The joints that take a signal, by index."""
+        """Return the joints that take a signal, by index."""
         exempt = self.exempt.get(signal.key, {})
         return {index: name for index, name in enumerate(self.types) if name not in exempt}
 

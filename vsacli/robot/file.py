@@ -30,7 +30,7 @@ class RobotFile(Robot):
     )
 
     def robot(self) -> Robot:
-        """The robot, with standard rows and link frames whatever the convention of the file."""
+        """Return the robot, with standard rows and link frames whatever the convention of the file."""
         robot = Robot(**{name: getattr(self, name) for name in declared(Robot)}, sources=self.sources)
         if self.convention == "standard":
             return robot
@@ -61,7 +61,7 @@ class ReadRobot(NamedTuple):
     source: Source
 
     def robot(self, changes: Changes = MappingProxyType({})) -> Robot:
-        """The robot, with changes.
+        """Return the robot, with changes.
 
         Raises:
             ChangeError: one cannot be made.

@@ -53,11 +53,11 @@ class Frame(NamedTuple):
     origin: FloatArray
 
     def point(self, local: tuple[float, float, float]) -> FloatArray:
-        """A point given in this frame, (samples, 3)."""
+        """Return a point given in this frame, (samples, 3)."""
         return np.asarray(self.axes @ np.array(local) + self.origin)
 
     def holding(self, inner: Frame) -> Frame:
-        """A frame that is given in this one."""
+        """Return a frame that is given in this one."""
         origin = (self.axes @ inner.origin[..., None])[..., 0] + self.origin
         return Frame(self.axes @ inner.axes, origin)
 

@@ -63,12 +63,12 @@ class Robot:
         return html_table(f"Robot {self.name}", self._joint_rows())
 
     def _joint_rows(self) -> list[tuple[str, ...]]:
-        """A line for each joint, below a header."""
+        """Return a line for each joint, below a header."""
         joints = ((joint.name, joint.type, joint.actuator_type) for joint in self.joints)
         return [("joint", "type", "actuator"), *joints]
 
     def replace(self, path: str | Mapping[str, Any], value: Any = None) -> Self:
-        """A robot with another value at a path into it; this one stays as it is.
+        """Return a robot with another value at a path into it; this one stays as it is.
 
         `robot.replace("joints.elbow.link.mass", 2.5)`, or several at once:
         `robot.replace({"joints.*.damping": 0, "gravity.2": -1.62})`. The new robot is checked as a whole.
@@ -104,7 +104,7 @@ class Robot:
         return tuple(joint.actuator for joint in self.joints)
 
     def has(self, variable: Variable) -> bool:
-        """Whether results of the robot hold a variable of joints."""
+        """Return whether results of the robot hold a variable of joints."""
         if variable.requires == LOSSES:
             return any(joint.has_friction or joint.damper is not None for joint in self.joints)
         required_of_none = variable.requires in OF_ANY_ROBOT

@@ -24,7 +24,7 @@ AFTER_LAST = DenavitHartenberg(a=0, alpha=0)
 
 
 def as_standard(robot: Robot) -> Robot:
-    """The robot with standard rows and link frames, of one whose rows and link frames are modified ones.
+    """Return the robot with standard DH rows and link frames for one with modified ones.
 
     Zeros and right angles stay exact.
 
@@ -40,12 +40,12 @@ def as_standard(robot: Robot) -> Robot:
 
 
 def modified_link(joint: Joint) -> Link:
-    """The link of a standard joint in its modified frame, as a file of that convention has it."""
+    """Return the link of a standard joint in its modified frame, as a file of that convention has it."""
     return _moved_link(joint.link, DenavitHartenberg(a=-joint.dh.a, alpha=-joint.dh.alpha))
 
 
 def _moved(base: Pose, row: DenavitHartenberg) -> Pose:
-    """The pose followed by Rx(alpha) Tx(a); the roll of a pose is turned about its own x axis, too."""
+    """Return the pose followed by Rx(alpha) Tx(a); the roll of a pose is turned about its own x axis, too."""
     shift = rotation_matrix(base).times(Vector(exact(row.a), 0, 0))
     x, y, z = (float(start + step) for start, step in zip(base.xyz, shift, strict=True))
     roll, pitch, yaw = base.rpy
@@ -58,7 +58,7 @@ def _standard_joint(joint: Joint, row: DenavitHartenberg, next_row: DenavitHarte
 
 
 def _moved_link(link: Link, row: DenavitHartenberg) -> Link:
-    """The link seen from the frame that Tx(a) Rx(alpha) leads to."""
+    """Return the link seen from the frame that Tx(a) Rx(alpha) leads to."""
     c, s = trigonometric("cos", row.alpha), trigonometric("sin", row.alpha)
     x, (y, z) = link.com[0] - row.a, _turned(c, s, *link.com[1:])
     return Link(mass=link.mass, com=(x, y, z), inertia=_turned_inertia(link.inertia, c, s))

@@ -64,7 +64,7 @@ class Parameter(NamedTuple):
 
 
 def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, ...]:
-    """The numbers of a robot that results depend on.
+    """Return the numbers of a robot that results depend on.
 
     Args:
         robot: the robot.
@@ -101,12 +101,12 @@ def _parameter(robot: Robot, number: Number) -> Parameter:
 
 
 def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
-    """A robot that carries the derivatives by some of its numbers, a direction each; see `with_numbers`."""
+    """Return a robot that carries derivatives by some of its parameters (see `with_numbers`)."""
     return with_numbers(robot, chosen, seeds([parameter.value for parameter in chosen]))
 
 
 def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
-    """A robot with other values of some of its numbers, scalars of any kind.
+    """Return a robot with other values of some of its numbers, scalars of any kind.
 
     It is none to be checked or written: records on the way to those numbers are made without their checks.
     """
@@ -116,7 +116,7 @@ def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Sca
 
 
 def _with_numbers(content: Any, places: Iterable[tuple[NumberPath, Scalar]]) -> Any:
-    """A record or list with other numbers at some paths."""
+    """Return a record or list with other numbers at some paths."""
     inside: dict[str | int, list[tuple[NumberPath, Scalar]]] = {}
     for path, scalar in places:
         if not path:  # of a pair of numbers that are one, both
@@ -150,12 +150,12 @@ def _in_list(
 
 
 def apart(joint: Joint) -> Joint:
-    """The joint with an actuator that is no other's, as one may be of several robots."""
+    """Return the joint with an actuator that is no other's, as one may be of several robots."""
     return _remade(joint, {"actuator": _remade(joint.actuator, {})})
 
 
 def _remade(record: _Record, contents: Mapping[str, Any]) -> _Record:
-    """A record with other values in some fields, without its checks and without what it keeps of them."""
+    """Return a record with other values in some fields, without its checks and cached values."""
     new = object.__new__(type(record))
     for field in dataclasses.fields(record):  # type: ignore[arg-type]  # declared fields are those of dataclasses
         object.__setattr__(new, field.name, contents.get(field.name, getattr(record, field.name)))

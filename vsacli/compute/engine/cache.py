@@ -45,7 +45,7 @@ class Cache:
     folder: Path
 
     def find(self, key: str) -> Path | None:
-        """The library of a key, if there is one.
+        """Return the library of a key, if there is one.
 
         Raises:
             CacheError: there is, but it is not what was stored; it is removed.
@@ -84,7 +84,7 @@ class Cache:
             raise CacheError(f"the cache folder {self.folder} cannot be written: {error.strerror}") from None
 
     def entries(self) -> list[Entry]:
-        """All libraries, that which was not used for the longest time first; not other folders."""
+        """Return all libraries, that which was not used for the longest time first; not other folders."""
         found = []
         for path in self.folder.iterdir():
             with suppress(FileNotFoundError):  # removed meanwhile
@@ -137,7 +137,7 @@ class Cache:
 
 
 def open_cache() -> Cache:
-    """The cache of the user, made if need be.
+    """Return the cache of the user, made if need be.
 
     Raises:
         CacheError: it cannot be made, is not the user's, or others may write to it.

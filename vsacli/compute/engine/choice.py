@@ -75,7 +75,7 @@ def choose(
     *,
     busy: int = 0,
 ) -> Choice:
-    """The engine for a computation.
+    """Return the engine for a computation.
 
     Args:
         name: one of `NAMES`; "auto" takes compiled code where that saves time.
@@ -122,7 +122,7 @@ class Settled(NamedTuple):
 
 
 def settle(name: str, kernel: Kernel, samples: int) -> Settled:
-    """The engine for many computations that are to agree, whoever carries out each of them, and when.
+    """Return the engine for many computations that are to agree, whoever carries out each of them, and when.
 
     So it does not depend on what was compiled before.
 
@@ -185,7 +185,7 @@ def in_usual_blocks(samples: int, inputs: int) -> float:
 
 
 def _repays(code: Code, samples: float) -> bool:
-    """Whether NumPy would be busy for longer than the compiler, which is done in time."""
+    """Return whether NumPy would be busy for longer than the compiler, which is done in time."""
     repays = code.operations * samples * NUMPY_SECONDS > code.compiling_seconds
     return repays and not code.takes_too_long
 

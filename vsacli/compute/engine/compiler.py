@@ -79,7 +79,7 @@ class Compiler:
 
 
 def system_compiler() -> Compiler:
-    """The compiler that the environment variable CC names; else `cc`, else that of the package ziglang.
+    """Return the compiler that CC names; else `cc`, else that of the package ziglang.
 
     Raises:
         CompilerError: there is none, or it does not work.
@@ -113,7 +113,7 @@ def _examined(command: tuple[str, ...], _path: str) -> Compiler:
 
 
 def _spoken(command: tuple[str, ...]) -> str:
-    """A command in messages and for the record, where it does not matter which folder Python is in."""
+    """Return a command in messages and for the record, where it does not matter which folder Python is in."""
     return shlex.join("python" if part == sys.executable else part for part in command)
 
 

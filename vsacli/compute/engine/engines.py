@@ -58,7 +58,7 @@ def samples_per_pass(inputs: int) -> int:
 
 
 def passes(rows: Sequence[FloatArray]) -> Iterator[slice]:
-    """The samples of each pass over a kernel's inputs."""
+    """Yield the samples of each pass over a kernel's inputs."""
     samples = samples_per_pass(len(rows))
     for start in range(0, len(rows[0]), samples):
         yield slice(start, start + samples)
@@ -68,7 +68,7 @@ class Engine(Protocol):
     """What carries out kernels."""
 
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
-        """The kernel's outputs, (outputs, samples), from its inputs, contiguous rows (samples,)."""
+        """Return the kernel's outputs, (outputs, samples), from its inputs, contiguous rows (samples,)."""
 
 
 class NumPyEngine:
@@ -122,7 +122,7 @@ class TracedEngine:
 
 @lru_cache(maxsize=KEPT_PROGRAMS)
 def _row_function(kernel: Kernel) -> RowFunction | CallingRowFunction | None:
-    """The program of a kernel on rows; None if it has loops or tables."""
+    """Return the program of a kernel on rows; None if it has loops or tables."""
     from vsacli.compute.tracing import is_of_calls
     from vsacli.compute.tracing.row_functions import CallingRowFunction, RowFunction
 

@@ -47,7 +47,7 @@ VECTORS = Dialect(
 
 
 def batch_source(program: Program) -> str:
-    """A translation unit with the function `run` over rows of samples."""
+    """Return a translation unit with the function `run` over rows of samples."""
     counts = [f"#define INPUTS {len(program.inputs)}", f"#define OUTPUTS {len(program.outputs)}"]
     support = files("vsacli.compute.engine").joinpath("lanes.c").read_text(encoding="utf-8")
     group = _calling_group(program) if is_of_calls(program) else _group(program)
@@ -55,7 +55,7 @@ def batch_source(program: Program) -> str:
 
 
 def _group(program: Program) -> Iterator[str]:
-    """The function that computes one sample a lane."""
+    """Yield the function that computes one sample a lane."""
     tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
     writer = Writer(VECTORS, tables)
@@ -73,7 +73,7 @@ def _group(program: Program) -> Iterator[str]:
 
 
 def _calling_group(program: Program) -> Iterator[str]:
-    """The same for a program of calls: loops copy between the rows and the workspace."""
+    """Yield the same for a program of calls: loops copy between the rows and the workspace."""
     tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
     code = CallingCode("part", program, Writer(VECTORS, tables))
@@ -97,7 +97,7 @@ def _calling_group(program: Program) -> Iterator[str]:
 
 
 def _stores(type_: str, name: str, entries: list[tuple[int, Any]], value: str) -> Iterator[str]:
-    """A loop that stores values to rows, both of which follow from a table."""
+    """Yield a loop that stores values to rows, both of which follow from a table."""
     if not entries:
         return
     pairs = ", ".join(f"{{{row}, {entry}}}" for row, entry in entries)

@@ -68,7 +68,7 @@ def load(
     tell: Tell,
     worthwhile: Worthwhile = lambda _code: True,
 ) -> Loaded[_Opened] | None:
-    """The library of some code; None if it is not there and not worth compiling.
+    """Return the library of some code; None if it is not there and not worth compiling.
 
     Args:
         code: what to compile.

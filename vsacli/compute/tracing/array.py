@@ -32,7 +32,7 @@ def apply_ufunc(
 
 
 def elementwise(tape: Tape, ufunc: np.ufunc, *operands: Cells) -> Cells:
-    """A function on each entry."""
+    """Return a function on each entry."""
     if all(cells.size == 1 for cells in operands):
         single = np.empty(max((cells.shape for cells in operands), key=len), dtype=object)
         single[...] = _one(tape, ufunc, *(cells.item() for cells in operands))
@@ -41,7 +41,7 @@ def elementwise(tape: Tape, ufunc: np.ufunc, *operands: Cells) -> Cells:
 
 
 def each_entry(function: Callable[..., Operand], *operands: Any) -> Cells:
-    """A function of single entries on all of some arrays."""
+    """Return a function of single entries on all of some arrays."""
     spread = np.broadcast_arrays(*(np.asarray(cells, dtype=object) for cells in operands))
     result = np.empty(spread[0].size, dtype=object)
     result[:] = [function(*entries) for entries in zip(*(cells.flat for cells in spread), strict=True)]
@@ -49,7 +49,7 @@ def each_entry(function: Callable[..., Operand], *operands: Any) -> Cells:
 
 
 def _one(tape: Tape, ufunc: np.ufunc, *operands: Operand) -> Operand:
-    """A function of symbols or constants."""
+    """Return a function of symbols or constants."""
     if not any(isinstance(operand, Symbol) for operand in operands):
         with np.errstate(all="ignore"):
             number: Operand = ufunc(*operands).item()
@@ -72,7 +72,7 @@ def _any_truth(operands: Sequence[Operand]) -> bool:
 
 
 def _scaled_bits(tape: Tape, operands: Sequence[Operand]) -> Operand | None:
-    """A truth value as integer, times a constant."""
+    """Return a truth value as integer, times a constant."""
     for symbol, factor in (operands, operands[::-1]):
         if isinstance(symbol, Symbol) and symbol.operation == "bits":
             truth, mask = symbol.operands
@@ -229,7 +229,7 @@ class TracedArray(NDArrayOperatorsMixin):
         return hash(float(self))
 
     def _known(self) -> Cells:
-        """The entries, if all of them are constants."""
+        """Return the entries, if all of them are constants."""
         if any(isinstance(cell, Symbol) for cell in self.cells.flat):
             raise NotImplementedError(
                 "what is known only when the program runs cannot decide what is recorded"
@@ -293,7 +293,7 @@ _CASTS: dict[str, Callable[[float], Operand]] = {"u": int, "f": float, "b": bool
 
 
 def cells_of(array: Any) -> Cells:
-    """The entries of an array, traced or not, as symbols and Python's numbers."""
+    """Return the entries of an array, traced or not, as symbols and Python's numbers."""
     if isinstance(array, TracedArray):
         return array.cells
     return np.asarray(array, dtype=object)
@@ -309,7 +309,7 @@ def _unpacked(argument: Any) -> Any:
 
 
 def _index(index: Any) -> Any:
-    """An index; of traced arrays only truth values that do not depend on a sample."""
+    """Return an index; of traced arrays only truth values that do not depend on a sample."""
     return index._known().astype(bool) if isinstance(index, TracedArray) else index
 
 
@@ -321,7 +321,7 @@ def trace(
     calling: bool = False,
     short: bool = False,
 ) -> Program:
-    """The program of a function of rows of samples: what it does to one sample.
+    """Return the program of a function of rows of samples: what it does to one sample.
 
     Args:
         function: from rows of samples to rows of results; each sample is computed by itself.
@@ -346,7 +346,7 @@ def trace_by_size(
     *,
     short: bool = False,
 ) -> Program:
-    """The program of a function, as of `trace`: written out if it is short, else of calls.
+    """Return the program of a function, as of `trace`: written out if it is short, else of calls.
 
     Args:
         function: as of `trace`.

@@ -188,7 +188,7 @@ class Dialect(NamedTuple):
 
 
 def digits(number: float) -> str:
-    """A constant with all its digits; those that are not finite by their names of math.h."""
+    """Return a constant with all its digits; those that are not finite by their names of math.h."""
     if math.isnan(number):
         return "NAN"
     if math.isinf(number):
@@ -226,7 +226,7 @@ class Writer:
                 yield f"const {self.dialect.types[symbol.kind]} {_name(symbol, names, prefix)} = {text};"
 
     def value(self, operand: Operand, kind: Kind, names: Names, prefix: str = "v") -> str:
-        """A value, or a constant of that kind."""
+        """Return a value, or a constant of that kind."""
         if isinstance(operand, Symbol):
             return _name(operand, names, prefix)
         return self.dialect.constant(operand, kind)
@@ -254,7 +254,7 @@ class Writer:
         return dialect.call(symbol.kind, C_NAMES.get(operation, operation), texts)
 
     def definition(self, head: str, program: Program, names: Names, results: str) -> Iterator[str]:
-        """A function that puts what a program computes into an array of real numbers."""
+        """Yield a function that puts what a program computes into an array of real numbers."""
         yield head
         yield "{"
         yield from self.statements(program.operations, names)
@@ -263,7 +263,7 @@ class Writer:
         yield "}"
 
     def _subroutine(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
-        """An array of the results, and what fills it."""
+        """Yield an array of the results, and what fills it."""
         assert self._name_of is not None
         (body,), *operands = symbol.operands
         own = _name(symbol, names, prefix)
@@ -352,5 +352,5 @@ def _name(symbol: Symbol, names: Names, prefix: str) -> str:
 
 
 def _renamed(body: Program, texts: list[str]) -> Names:
-    """The inputs of a body by what they are given."""
+    """Return the inputs of a body by what they are given."""
     return {symbol.index: text for symbol, text in zip(body.inputs, texts, strict=True)}

@@ -67,7 +67,7 @@ def _key(program: Program) -> Hashable:
 
 
 def _operand_key(operand: Any) -> Hashable:
-    """A value by its number, a constant by its digits; NaN, too, equals itself."""
+    """Return a value by its number, a constant by its digits; NaN, too, equals itself."""
     if isinstance(operand, Symbol):
         return operand.index, operand.kind
     if isinstance(operand, Table):
@@ -131,7 +131,7 @@ class CallingCode:
         return iter(self._statements)
 
     def value(self, symbol: Symbol, place: str | int) -> str:
-        """A value in the workspace."""
+        """Return a value in the workspace."""
         return self._dialect.from_slot(symbol.kind, f"{VALUES}[{place}]")
 
     def _call(self, symbol: Symbol, values: list[Symbol], workspace: Workspace) -> None:
@@ -147,7 +147,7 @@ class CallingCode:
         self._places += [workspace.slot[value.index] for value in values]
 
     def _definition(self, function: _Function, qualifiers: str) -> Iterator[str]:
-        """A function that loads what is first needed, and stores results at once: fewer values to keep."""
+        """Yield a function that loads inputs at first use and stores results at once, to keep few values."""
         types, body = self._dialect.types, function.body
         values, table = f"{types[Kind.REAL]} *{VALUES}", f"const {self._number} *{CONSTANTS}"
         yield f"{qualifiers} void {function.name}({values}, {table}, const int *{PLACES})"

@@ -26,7 +26,7 @@ class _Run(NamedTuple):
 
 
 def with_outlined_runs(program: Program) -> Program:
-    """The program with nothing but calls and items of these."""
+    """Return the program with nothing but calls and items of these."""
     parts = list(_calls_and_runs(program.operations))
     last_part = {
         operand.index: number
@@ -68,7 +68,7 @@ def _is_item_of_call(symbol: Symbol) -> bool:
 
 
 def _called(operations: Sequence[Symbol], results: Sequence[Symbol], index: int) -> list[Symbol]:
-    """A call of operations, and the results that are read beyond, which keep their numbers."""
+    """Return a call of operations, and the results that are read beyond, which keep their numbers."""
     own = {symbol.index for symbol in operations}
     given = {
         operand.index: operand
@@ -122,7 +122,7 @@ class _Common(NamedTuple):
 
 
 def with_shared_bodies(program: Program) -> Program:
-    """The program with calls of fewer bodies: constants in which alike ones differ become arguments."""
+    """Return the program with fewer bodies: constants in which similar ones differ become arguments."""
     calls: list[Call] = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
     programs = {id(call.body): call.body for call in calls}
     bodies = {identity: _read(body) for identity, body in programs.items()}
@@ -173,14 +173,14 @@ def _operand_shapes(
 
 
 def _operand_shape(operand: Any, number: Mapping[int, int]) -> Hashable:
-    """The number of a value; else what is fixed, numbers to the digit."""
+    """Return the number of a value; else what is fixed, numbers to the digit."""
     if isinstance(operand, Symbol):
         return number[operand.index]
     return (type(operand), repr(operand)) if isinstance(operand, float | int) else operand
 
 
 def _common(program: Program, of_bodies: Sequence[Constants]) -> _Common:
-    """The body for several that are as this one but for constants; which stay where all have the same."""
+    """Return one body for several that differ in constants only; those that are equal in all stay."""
     first: dict[tuple[str, ...], Place] = {}
     same: dict[Place, Place] = {}
     for place in of_bodies[0]:
@@ -192,7 +192,7 @@ def _common(program: Program, of_bodies: Sequence[Constants]) -> _Common:
 
 
 def _opened(program: Program, parameters: Mapping[Place, int]) -> Program:
-    """A program that is given the constants in some places: those of the same number in one input."""
+    """Return a program that is given the constants in some places: those of the same number in one input."""
     if not parameters:
         return program
     values = [*program.inputs, *program.operations]
@@ -211,7 +211,7 @@ def _opened(program: Program, parameters: Mapping[Place, int]) -> Program:
 
 
 def _given(symbol: Symbol, places: Mapping[Place, int], inputs: Mapping[int, Symbol]) -> Symbol:
-    """An operation with values in place of constants among its operands, or in its body."""
+    """Return an operation with values in place of constants among its operands, or in its body."""
     operands: list[Any] = list(symbol.operands)
     deeper = {place: number for place, number in places.items() if len(place) > 1}
     for place, number in places.items():
@@ -274,5 +274,5 @@ class Workspace:
 
 
 def values_of(symbol: Symbol) -> Iterator[Symbol]:
-    """The operands of an operation that are no constants."""
+    """Return the operands of an operation that are no constants."""
     return (operand for operand in symbol.operands if isinstance(operand, Symbol))

@@ -34,7 +34,7 @@ class Emitter(Protocol):
     """What the operators of symbols add operations to: a tape."""
 
     def emit(self, operation: str, *operands: Any) -> Operand:
-        """The result of an operation on symbols and constants."""
+        """Return the result of an operation on symbols and constants."""
 
 
 class Symbol:
@@ -60,7 +60,7 @@ class Symbol:
         self.kind = kind
 
     def with_operands(self, operands: Sequence[Any]) -> Symbol:
-        """The same value of an operation on other operands."""
+        """Return the same value of an operation on other operands."""
         return Symbol(self.tape, self.index, self.operation, tuple(operands), self.kind)
 
     def __add__(self, other: Scalar) -> Operand:
@@ -119,7 +119,7 @@ class Program(NamedTuple):
 
 
 def is_of_calls(program: Program) -> bool:
-    """Whether a program was traced with calls, of which it then consists."""
+    """Return whether a program was traced with calls, of which it then consists."""
     return any(symbol.operation == "call" for symbol in program.operations)
 
 
@@ -202,7 +202,7 @@ _KINDS = {
 
 
 def kind_of(operand: Any) -> Kind:
-    """The kind of a value; a plain integer is a real number wherever it may be one."""
+    """Return the kind of a value; a plain integer is a real number wherever it may be one."""
     if isinstance(operand, Symbol):
         return operand.kind
     return Kind.TRUTH if isinstance(operand, bool) else Kind.REAL
@@ -227,7 +227,7 @@ def kinds_of_operands(symbol: Symbol) -> list[Kind]:
 
 
 def result_kind(operation: str, operands: Sequence[Any]) -> Kind:
-    """The kind of an operation's result.
+    """Return the kind of an operation's result.
 
     Raises:
         NotImplementedError: it is none of those that can be recorded.

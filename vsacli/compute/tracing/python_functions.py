@@ -88,7 +88,7 @@ def _expression(symbol: Symbol, tables: Mapping[Table, str]) -> str:
 
 
 def _value(operand: Any) -> str:
-    """A name, or a constant exactly."""
+    """Return a name, or a constant exactly."""
     if isinstance(operand, Symbol):
         return f"v{operand.index}"
     return f"({operand!r})" if operand < 0 else repr(operand)  # nan and inf are names of NumPy

@@ -124,7 +124,7 @@ class _RowAllocation:
             yield f" {symbol.operation}({', '.join(operands)}, {out}{self._allocated(symbol)})"
 
     def _operand(self, operand: Operand, kind: Kind = Kind.REAL) -> str:
-        """A row, or a constant as values of a kind have it."""
+        """Return a row, or a constant as values of a kind have it."""
         if isinstance(operand, Symbol):
             return self._row[operand.index]
         kind = _kind_of_constant(operand, kind)
@@ -133,7 +133,7 @@ class _RowAllocation:
         return name
 
     def _allocated(self, symbol: Symbol) -> str:
-        """A row for a value: that of an output, one that is free, or a new one."""
+        """Return a row for a value: that of an output, one that is free, or a new one."""
         row = self._output_row.get(symbol.index)
         if row is None and self._free[symbol.kind]:
             row = self._free[symbol.kind].pop()

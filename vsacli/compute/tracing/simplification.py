@@ -20,7 +20,7 @@ from vsacli.compute.tracing.program import (
 
 
 def folded(operation: str, operands: Sequence[Operand]) -> Operand | None:
-    """The result if it is a constant or one of the operands; None if the operation has to be carried out.
+    """Return the result if it is a constant or an operand; None if the operation has to be carried out.
 
     What NumPy would compute is kept, NaN and infinity included: 0 x is not 0. But x + 0 is x, also where x
     is -0.
@@ -48,7 +48,7 @@ def _is(operand: Operand, constant: float) -> bool:
 
 
 def _neutral(constant: float) -> Callable[[Operand, Operand], Operand | None]:
-    """The rule of a commutative operation that a constant leaves the other operand as it is."""
+    """Return the rule of a commutative operation that a constant leaves the other operand as it is."""
 
     def rule(a: Operand, b: Operand) -> Operand | None:
         return b if _is(a, constant) else _second_neutral(constant)(a, b)
@@ -57,7 +57,7 @@ def _neutral(constant: float) -> Callable[[Operand, Operand], Operand | None]:
 
 
 def _second_neutral(constant: float) -> Callable[[Operand, Operand], Operand | None]:
-    """The rule of an operation that a constant leaves the first operand as it is."""
+    """Return the rule of an operation that a constant leaves the first operand as it is."""
     return lambda a, b: a if _is(b, constant) else None
 
 
@@ -117,7 +117,7 @@ Shortened = dict[tuple[int, frozenset[int]], Program]
 def without_dead_code(
     inputs: Sequence[Symbol], operations: Sequence[Symbol], outputs: Sequence[Operand]
 ) -> Program:
-    """The program that computes these outputs by those of the operations that they need."""
+    """Return the program that computes these outputs by those of the operations that they need."""
     needed = {output.index for output in outputs if isinstance(output, Symbol)}
     items: dict[int, set[int]] = defaultdict(set)
     shortened: Shortened = {}
@@ -140,7 +140,7 @@ def without_dead_code(
 
 
 def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
-    """A loop with the part of the state on which the wanted entries, and the end, depend."""
+    """Return a loop with the part of the state on which the wanted entries, and the end, depend."""
     (body, limit, numbers), *operands = symbol.operands
     places = _places(numbers, wanted)
     live: set[int] = set()
@@ -161,7 +161,7 @@ def _loop(symbol: Symbol, wanted: set[int]) -> Symbol:
 
 
 def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
-    """A branch with the wanted outputs."""
+    """Return a branch with the wanted outputs."""
     (body, numbers), truth, *operands = symbol.operands
     places = _places(numbers, wanted)
     shorter = without_dead_code(body.inputs, body.operations, _chosen(body.outputs, places))
@@ -179,7 +179,7 @@ def _branch(symbol: Symbol, wanted: set[int]) -> Symbol:
 
 
 def _call(symbol: Symbol, wanted: set[int], shortened: Shortened) -> Symbol:
-    """A call with the wanted outputs; calls of one program for the same outputs keep one program."""
+    """Return a call with the wanted outputs; calls of one program for the same outputs keep one program."""
     (body, numbers), *operands = symbol.operands
     places = frozenset(_places(numbers, wanted))
     key = id(body), places

@@ -59,13 +59,13 @@ class Tape:
         return [self.input(Kind.REAL) for _ in range(count)]
 
     def input(self, kind: Kind) -> Symbol:
-        """A new variable."""
+        """Return a new variable."""
         symbol = self._new("input", (), kind)
         self._inputs.append(symbol)
         return symbol
 
     def emit(self, operation: str, *operands: Operand | Table) -> Operand:
-        """The result of an operation on symbols and constants, named as the function of NumPy.
+        """Return the result of an operation on symbols and constants, named as the function of NumPy.
 
         Beyond these there are `bits(truth, mask)`, the mask where true, else 0; and `take(table, index)`.
         """
@@ -79,7 +79,7 @@ class Tape:
     def emit_loop(
         self, body: Program, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
     ) -> list[Symbol]:
-        """The state after the repetition of a program that was traced on a tape of its own."""
+        """Return the state after the repetition of a program that was traced on a tape of its own."""
         loop = Loop(body, limit, tuple(range(len(state))))
         return self._emit_nested("loop", body.outputs[:-1], (loop, *state, *constants))
 

@@ -81,7 +81,7 @@ def subroutine_traced(first: TracedArray, function: Function, arguments: Sequenc
 def _nested(
     tape: Tape, function: Callable[[Sequence[Any]], Sequence[Any]], entries: Sequence[Operand]
 ) -> Program:
-    """The program of a body within one on a tape."""
+    """Return the program of a body within one on a tape."""
     return trace(function, list(map(kind_of, entries)), short=tape.short)
 
 
@@ -107,7 +107,7 @@ def _taken(index: TracedArray, table: Table) -> TracedArray:
 def _for_each_entry(
     emit: Callable[..., Sequence[Operand]], like: TracedArray, arrays: Sequence[Any], count: int
 ) -> tuple[TracedArray, ...]:
-    """A loop or branch with `count` results for each entry of arrays."""
+    """Return a loop or branch with `count` results for each entry of arrays."""
     spread = np.broadcast_arrays(*map(cells_of, arrays), subok=False)
     results: Iterator[Sequence[Operand]] = (
         emit(*entries) for entries in zip(*(cells.flat for cells in spread), strict=True)

@@ -126,7 +126,7 @@ class _Law:
         return values
 
     def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
-        """The arrays of each argument by name."""
+        """Return the arrays of each argument by name."""
         sizes = RowLayout({name: (structure.layout.size,) for name, structure in self.arguments})
         entries = sizes.arrays(np.concatenate(rows))
         return (structure.layout.arrays(entries[name]) for name, structure in self.arguments)

@@ -80,7 +80,7 @@ def unpacked(arguments: Arguments, rows: Rows) -> dict[str, Rows]:
 
 
 def structures(functions: Sequence[Function]) -> list[Structure]:
-    """Each structure that functions use, once."""
+    """Return each structure that functions use, once."""
     used = (each for function in functions for each in (*dict(function.arguments).values(), function.result))
     return list(dict.fromkeys(used))
 

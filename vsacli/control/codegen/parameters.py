@@ -19,7 +19,7 @@ PARAMETERS = "parameters"
 
 
 def parameters_structure(chosen: Sequence[Parameter]) -> Structure:
-    """The argument: a member for each number, by its path."""
+    """Return the argument: a member for each number, by its path."""
     meaning = "Numbers of the robot, by their paths in its file; the functions do not check them."
     arrays = (Array("_".join(each.by_index), (), _meaning(each)) for each in chosen)
     return Structure(PARAMETERS, meaning, tuple(arrays), tuple(each.value for each in chosen))
@@ -32,7 +32,7 @@ def _meaning(parameter: Parameter) -> str:
 
 
 def with_parameters(make: Maker, robot: Robot, frame: str | None, chosen: Sequence[Parameter]) -> Function:
-    """A function that takes some numbers of the robot, unless it depends on none of them.
+    """Return a function that takes some numbers of the robot, unless it depends on none of them.
 
     What makes it is called again where these are symbols, so that there is no second text of anything.
 
@@ -54,7 +54,7 @@ def with_parameters(make: Maker, robot: Robot, frame: str | None, chosen: Sequen
 
 
 def _reads(program: Program, last: int) -> bool:
-    """Whether a program reads one of its last inputs."""
+    """Return whether a program reads one of its last inputs."""
     operands = {operand for each in program.operations for operand in each.operands} | {*program.outputs}
     return any(isinstance(each, Symbol) and each in operands for each in program.inputs[-last:])
 

@@ -55,7 +55,7 @@ def wrench_structure(frame: str) -> Structure:
 
 
 def wrench_argument(frame: str | None) -> tuple[tuple[str, Structure], ...]:
-    """The wrench as an argument, if there is one."""
+    """Return the wrench as an argument, if there is one."""
     return () if frame is None else (("wrench", wrench_structure(frame)),)
 
 
@@ -159,7 +159,7 @@ def _arrays(robot: Robot, names: tuple[str, ...]) -> tuple[Array, ...]:
 
 
 def variable_array(robot: Robot, name: str) -> Array:
-    """The array of a result variable."""
+    """Return the array of a result variable."""
     variable = VARIABLES[name]
     motors = (2,) if "motor" in variable.dims else ()
     units = dict.fromkeys(variable.quantity.unit(joint_type) for joint_type in robot.joint_types)

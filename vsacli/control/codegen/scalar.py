@@ -51,12 +51,12 @@ static inline int search(const {type} *nodes, int count, {type} x)
 
 
 def _holds_float(value: float) -> bool:
-    """Whether single precision has all digits of a number that is not below its range."""
+    """Return whether single precision has all digits of a number that is not below its range."""
     return math.isnan(value) or (single(value) == value and float(np.float32(value)) == value)
 
 
 def _holds_integer(largest: int) -> Callable[[float], bool]:
-    """Whether a whole number of so many values has all digits; minus zero is none."""
+    """Return whether a whole number of so many values has all digits; minus zero is none."""
     return lambda value: abs(value) <= largest and value == int(value) and str(value) != "-0.0"
 
 
@@ -152,7 +152,7 @@ def definitions(prefix: str, functions: Sequence[Function], precision: str) -> I
 
 
 def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
-    """The nominal values of a structure."""
+    """Return the nominal values of a structure."""
     values = zip(structure.entries, structure.nominal, strict=True)
     members = (f"    .{entry} = {dialect.real(value)},\n" for entry, value in values)
     name = f"{prefix}_{structure.name} {prefix}_nominal_{structure.name}"
@@ -160,13 +160,13 @@ def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
 
 
 def helper_text(name: str, precision: str) -> str:
-    """A function of `HELPERS`."""
+    """Return a function of `HELPERS`."""
     text = HELPERS[name].format(type=precision)
     return text if text.startswith("/*") else f"static inline {text}"
 
 
 def signature(prefix: str, function: Function) -> str:
-    """The head of a function; each argument in a line of its own if they do not fit into one."""
+    """Return the head of a function; each argument in a line of its own if they do not fit into one."""
     arguments = [f"const {prefix}_{structure.name} *{name}" for name, structure in function.arguments]
     result = f"{prefix}_{function.result.name} *{function.result.name}"
     lines = [f"unsigned {prefix}_{function.name}({', '.join([*arguments, result])})"]

@@ -72,7 +72,7 @@ class Reference:
         }
 
     def inputs(self, function: Function) -> list[Arrays]:
-        """The arguments of a function, each by the names of its arrays."""
+        """Return the arguments of a function, each by the names of its arrays."""
         return [
             _gains(structure.arrays[0].shape) if structure.name == "gains" else self._inputs[structure.name]
             for _, structure in function.arguments
@@ -101,7 +101,7 @@ class Reference:
         return Comparison(0.0 if bits else scale, scale if name == BOUNDED else np.inf)
 
     def _entries(self, function: Function) -> FloatArray:
-        """All entries of the arguments, (CASES, entries)."""
+        """Return all entries of the arguments, (CASES, entries)."""
         entries = [
             arrays[member.name].reshape(CASES, -1)
             for (_, structure), arrays in zip(function.arguments, self.inputs(function), strict=True)
@@ -166,7 +166,7 @@ def _two_sets(chosen: Sequence[Parameter]) -> Arrays:
 
 
 def _gains(shape: Sequence[int]) -> Arrays:
-    """All poles at one place, with integral action; the same for each case."""
+    """Return all poles at one place, with integral action; the same for each case."""
     joints, order = shape
     position, stiffness = (np.poly([POLE] * (count + 1))[:0:-1] for count in (order, STIFFNESS_ORDER))
     return {
@@ -234,7 +234,7 @@ def check_single_precision(robot: Robot, functions: Sequence[Function], referenc
 
 
 def _differences(functions: Sequence[Function], reference: Reference) -> Iterator[_Difference]:
-    """The largest difference in each array."""
+    """Yield the largest difference in each array."""
     for function in functions:
         single, double = reference.single_results(function), reference.results(function)
         for array in function.result.arrays:

@@ -86,7 +86,7 @@ def _conventions(robot: Robot, functions: Sequence[Function]) -> str:
 
 
 def _structure(prefix: str, structure: Structure, precision: str) -> str:
-    """The type of a structure in C, and its constant if it has nominal values."""
+    """Return the type of a structure in C, and its constant if it has nominal values."""
     name = f"{prefix}_{structure.name}"
     lines = [comment(structure.meaning), "typedef struct {"]
     for array in structure.arrays:
@@ -138,7 +138,7 @@ def self_test_text(
 
 
 def _vector(declared: str, structure: Structure, values: Arrays) -> str:
-    """A constant with the values of a structure in all cases."""
+    """Return a constant with the values of a structure in all cases."""
     cases = (
         ", ".join(
             f".{array.name} = {_initializer(values[array.name][case], array.bits)}"
@@ -156,7 +156,7 @@ def _initializer(values: FloatArray, bits: bool) -> str:
 
 
 def _test(prefix: str, function: Function, reference: Reference) -> str:
-    """The comparison of all entries of a result in C."""
+    """Return the comparison of all entries of a result in C."""
     own, result = function.name, f"{prefix}_{function.result.name}"
     given = ", ".join(f"&{own}_{name}[n]" for name, _ in function.arguments)
     comparisons = "\n".join(_comparisons(function, reference))
@@ -210,7 +210,7 @@ def _type(structure: Structure) -> str:
 
 
 def _data_type(structure: Structure, precision: str) -> str:
-    """The type of a structure in Python, laid out as C has it."""
+    """Return the type of a structure in Python, laid out as C has it."""
     number = {"double": "np.float64", "float": "np.float32"}[precision]
     members = "".join(
         f'        ("{array.name}", {"np.uintc" if array.bits else number}, {array.shape}),\n'
@@ -220,7 +220,7 @@ def _data_type(structure: Structure, precision: str) -> str:
 
 
 def _binding(prefix: str, function: Function) -> str:
-    """A function in Python with the arguments of that in C."""
+    """Return a function in Python with the arguments of that in C."""
     meaning = f'"""{function.meaning}"""'
     given = "".join(f", ({name}, {_type(structure)})" for name, structure in function.arguments)
     return f"""def {function.name}({_names(function)}):
@@ -229,7 +229,7 @@ def _binding(prefix: str, function: Function) -> str:
 
 
 def _constant(prefix: str, structure: Structure) -> str:
-    """The nominal values of a structure, in Python."""
+    """Return the nominal values of a structure, in Python."""
     kind, name = _type(structure), f"{prefix}_nominal_{structure.name}"
     return f"""_CONSTANT = (ctypes.c_char * {kind}.itemsize).in_dll(_LIBRARY, "{name}")
 NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""

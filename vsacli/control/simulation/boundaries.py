@@ -37,13 +37,13 @@ class Boundary(ABC):
         """What must stay positive, one number for each of `joints`, at positions of joints and motors."""
 
     def distance(self, vector: FloatArray) -> FloatArray:
-        """The smallest distance, at most 1; one that is not defined any more lies beyond."""
+        """Return the smallest distance, at most 1; one that is not defined any more lies beyond."""
         distances = self._distances(vector)
         known = np.where(np.isnan(distances), -1.0, np.minimum(distances, 1.0))
         return reduce(np.minimum, np.moveaxis(known, -1, 0))
 
     def ending(self, time: float, vector: FloatArray) -> Ending:
-        """The end of a run here."""
+        """Return the end of a run here."""
         return Ending(time, self.reason, self.flag, int(self.joints[np.argmin(self._distances(vector))]))
 
     def _distances(self, vector: FloatArray) -> FloatArray:

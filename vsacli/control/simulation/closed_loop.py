@@ -49,16 +49,16 @@ class Packing:
         self.motor_velocities = drivetrain.of_all(dq, dtheta)
 
     def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
-        """The vector of a state at which nothing is integrated yet."""
+        """Return the vector of a state at which nothing is integrated yet."""
         nothing = np.zeros_like(q)
         return self.joined(Phase(q, dq, theta, dtheta, Integral(nothing, nothing)))
 
     def joined(self, phase: Phase) -> FloatArray:
-        """The vector of a state."""
+        """Return the vector of a state."""
         return np.concatenate((*phase[:4], *phase.integral))
 
     def unpack(self, vector: FloatArray) -> Phase:
-        """The parts of vectors (..., entries), as views."""
+        """Return the parts of vectors (..., entries), as views."""
         q, dq, theta, dtheta, *integral = (vector[..., part] for part in self._parts)
         return Phase(q, dq, theta, dtheta, Integral(*integral))
 
@@ -181,7 +181,7 @@ class ClosedLoop:
         return self.controller_torque(time, vector) if self.held is None else self.held(time)
 
     def controller_torque(self, time: float, vector: FloatArray) -> FloatArray:
-        """The same if the controller acts in that state."""
+        """Return the same if the controller acts in that state."""
         return self.controller.torque(time, self.packing.unpack(vector), self.slip)
 
     def hold(self, torques: FloatArray) -> None:

@@ -59,7 +59,7 @@ def dop853_with_stages() -> Any:
             self._step_impl = MethodType(FunctionType(text.__code__, names), self)
 
         def _rk_step(self, fun: Any, t: Any, y: Any, f: Any, h: Any, *tableau: Any) -> Any:
-            """The state at the end of a trial step, and its rates; those at the stages are left in K."""
+            """Return the state at the end of a trial step, and its rates; leave those of the stages in K."""
             self.K[0] = f
             state = self._stages(t, h, y, step, self.K_extended)
             return one_by_one(fun, t, y, f, h, *tableau) if state is None else (state, self.K[-1].copy())
@@ -121,7 +121,7 @@ class _Loop(Structure):
 
 
 def open_loop(path: Path) -> dict[str, Any]:
-    """The functions of a compiled closed loop by name.
+    """Return the functions of a compiled closed loop by name.
 
     Raises:
         CompilerError: they cannot be loaded.

@@ -34,7 +34,7 @@ class Ending:
     verdict: str = DIVERGED
 
     def described(self, joint_names: Sequence[str], first: float) -> str:
-        """The end as a sentence; `first` is the stamp of time zero, s."""
+        """Return the end as a sentence; `first` is the stamp of time zero, s."""
         place = "" if self.joint is None else f"{joint_names[self.joint]}: "
         return f"{place}{self.reason}; ended at t = {time_text(first + self.time)}"
 
@@ -84,11 +84,11 @@ class Budget:
         self._first, self._last = float(times[0]), float(times[-1])
 
     def spent(self, _time: float) -> bool:
-        """Whether nothing is left."""
+        """Return whether nothing is left."""
         return self.used >= self.limit
 
     def too_slow(self, time: float) -> bool:
-        """Whether a run that goes on as it did up to a time takes more than may be taken explicitly."""
+        """Return whether a run that goes on at this rate exceeds the limit of explicit steps."""
         projected = self.used * (self._last - self._first)  # times the part of it that is done
         share = EXPLICIT_SHARE * self.limit
         return self.used > TRIAL * self.limit and projected > share * (time - self._first)
@@ -125,6 +125,6 @@ class Deadline:
         return min(self.time - time, 1.0)
 
     def ending(self, time: float, _vector: FloatArray) -> Ending:
-        """The end of a run here."""
+        """Return the end of a run here."""
         reason = f"the budget of {self._limit} evaluations of the equations of motion is used up"
         return Ending(time, reason, verdict=INCOMPLETE)

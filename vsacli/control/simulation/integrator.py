@@ -168,7 +168,7 @@ class Integrator:
         events: Sequence[Any],
         options: Mapping[str, Any],
     ) -> Any:
-        """A solution from a time on, evaluated at further times, to the first event or the last time."""
+        """Return a solution evaluated at further times, up to the first event or the last time."""
         from scipy.integrate import solve_ivp
 
         time, times = span
@@ -193,7 +193,7 @@ def _evaluated(solution: Any, start: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def _terminal_event(events: Sequence[Any], solution: Any) -> tuple[Any, float, FloatArray]:
-    """The event that ended a solution, its time and state; None if the solution reached its last time."""
+    """Return the event that ended a solution, its time and state; None if there was none."""
     for event, times, states in zip(events, solution.t_events, solution.y_events, strict=True):
         if len(times):
             return event, float(times[-1]), states[-1]

@@ -179,7 +179,7 @@ def _tracking(
 
 
 def _worst(joint: Joint, index: int, history: History) -> dict[str, Worst]:
-    """The worst excess of each limit of a joint; of either motor."""
+    """Return the worst excess of each limit of a joint; of either motor."""
     worst: dict[str, Worst] = {}
     most: dict[str, float] = {}
     checks = [check for check in limit_checks(joint) if check.flag in LIMITS]
@@ -200,7 +200,7 @@ def _checked(variable: str) -> str:
 
 
 def row(joint: JointTracking) -> tuple[str, ...]:
-    """A joint in the table of the report, under `HEADER`."""
+    """Return a joint in the table of the report, under `HEADER`."""
     motors = " / ".join(_number(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
     return (
         joint.name,
@@ -241,7 +241,7 @@ def end_sentence(joint: JointTracking) -> str:
 
 
 def stiffness_warnings(robot: Robot, history: History) -> Iterator[str]:
-    """A warning for each joint that arrives with another stiffness than commanded."""
+    """Yield a warning for each joint that arrives with another stiffness than commanded."""
     errors = history.stiffness_error[-1]
     allowed = STIFFNESS_SHARE * history.stiffness.max(axis=0)
     for index in np.flatnonzero(np.abs(errors) > allowed):  # NaN of rigid joints exceeds nothing

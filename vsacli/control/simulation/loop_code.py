@@ -72,7 +72,7 @@ def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
 
 
 def _recorded(function: Callable[[Any, Any], Any], entries: int) -> Recorded:
-    """A function of a time and a state vector."""
+    """Return a function of a time and a state vector."""
     tape = Tape(MOST_RECORDED)
 
     def inputs(count: int) -> Any:
@@ -112,7 +112,7 @@ def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
 
 
 def _function(name: str, program: Program, entries: int, writer: Writer) -> Iterator[str]:
-    """A function of a program, whose inputs are the entries of a state, then columns of tables."""
+    """Return a function of a program, whose inputs are the entries of a state, then columns of tables."""
     places = (
         f"y[{number}]" if number < entries else f"s[{number - entries}]"
         for number in range(len(program.inputs))

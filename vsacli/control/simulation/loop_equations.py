@@ -55,7 +55,7 @@ class Equations:
     def stages(
         self, _time: float, _step: float, _vector: FloatArray, _which: Stages, _rates: FloatArray
     ) -> FloatArray | None:
-        """Several stages of a step; see `CompiledLoop.stages`. None if they must be computed one by one."""
+        """Return several stages of a step (see `CompiledLoop.stages`); None to compute them one by one."""
         return None
 
     def distance(self, vector: FloatArray) -> float:
@@ -81,7 +81,7 @@ class Edge:
         return self._equations.distance(vector)
 
     def ending(self, time: float, vector: FloatArray) -> Ending:
-        """The end of a run there."""
+        """Return the end of a run there."""
         reached = min(self._equations.boundaries, key=lambda each: float(each.distance(vector)))
         return reached.ending(time, vector)
 
@@ -233,7 +233,7 @@ class RecordedEquations(Equations):
         return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
 
     def _compiling(self) -> Iterator[float]:
-        """The same for the engine "c"; that it cannot be had is an InputError."""
+        """Yield the same for the engine "c"; that it cannot be had is an InputError."""
         yield 0.0
         with compiled_as_asked():
             recording = record(self.loop, self.boundaries)

@@ -24,7 +24,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
-    """The robot with every dynamic parameter wrong by a random relative error; itself if that is zero.
+    """Return the robot with every dynamic parameter wrong by a random relative error; itself if that is zero.
 
     Masses, centres of mass, inertia tensors, dampings, dry friction, motor inertias and the constants of
     springs and mechanisms are each multiplied by 1 + relative u with u uniform in [-1, 1]; a tensor as a

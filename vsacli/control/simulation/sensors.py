@@ -96,7 +96,7 @@ class Readings:
         return truth._replace(q=q, theta=theta[self._drivetrain.sprung])
 
     def variables(self, truth: Phase, torque: FloatArray) -> dict[str, FloatArray]:
-        """All that is read along a run, from its states and the motor torques (samples, motors)."""
+        """Return all that is read along a run, from its states and the motor torques (samples, motors)."""
         rows = slice(len(torque))
         q, theta = self.positions(truth, rows)
         of_joints = self._drivetrain.of_joints

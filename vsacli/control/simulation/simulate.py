@@ -195,7 +195,7 @@ def _report(
     exact: bool,
     full: SimulationReport | None,
 ) -> SimulationReport:
-    """The report on a run.
+    """Return the report on a run.
 
     Args:
         robot: as of `simulate`.
@@ -268,7 +268,7 @@ def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gain
 
 
 def _peak_torque(robot: Robot, trajectory: Trajectory) -> float:
-    """The largest torque of a motor along a trajectory, of `PEAK_SAMPLES` samples, N m (N)."""
+    """Return the largest torque of a motor along a trajectory, of `PEAK_SAMPLES` samples, N m (N)."""
     motion = trajectory.at(np.linspace(*trajectory.times.span, PEAK_SAMPLES))
     return float(np.nanmax(np.abs(compute_block(robot, motion).tau_motor)))
 

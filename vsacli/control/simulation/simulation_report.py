@@ -34,7 +34,7 @@ _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Fl
 
 
 def verdict_on(history: History, joints: Sequence[JointTracking], ending: Ending | None) -> str:
-    """The worst of `VERDICTS` that applies.
+    """Return the worst of `VERDICTS` that applies.
 
     A flag of any step speaks for its own, joints off course where the run was to end for "strayed", and
     an early end that no flag explains for itself.
@@ -125,7 +125,7 @@ class SimulationReport(Stored):
         return LargestError(worst.name, worst.q.peak, POSITION.unit(worst.type), worst.q.time)
 
     def as_text(self) -> ReportText:
-        """The report in its parts, as people read it."""
+        """Return the report in its parts, as people read it."""
         lines = [
             *warnings_and_notes(self.warnings, self.notes),
             *(limit_sentence(joint, worst) for joint in self.joints for worst in joint.worst.values()),
@@ -138,7 +138,7 @@ class SimulationReport(Stored):
         return ReportText(self._headline(), [HEADER, *map(row, self.joints)], lines)
 
     def __str__(self) -> str:
-        """The lines that the command prints, without a final newline."""
+        """Return the lines that the command prints, without a final newline."""
         return str(self.as_text())
 
     def _headline(self) -> str:

@@ -29,7 +29,7 @@ class Switch:
         return float(self._sliding.distances(time, vector)[self._motor])
 
     def passed(self, time: float, vector: FloatArray) -> FloatArray:
-        """The state in which the run goes on."""
+        """Return the state in which the run goes on."""
         return self._sliding.switched(time, vector, self._motor)
 
 
@@ -66,7 +66,7 @@ class Sliding:
         return self._stopped(vector, self._laws.sharp & (direction == 0))
 
     def switched(self, time: float, vector: FloatArray, motor: int) -> FloatArray:
-        """The state after a motor stopped, or broke loose, with the new directions of friction."""
+        """Return the state after a motor stopped, or broke loose, with the new directions of friction."""
         slip, chosen = self._slip, np.arange(len(self._slip)) == motor
         stops = slip[motor] != 0
         holding = self._friction(time, vector) - self._laws.offset

@@ -130,7 +130,7 @@ _TO_PROBES = np.vander(_PROBES, DEGREE + 1) @ _TO_POWERS
 
 
 def tabulate(function: Callable[[FloatArray], FloatArray], breakpoints: FloatArray) -> PPoly[Any]:
-    """A piecewise polynomial that stands for a function of time, to about `TOLERANCE`.
+    """Return a piecewise polynomial that stands for a function of time, to about `TOLERANCE`.
 
     Args:
         function: values (samples, columns) at times (samples,); analytic between breakpoints, or NaN.
@@ -219,11 +219,11 @@ class Reference:
         return Motion.of(np.asarray(time), self._commands(time), self.wrench(time))
 
     def damping(self, time: float | FloatArray) -> dict[str, FloatArray]:
-        """The damping with its derivatives, by name; nothing if none is commanded."""
+        """Return the damping with its derivatives, by name; nothing if none is commanded."""
         return {} if self._damping is None else self._damping(time)
 
     def wrench(self, time: float | FloatArray) -> Wrench | None:
-        """The wrench alone."""
+        """Return the wrench alone."""
         return None if self._wrench is None else Wrench(**self._wrench(time), frame=self.frame or "")
 
 

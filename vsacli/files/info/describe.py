@@ -33,7 +33,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 def describe_cache(folder: str) -> dict[str, Any]:
-    """The cache of compiled code, and unfinished files in a folder and in that for temporary files.
+    """Return the cache of compiled code, and unfinished files in a folder and in that for temporary files.
 
     Raises:
         StorageError: the cache cannot be used.
@@ -83,7 +83,7 @@ KIND = "table of a study"
 
 
 def describe_study(path: str) -> dict[str, Any]:
-    """A table as JSON values: what the study found, what varies, provenance, and inputs with their SHA-256.
+    """Return a table as JSON values: findings, parameters that vary, provenance, inputs with their SHA-256.
 
     Raises:
         InputError: the file is damaged.
@@ -111,7 +111,7 @@ def _parameter(table: StoredStudy, path: str) -> dict[str, Any]:
 
 
 def study_lines(table: Mapping[str, Any]) -> Iterator[str]:
-    """The description as text."""
+    """Yield the description as text."""
     yield str(StudySummary.from_json(table))
     provenance = table["provenance"]
     yield f"created {provenance['created']} with NumPy {provenance['numpy']}, engine {provenance['engine']}"
@@ -168,7 +168,7 @@ def describe_file(
 
 
 def described_value(description: dict[str, Any], field: str) -> Any:
-    """The value at a path into a description, as plain JSON values.
+    """Return the value at a path into a description, as plain JSON values.
 
     Raises:
         InputError: nothing is there; says what is, and the nearest name.
@@ -179,7 +179,7 @@ def described_value(description: dict[str, Any], field: str) -> Any:
 def _described_table(
     path: str, robot_path: str | None, progress: Progress, rate: float | None
 ) -> dict[str, Any]:
-    """A CSV file: a trajectory if its columns have the names for it, else a recording."""
+    """Return a CSV file: a trajectory if its columns have the names for it, else a recording."""
     from vsacli.files.recordings import describe_recording, is_trajectory
 
     robot = None if robot_path is None else load_robot(robot_path)
@@ -202,7 +202,7 @@ def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:
 
 
 def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> dict[str, Any]:
-    """A trajectory as JSON values: times, and of each joint the range and the peak of each quantity.
+    """Return a trajectory as JSON values: times, and of each joint the range and the peak of each quantity.
 
     `min`, `max` and `peak`, the largest absolute value, are those at the steps. What a joint does not have,
     such as the stiffness of a rigid one, is NaN.
@@ -257,7 +257,7 @@ class _Ranges:
 
 
 def describe_result(result: StoredResult) -> dict[str, Any]:
-    """A result or simulation as JSON values: provenance, inputs with their SHA-256, variables, report.
+    """Return a result or simulation as JSON values: provenance, inputs with their SHA-256, variables, report.
 
     Raises:
         InputError: the file is damaged.

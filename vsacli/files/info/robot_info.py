@@ -57,7 +57,7 @@ def free_range(joint: Joint) -> tuple[float, float]:
 
 
 def unlimited(joint: Joint) -> bool:
-    """Whether the joint is prismatic and may move without end, so that it is held at zero."""
+    """Return whether the joint is prismatic and may move without end, so that it is held at zero."""
     return not joint.is_revolute and not all(map(math.isfinite, joint.limits.position))
 
 
@@ -79,7 +79,7 @@ def _random(goals: int, robot: Robot) -> FloatArray:
 
 
 def _searched(objective: Objective, q: FloatArray, robot: Robot) -> FloatArray:
-    """The configurations after sweeps over all joints, until nothing is gained."""
+    """Return the configurations after sweeps over all joints, until nothing is gained."""
     count = len(robot.joints)
     work = max(q[..., 0].size * len(_ANGLES), SAMPLES_AT_NO_COST) * count * count
     before = np.zeros(len(q))
@@ -134,7 +134,7 @@ LOAD_ROUNDING = 1e-12
 
 
 def describe_robot(robot: Robot) -> dict[str, Any]:
-    """A robot as JSON values in SI units: every declared field, reach, static load and reachable stiffness.
+    """Return a robot as JSON values in SI units: its fields, reach, static load and attainable stiffness.
 
     `reach` and `static_load` are the largest values found over the configurations within the position limits;
     a prismatic joint without limits is held at zero. `static_load` is the torque of gravity alone.
@@ -180,7 +180,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
 
 
 def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[float]]:
-    """The stiffness reachable `unloaded`, and `loaded` by a torque in either direction, N m/rad (N/m), at q.
+    """Return the stiffness attainable `unloaded` and `loaded` (a torque either way) at q, N m/rad (N/m).
 
     Of a joint whose stiffness is not commanded, that which it has then; empty if it has no springs.
     """
@@ -220,7 +220,7 @@ def gravity_torques(robot: Robot, q: FloatArray) -> FloatArray:
 
 
 def reach(robot: Robot) -> Extremes:
-    """The largest distance of the end effector's frame from the origin of DH frame 0 that was found, m."""
+    """Return the largest distance found of the end effector from the origin of DH frame 0, m."""
 
     def squared(q: FloatArray) -> FloatArray:
         position = tip_position(robot, q)
@@ -244,7 +244,7 @@ def _length(joint: Joint) -> float:
 
 
 def static_load(robot: Robot) -> Extremes:
-    """The largest |torque| that gravity alone demands of each joint, N m (N), as far as was found."""
+    """Return the largest |torque| that gravity alone demands of each joint, N m (N), as far as was found."""
     return largest_sizes(lambda q: gravity_torques(robot, q), len(robot.joints), robot)
 
 

@@ -39,7 +39,7 @@ def device_lines(joints: Sequence[Values]) -> Iterator[str]:
 
 
 def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
-    """A line for each record in an actuator, and one for the numbers beside them."""
+    """Yield a line for each record in an actuator, and one for the numbers beside them."""
     own = []
     for name, field, value in _given(cls, values):
         if not field.kind.records:
@@ -56,7 +56,7 @@ def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
 
 
 def _given(cls: type, values: Values) -> Iterator[tuple[str, Field, Any]]:
-    """The fields that say something: none that is absent, infinite or as it is by default."""
+    """Yield the fields that say something: none that is absent, infinite or as it is by default."""
     for name, (field, default) in declared(cls).items():
         value = values.get(name)
         if value is not None and value != default and value != math.inf:
@@ -64,7 +64,7 @@ def _given(cls: type, values: Values) -> Iterator[tuple[str, Field, Any]]:
 
 
 def _record(field: Field, values: Values, joint_type: str) -> str:
-    """A record of a field: the word that chose it, and its numbers."""
+    """Return a record of a field: the word that chose it, and its numbers."""
     word = values.get("type", "")
     cls = field.kind.records[word]
     key, other_type = getattr(cls, "unit_variant_with", ("", joint_type))
@@ -80,7 +80,7 @@ def _record(field: Field, values: Values, joint_type: str) -> str:
 
 
 def _words(name: str, quantity: Quantity, value: Any, joint_type: str) -> str:
-    """A field and what it is, with its unit."""
+    """Return a field and what it is, with its unit."""
     written = quantity.unit(joint_type)
     unit = "" if written == str(DIMENSIONLESS) else f" {written}"
     match value:
@@ -102,7 +102,7 @@ MOTION = ("dq", "ddq", "d3q", "d4q")
 
 
 def render(description: Description) -> str:
-    """A description as lines of text, without a final newline."""
+    """Return a description as lines of text, without a final newline."""
     return "\n".join(_RENDERERS[description["kind"]](description))
 
 
@@ -167,7 +167,7 @@ def _dampers(joints: Sequence[Description]) -> Iterator[str]:
 
 
 def _springs(actuator: Description) -> str:
-    """The types of mechanism, springs and coupling, as far as there are any."""
+    """Return the types of mechanism, springs and coupling, as far as there are any."""
     mechanism = actuator.get("mechanism")
     written = (mechanism or actuator).get("spring") or []
     springs = written if isinstance(written, list) else [written]
@@ -249,7 +249,7 @@ def _megabytes(size: int) -> str:
 
 
 def _left(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    """A table with all its columns to the left."""
+    """Yield a table with all its columns to the left."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

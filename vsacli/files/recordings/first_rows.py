@@ -80,27 +80,27 @@ class FirstRows:
         return self.header.columns
 
     def filled(self, place: int) -> list[str]:
-        """The cells of a column that hold something."""
+        """Return the cells of a column that hold something."""
         return [row[place] for row in self.cells if row[place].strip().lower() not in NOTHING]
 
     def numbers(self, place: int) -> list[float]:
-        """The numbers of a column; nothing if it holds anything else."""
+        """Return the numbers of a column; nothing if it holds anything else."""
         cells = self.filled(place)
         return [float(cell) for cell in cells] if all(map(is_number, cells)) else []
 
     def clocks(self, place: int) -> list[Clock]:
-        """The times of a column that is written as a clock shows them; nothing if it holds anything else."""
+        """Return the times of a column in clock notation; an empty list if it holds anything else."""
         clocks = [clock for cell in self.filled(place) if (clock := read_clock(cell)) is not None]
         return clocks if len(clocks) == len(self.filled(place)) else []
 
     def is_index(self, place: int) -> bool:
-        """Whether a column counts the rows: nameless or called so, and larger by one from row to row."""
+        """Return whether a column counts the rows: without a telling name, and increasing by one."""
         name = split_heading(self.columns[place])[0].lower()
         named_so = (not name and self.header.line > 0) or name in INDICES
         return named_so and self.counts_rows(place)
 
     def counts_rows(self, place: int) -> bool:
-        """Whether the whole numbers of a column are larger by one from row to row."""
+        """Return whether the whole numbers of a column are larger by one from row to row."""
         values = self.numbers(place)
         return len(values) > 1 and all(after - before == 1 for before, after in pairwise(values))
 
@@ -110,7 +110,7 @@ class FirstRows:
         return texts.pop() if len(texts) == 1 and not self.numbers(place) else ""
 
     def called(self, place: int) -> str | int:
-        """A column as mappings name it: its number where there is no name, or it is repeated."""
+        """Return a column as mappings name it: its number where there is no name, or it is repeated."""
         name = self.columns[place]
         return name if name and self.columns.count(name) == 1 else place + 1
 
@@ -120,7 +120,7 @@ class FirstRows:
         return [place for place in range(len(self.columns)) if self.numbers(place)]
 
     def rises(self, place: int) -> bool:
-        """Whether the numbers or times of a column, two at least, nearly always increase from row to row."""
+        """Return whether a column of at least two numbers or times nearly always increases."""
         cells = self.filled(place)
         clocks = self.clocks(place)
         if clocks:
@@ -134,7 +134,7 @@ class FirstRows:
 
 
 def read_first_rows(path: str | os.PathLike[str]) -> FirstRows:
-    """The first rows of a CSV file, whatever its columns are called.
+    """Return the first rows of a CSV file, whatever its columns are called.
 
     Raises:
         InputError: it begins as no table does, or rows have other cells than the header.
@@ -173,7 +173,7 @@ class TimeColumn(NamedTuple):
 
 
 def time_column(rows: FirstRows) -> TimeColumn | None:
-    """The column that holds the stamps, if one does: called so, of clock texts, or of even steps."""
+    """Return the column that holds the stamps, if one does: called so, of clock texts, or of even steps."""
     pair = _seconds_and_nanoseconds(rows)
     if pair is not None:
         seconds, rest = map(rows.called, pair)
@@ -227,7 +227,7 @@ def _called(rows: FirstRows) -> list[int]:
 
 
 def _like_stamps(rows: FirstRows, place: int) -> bool:
-    """Whether a column that nothing calls a time rises in nearly even steps, and counts no rows."""
+    """Return whether a column that nothing calls a time rises in nearly even steps, and counts no rows."""
     words = words_of(split_heading(rows.columns[place])[0])
     if QUANTITY_WORDS.intersection(words) or rows.counts_rows(place) or not rows.rises(place):
         return False

@@ -150,7 +150,7 @@ def _labels(rows: FirstRows) -> dict[int, str]:
 
 
 def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_Column], dict[int, str]]:
-    """The columns of `sensor_msgs/JointState` without a header: stamp, frame, names, then three arrays."""
+    """Return the columns of a `sensor_msgs/JointState` without header: stamp, frame, names, three arrays."""
     first = None if time is None or time.nanoseconds is None else time.nanoseconds + 2
     texts = [place for place in range(first or 0, len(rows.columns)) if rows.text(place)]
     count = next((number for number, place in enumerate(texts) if place != texts[0] + number), len(texts))
@@ -186,7 +186,7 @@ def _of_robot(
 def _matched(
     family: Sequence[_Column], labels: Mapping[int, str], joints: JointNames
 ) -> list[tuple[_Column, _Joint]]:
-    """The columns of a family whose names, or the names in their rows, are those of joints.
+    """Return the columns of a family whose names, or the names in their rows, are those of joints.
 
     Where columns count from zero and joints from one, or the other way round, their numbers say nothing.
     """
@@ -238,7 +238,7 @@ def _named(columns: Sequence[_Column], labels: Mapping[int, str]) -> Iterator[tu
 
 
 def _is_no_joint(column: _Column) -> bool:
-    """Whether a name speaks of a pose, as `tcp_pos_x`, or says no quantity."""
+    """Return whether a name speaks of a pose, as `tcp_pos_x`, or says no quantity."""
     telling = [word for word in column.words if word not in GENERIC]
     return column.bare or any(word in AXES for word in telling) or bool(telling and set(telling) <= {*POSES})
 

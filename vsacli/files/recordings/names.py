@@ -62,7 +62,7 @@ POSES = ("roll", "pitch", "yaw", "tool", "odom", "imu", "linear", "angular", "or
 
 
 def words_of(name: str) -> tuple[str, ...]:
-    """The words and numbers of a name in small letters, equal for `joint_01`, `Joint1` and `joint-1`."""
+    """Return the words and numbers of a name in lower case, equal for `joint_01`, `Joint1` and `joint-1`."""
     return tuple(word.lower().lstrip("0") or "0" for word in WORDS.findall(name))
 
 
@@ -92,7 +92,7 @@ class JointNames:
         self._cores = {name: words[first : len(words) - last] for name, words in self._words.items()}
 
     def in_words(self, words: Sequence[str]) -> Match | None:
-        """The joint whose name stands in these words, the longest if several do; None if none or two do."""
+        """Return the joint with the longest name found in these words; None for none or for a tie."""
         for whole, of_joints in ((True, self._words), (False, self._cores)):
             there = [name for name, own in of_joints.items() if own and _stands_in(own, words)]
             longest = max((len(of_joints[name]) for name in there), default=0)
@@ -102,7 +102,7 @@ class JointNames:
         return None
 
     def called(self, words: Sequence[str]) -> str:
-        """The joint that a column is named after and nothing else; empty if it is called otherwise."""
+        """Return the joint that a column is named after and nothing else; empty if it is called otherwise."""
         rest = "".join(word for word in words if word not in OF_JOINTS)
         for name in self.names:
             own, core = self._words[name], self._cores[name]
@@ -112,7 +112,7 @@ class JointNames:
         return ""
 
     def _tells(self, core: Sequence[str], words: Sequence[str]) -> bool:
-        """Whether what remains of a name is enough: a number alone only amid words that say nothing else."""
+        """Return whether the rest of a name is enough: a number alone only among words without meaning."""
         common = {word for own in self._words.values() for word in own}
         others = [word for word in words if word not in core]
         return not all(word.isdecimal() for word in core) or all(

@@ -101,7 +101,7 @@ def describe_recording(
 
 
 def _proposed_rate(time: TimeColumn | None, jittering: str) -> list[str]:
-    """A comment on the rate of the trajectory where one is needed, or of use."""
+    """Return a comment on the rate of the trajectory where one is needed, or of use."""
     if time is None:
         return ["# rate: ...  # rows per second: no column holds times"]
     if jittering:
@@ -112,7 +112,7 @@ def _proposed_rate(time: TimeColumn | None, jittering: str) -> list[str]:
 def _trajectory(
     file: str, mapping: Sequence[str], taken: Sequence[Guess], robot: Robot | None, rate: Sequence[str]
 ) -> Iterator[str]:
-    """A trajectory file that takes the positions from the recording."""
+    """Yield a trajectory file that takes the positions from the recording."""
     yield f"format: {trajectory_file.FORMAT}"
     yield "name: recorded"
     yield from rate
@@ -272,12 +272,12 @@ class _Survey:
 
 
 def _counts(values: FloatArray) -> bool:
-    """Whether these are whole numbers that never fall, as of a counter: no signal of a sensor."""
+    """Return whether these are whole numbers that never fall, as of a counter: no signal of a sensor."""
     return bool(np.all(values == np.round(values)) and np.all(np.diff(values) >= 0))
 
 
 def is_trajectory(path: str, robot: Robot) -> bool:
-    """Whether the columns of a CSV file are, by their names, a trajectory of a robot."""
+    """Return whether the columns of a CSV file are, by their names, a trajectory of a robot."""
     try:
         column_layout(read_header(path).columns, CommandedJoints.of(robot), NEEDED, path)
     except InputError:

@@ -73,7 +73,7 @@ def mapping_lines(
     leaves_out: bool,
     rate: float | None = None,
 ) -> Iterator[str]:
-    """The keys `columns` and `ignore`.
+    """Yield the keys `columns` and `ignore`.
 
     Args:
         time: the stamps.

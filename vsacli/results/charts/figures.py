@@ -68,13 +68,13 @@ def result_title(result: StoredResult) -> str:
 
 
 def axis_label(words: str, unit: str, joint_type: str, column: int) -> str:
-    """The label of an axis of a `Part`."""
+    """Return the label of an axis of a `Part`."""
     force = "force" if joint_type == "prismatic" else "torque"
     return f"{words.format(force=force, motor=MOTORS[column])} [{unit}]"
 
 
 def variable_words(variable: Variable) -> str:
-    """The label of a variable without words of its own."""
+    """Return the label of a variable without words of its own."""
     return f"{variable.name}_{{motor}}" if "motor" in variable.dims else variable.name
 
 

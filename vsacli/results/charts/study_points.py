@@ -96,7 +96,7 @@ class StudyPoints:
         return margins, np.arange(len(margins), 0, -1) / len(self.margin)
 
     def unit(self, path: str) -> str:
-        """The unit of a number, empty if it has none."""
+        """Return the unit of a number, empty if it has none."""
         unit = self._table.unit(path)
         return "" if unit == "1" else unit
 

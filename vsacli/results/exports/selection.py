@@ -71,7 +71,7 @@ class Chosen:
         return [quantity.unit("revolute" if self.on_shaft else each) for each in joint_types]
 
     def of_columns(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:
-        """The columns that there are, (columns, samples), of (samples, ...)."""
+        """Return the columns that there are, (columns, samples), of (samples, ...)."""
         flat: npt.NDArray[Any] = values.reshape(len(values), -1).T[self.there.ravel()]
         return flat
 

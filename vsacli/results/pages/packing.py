@@ -28,7 +28,7 @@ class Packed:
         self._numbers: dict[bytes, int] = {}
 
     def add(self, values: ArrayLike) -> int:
-        """The number of an array, of any shape; what is not finite, or too large, becomes NaN."""
+        """Return the number of an array, of any shape; what is not finite, or too large, becomes NaN."""
         with np.errstate(over="ignore"):
             single = np.asarray(values, dtype="<f4")
         content = np.where(np.isfinite(single), single, np.float32(np.nan)).astype("<f4").tobytes()

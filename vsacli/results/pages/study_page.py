@@ -20,7 +20,7 @@ MOST_RUNS = 20_000
 
 
 def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> str:
-    """The page of tables of studies, as HTML.
+    """Return the page of tables of studies, as HTML.
 
     Args:
         tables: open.
@@ -70,7 +70,7 @@ def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) 
 
 
 def _drawn(points: StudyPoints) -> IndexArray:
-    """The rows that are drawn: all, or so many, the worst and the front among them."""
+    """Return the rows that are drawn: all, or so many, the worst and the front among them."""
     chosen = [evenly(len(points.runs), MOST_RUNS), points.worst]
     if points.cost is not None:
         chosen.append(points.front)

@@ -97,7 +97,7 @@ class _CheckedBytes(io.FileIO):
         return len(view)
 
     def _ends(self, offset: int) -> bool:
-        """Whether a heap is as large as it says, and each of its objects ends.
+        """Return whether a heap is as large as it says, and each of its objects ends.
 
         A heap collection (HDF5 file format 3.0, III.E) is a row of objects, each after its header of index,
         reference count and size; index 0 is the free space at the end.
@@ -172,7 +172,7 @@ def reporting_damage(path: str | Path, what: str = "") -> Iterator[None]:
 
 
 def _all_end(objects: bytes) -> bool:
-    """Whether the objects of a heap fill it: each has a size above zero, and none goes beyond the end."""
+    """Return whether the objects of a heap fill it: none is empty, and none extends beyond its end."""
     position = 0
     while len(objects) - position >= _OBJECT.size:
         index, _, _, size = _OBJECT.unpack_from(objects, position)
@@ -184,7 +184,7 @@ def _all_end(objects: bytes) -> bool:
 
 
 def own_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
-    """A dataset, if its values stand in this file and need no more memory at a time than the file has bytes.
+    """Return a dataset if its values are in this file and need no more memory at a time than it has bytes.
 
     Raises:
         KeyError: there is none.
@@ -227,7 +227,7 @@ def file_size(file: h5py.File) -> int:
 
 
 def bounded(dataset: h5py.Dataset) -> h5py.Dataset:
-    """The dataset, if to read it whole takes no more memory than its file has bytes.
+    """Return the dataset, if to read it whole takes no more memory than its file has bytes.
 
     Raises:
         ValueError: its shape asks for more.

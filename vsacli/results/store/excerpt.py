@@ -75,7 +75,7 @@ class Excerpt(StoredResult):
         return self._original.existing(variable)[self._joints]
 
     def has(self, variable: Variable) -> bool:
-        """Whether the variable is one of these joints, as far as that depends on the robot file."""
+        """Return whether the variable is one of these joints, as far as that depends on the robot file."""
         one_of_them = variable.requires in OF_ANY_ROBOT or bool(self.existing(variable).any())
         return one_of_them and super().has(variable)
 

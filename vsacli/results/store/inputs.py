@@ -88,7 +88,7 @@ def _write_content(group: h5py.Group, source: Source) -> None:
 
 
 def read_sources(file: CheckedFile) -> Iterator[StoredInput]:
-    """The files, in the order in which they were written."""
+    """Yield the files, in the order in which they were written."""
     number = 1
     while (name := f"inputs/file_{number}") in file:
         attributes = {key: str(value) for key, value in file[name].attrs.items()}

@@ -187,7 +187,7 @@ class Sink(io.RawIOBase):
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
-        """The current byte."""
+        """Return the current byte."""
         return self._file.tell()
 
     def readinto(self, buffer: Any) -> int:

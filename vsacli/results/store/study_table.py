@@ -303,7 +303,7 @@ class StoredStudy(StoredFile):
             return self._labels(name, rows)
 
     def read(self, name: str, rows: slice = ALL) -> AnyArray:
-        """A column of numbers, (rows, ...), or the numbers of the runs.
+        """Return a column of numbers, (rows, ...), or the numbers of the runs.
 
         Raises:
             InputError: it is damaged, or not there.
@@ -332,13 +332,13 @@ class StoredStudy(StoredFile):
         return (steps, *shape[1:]) if name in self.columns and "step" in self.column(name).dims else shape
 
     def unit(self, name: str) -> str:
-        """The unit of a column or parameter; that of revolute joints if they differ."""
+        """Return the unit of a column or parameter; that of revolute joints if they differ."""
         with reporting_damage(self.path, name):
             attributes = self._dataset(name).attrs
             return str(attributes.get("units_revolute", attributes.get("units", "")))
 
     def parameter_is_text(self, path: str) -> bool:
-        """Whether the values of what varies are texts rather than numbers."""
+        """Return whether the values of what varies are texts rather than numbers."""
         return bool(self._dataset(path).dtype.kind != "f")
 
     def provenance(self) -> dict[str, str]:

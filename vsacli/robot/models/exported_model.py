@@ -14,18 +14,18 @@ Value: TypeAlias = str | bool | float | Iterable[float]
 
 
 def element(parent: Element, tag: str, /, **attributes: Value) -> Element:
-    """A new element in another one."""
+    """Return a new element in another one."""
     return add(ElementTree.SubElement(parent, tag), **attributes)
 
 
 def add(to: Element, /, **attributes: Value) -> Element:
-    """The element with attributes that are new or replaced."""
+    """Return the element with attributes that are new or replaced."""
     to.attrib.update({name: _text(value) for name, value in attributes.items()})
     return to
 
 
 def document(root: Element, comment: str) -> str:
-    """The file, indented, with a comment at its beginning."""
+    """Return the file, indented, with a comment at its beginning."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- {_harmless(comment)} -->\n{text}\n'

@@ -49,7 +49,7 @@ LINK_COLOUR = (0.35, 0.45, 0.6, 1)
 
 
 def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
-    """The model, with a key frame if it is known where a motion starts.
+    """Return the model, with a key frame if it is known where a motion starts.
 
     Raises:
         InputError: MuJoCo takes no such link, or knows no such friction; or the start is none.
@@ -93,7 +93,7 @@ def _placed(parent: Element, name: str, pose: Pose) -> Element:
 
 
 def _link(parent: Element, joint: Joint, radius: float) -> Element:
-    """The body of a link, where it is at q = 0, with its joint."""
+    """Return the body of a link, where it is at q = 0, with its joint."""
     dh, link = joint.dh, joint.link
     sa, ca = math.sin(dh.alpha), math.cos(dh.alpha)
     place = (dh.a * math.cos(dh.theta), dh.a * math.sin(dh.theta), dh.d)

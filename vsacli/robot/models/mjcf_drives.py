@@ -39,7 +39,7 @@ def check_bodies(robot: Robot) -> None:
 
 
 def file_of(robot: Robot) -> str:
-    """The file that a robot was read from, empty if there is none."""
+    """Return the file that a robot was read from, empty if there is none."""
     return next((source.path for source in robot.sources), "")
 
 
@@ -81,7 +81,7 @@ def motor_name(joint: Joint, number: int) -> str:
 
 
 def rotors_of(joint: Joint, tendons: Element) -> list[Rotor]:
-    """The motors of a joint; what couples their inertias becomes the inertia of a tendon between them.
+    """Return the motors of a joint; what couples their inertias becomes the inertia of a tendon between them.
 
     The inertia m of a tendon along theta_1 + w theta_2 is m of motor 1, m w^2 of motor 2, and m w of both.
     With w^2 = B_2/B_1 that takes |B_12|/sqrt(B_1 B_2) of either motor's inertia, which is less than all.
@@ -114,7 +114,7 @@ def add_rotors(world: Element, rotors: list[Rotor], *, coupled: bool) -> None:
 
 
 def add_rotor(parent: Element, rotor: Rotor, **attributes: Value) -> Element:
-    """The body of a motor in another body, with its coordinate along or about z."""
+    """Return the body of a motor in another body, with its coordinate along or about z."""
     body = element(parent, "body", name=rotor.name)
     element(body, "inertial", pos=(0, 0, 0), mass=LEAST, diaginertia=(LEAST,) * 3)
     damping, inertia = rotor.motor.damping, rotor.inertia
@@ -123,7 +123,7 @@ def add_rotor(parent: Element, rotor: Rotor, **attributes: Value) -> Element:
 
 
 def add_sum(tendons: Element, name: str, weights: dict[str, float]) -> Element:
-    """A tendon whose length is a weighted sum of positions."""
+    """Return a tendon whose length is a weighted sum of positions."""
     tendon = element(tendons, "fixed", name=name)
     for position, weight in weights.items():
         element(tendon, "joint", joint=position, coef=weight)
@@ -196,7 +196,7 @@ class Sections(NamedTuple):
 
 
 def has_springs_of(joint: Joint) -> bool:
-    """Whether MJCF has springs such as those of a joint; also if it has none."""
+    """Return whether MJCF has springs such as those of a joint; also if it has none."""
     elements = joint.actuator.spring_elements
     polynomial = elements is not None and all(_terms(each.law) is not None for each in elements)
     return polynomial or joint.actuator.lever_spring is not None

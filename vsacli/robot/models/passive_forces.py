@@ -84,7 +84,7 @@ def forces_words(robot: Robot) -> str:
 
 
 def forces_text(robot: Robot) -> str | None:
-    """The file; None if MJCF has a place for all forces of the robot."""
+    """Return the file; None if MJCF has a place for all forces of the robot."""
     joints = [joint for joint in robot.joints if joint.has_friction or not has_springs_of(joint)]
     if not joints:
         return None
@@ -115,7 +115,7 @@ def _frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
 
 
 def _coordinates(joint: Joint) -> list[str]:
-    """The joint, and its motors if they move by themselves."""
+    """Return the joint, and its motors if they move by themselves."""
     numbers = range(1, 1 + len(joint.actuator.motors))
     return list(dict.fromkeys([joint.name, *(motor_name(joint, number) for number in numbers)]))
 

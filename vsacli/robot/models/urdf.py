@@ -32,7 +32,7 @@ NO_LIMIT = 1e9
 
 
 def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
-    """The model, with what it leaves out.
+    """Return the model, with what it leaves out.
 
     Raises:
         InputError: a start is given, for which there is no place.

@@ -51,7 +51,7 @@ Measure: TypeAlias = Callable[[Facts], Iterator[Measured]]
 
 
 def turns(angle: float) -> float:
-    """An angle in turns; NaN, not judged, if it is a multiple of a right angle in rad, but for rounding."""
+    """Return an angle in turns; NaN (not judged) for a multiple of a right angle, up to rounding."""
     rights = angle / (TURN / 4)
     computed = not angle.is_integer() and abs(rights - round(rights)) < ROUNDED * abs(rights)
     return math.nan if computed else abs(angle) / TURN
@@ -60,7 +60,7 @@ def turns(angle: float) -> float:
 def _numbers(
     unit: str, *keys: str, without: tuple[str, ...] = (), size: Callable[[Facts, float], float] | None = None
 ) -> Measure:
-    """Every number in a unit with one of these keys on its path, and none of those; its size is |value|."""
+    """Return every number in a unit with one of these keys on its path and none of those; size |value|."""
 
     def measure(facts: Facts) -> Iterator[Measured]:
         for number in facts.of_unit(unit):
@@ -92,7 +92,7 @@ def _lengths(facts: Facts) -> Iterator[Measured]:
 
 
 def _links(size: Callable[[Facts, int], float]) -> Measure:
-    """The mass of each link, with a size made from its index."""
+    """Return the mass of each link, with a size made from its index."""
 
     def measure(facts: Facts) -> Iterator[Measured]:
         for index, joint in enumerate(facts.joints):
@@ -108,7 +108,7 @@ def _gyration(facts: Facts, index: int) -> float:
 
 
 def _crowding(facts: Facts) -> Iterator[Measured]:
-    """The heaviest link, in the name of all, unless none has a mass, which the robot says by itself."""
+    """Yield the heaviest link, in the name of all, unless none has a mass, which the robot says by itself."""
     crowding = _links(lambda facts, _: ratio(facts.sizes.mass, facts.sizes.extent**3))
     heaviest = max(crowding(facts), key=lambda measured: measured.value)
     if heaviest.value > 0:
@@ -116,7 +116,7 @@ def _crowding(facts: Facts) -> Iterator[Measured]:
 
 
 def _gravity(size: Callable[[float], float]) -> Measure:
-    """The magnitude of gravity, with a size made from it."""
+    """Return the magnitude of gravity, with a size made from it."""
 
     def measure(facts: Facts) -> Iterator[Measured]:
         value = math.hypot(*facts.gravity)

@@ -73,16 +73,16 @@ class _Driven(NamedTuple):
         return _bounded(self.behind.max_velocity)
 
     def unit(self, name: str) -> str:
-        """The unit of a field; a motor behind a gear is one of rotation."""
+        """Return the unit of a field; a motor behind a gear is one of rotation."""
         kind = self.joint.type if name == "gear_ratio" or self.motor.gear_ratio is None else "revolute"
         return declared(Motor)[name][0].quantity.unit(kind)
 
     def path(self, name: str) -> NumberPath:
-        """The path to a field."""
+        """Return the path to a field."""
         return joint_path(self.number, self.joint, *self.at, name)
 
     def measured(self, name: str, size: float) -> Measured:
-        """A field with a size."""
+        """Return a field with a size."""
         return Measured(self.path(name), getattr(self.motor, name), self.unit(name), size)
 
 
@@ -99,7 +99,7 @@ def _all_motors(facts: Facts) -> Iterator[_Driven]:
 def _motors(
     name: str, size: Callable[[_Driven], float] | None = None, *, unit: str = "", carrying: bool = False
 ) -> Measure:
-    """A field of the motors; its size is |value|, NaN if 0 or infinite, or made from the motor.
+    """Return a field of the motors; its size is |value|, NaN if 0 or infinite, or made from the motor.
 
     Args:
         name: of the field.

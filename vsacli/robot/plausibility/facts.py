@@ -52,13 +52,13 @@ class Facts:
         return enumerate(() if self.placeholder else self.joints)
 
     def of_unit(self, unit: str) -> Iterator[Measured]:
-        """The numbers in a unit, each with its magnitude as size."""
+        """Yield the numbers in a unit, each with its magnitude as size."""
         for path, quantity, value, _ in self.numbers:
             if quantity.unit(self._variant(path)) == unit:
                 yield Measured(path, value, unit, abs(value))
 
     def _variant(self, path: NumberPath) -> str:
-        """The type of joint on which a unit depends; that of a motor behind its gear is one of rotation."""
+        """Return the joint type on which a unit depends: revolute for a motor behind its gear."""
         if path[0] != "joints" or not isinstance(path[1], Entry):
             return "revolute"
         joint = self.joints[path[1].number]
@@ -67,12 +67,12 @@ class Facts:
 
 
 def joint_path(number: int, joint: Joint, *steps: str | Entry) -> NumberPath:
-    """The path to something of a joint."""
+    """Return the path to something of a joint."""
     return ("joints", Entry(number, joint.name), *steps)
 
 
 def motors(joint: Joint) -> Iterator[tuple[NumberPath, Motor]]:
-    """The motors of a joint as they are written, each with its path from the joint."""
+    """Return the motors of a joint as they are written, each with its path from the joint."""
     return written_once(("actuator", "motor"), getattr(joint.actuator, "motor", ()))
 
 
@@ -126,7 +126,7 @@ class BodySizes:
         return WEIGHT_PER_MASS * self.mass
 
     def scale(self, joint: Joint) -> float:
-        """The weight at the reach of the robot, N m; the weight, N, for a prismatic joint."""
+        """Return the weight at the reach of the robot, N m; the weight, N, for a prismatic joint."""
         return self.weight * (self.extent if joint.is_revolute else 1.0)
 
 
@@ -165,5 +165,5 @@ def density_of_sphere(link: Link) -> float:
 
 
 def ratio(value: float, reference: float) -> float:
-    """A value over another; NaN if there is nothing to hold it against."""
+    """Return a value over another; NaN if there is nothing to hold it against."""
     return value / reference if reference > 0 else math.nan

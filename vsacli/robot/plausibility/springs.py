@@ -58,12 +58,12 @@ def _unit(joint: Joint) -> str:
 
 
 def _travel(facts: Facts, joint: Joint) -> float:
-    """A radian, or for a prismatic joint the reach of the robot, m."""
+    """Return a radian, or for a prismatic joint the reach of the robot, m."""
     return 1.0 if joint.is_revolute else facts.sizes.extent
 
 
 def _corridors(facts: Facts) -> Iterator[tuple[int, Joint, Corridor]]:
-    """The joints whose stiffness can be commanded, with their indices."""
+    """Yield the joints whose stiffness can be commanded, with their indices."""
     for index, joint in facts.driven:
         found = corridor(joint)
         if found is not None:
@@ -71,7 +71,7 @@ def _corridors(facts: Facts) -> Iterator[tuple[int, Joint, Corridor]]:
 
 
 def _soft_ends(facts: Facts) -> Iterator[Measured]:
-    """The stiffness of pairs of springs at rest, over the weight at full reach, per rad or per reach."""
+    """Yield the stiffness of antagonistic springs at rest over the weight at full reach."""
     for index, joint, found in _corridors(facts):
         size = ratio(found.lower * _travel(facts, joint), facts.sizes.scale(joint))
         beside = {"stiffness": f"{found.lower:.4g} {_unit(joint)}"}
@@ -86,13 +86,13 @@ def _stiff_transmissions(facts: Facts) -> Iterator[Measured]:
 
 
 def _soft_transmissions(facts: Facts) -> Iterator[Measured]:
-    """A rad, or the reach, over the deflection under what the weight can ask, if there is any."""
+    """Yield a rad, or the reach, over the deflection under what the weight can ask, if there is any."""
     for joint, measured, held in _single_springs(facts) if any(facts.gravity) else ():
         yield measured._replace(size=ratio(_travel(facts, joint), float(held.phi[0, 1])))
 
 
 def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, Transmission]]:
-    """Each joint whose stiffness is not commanded, with its spring at rest and under what the weight can ask.
+    """Yield each joint without commanded stiffness: its spring at rest and under the largest weight.
 
     What is measured is the stiffness or the law; its size is to be replaced.
     """
@@ -107,7 +107,7 @@ def _single_springs(facts: Facts) -> Iterator[tuple[Joint, Measured, Transmissio
 
 
 def _springs(facts: Facts) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
-    """The springs with their joints, as they are written."""
+    """Yield the springs with their joints, as they are written."""
     for number, joint in facts.driven:
         path = joint_path(number, joint, "actuator", "spring")
         for at, law in written_once(path, getattr(joint.actuator, "spring", None) or ()):
@@ -149,7 +149,7 @@ def _stiffness_limits(facts: Facts) -> Iterator[Measured]:
 
 
 def _least_stiffness(joint: Joint) -> float:
-    """The least that a joint can have without load, N m/rad (N/m)."""
+    """Return the least that a joint can have without load, N m/rad (N/m)."""
     found = corridor(joint)
     if found is not None:
         return found.lower if found.lower > 0 else found.upper
@@ -158,7 +158,7 @@ def _least_stiffness(joint: Joint) -> float:
 
 
 def _largest_dampings(facts: Facts) -> Iterator[Measured]:
-    """The upper end of each damper's range over twice the root of inertia times stiffness."""
+    """Yield the upper end of each damper's range over twice the root of inertia times stiffness."""
     for number, joint in facts.driven:
         if joint.damper is not None and joint.actuator.sprung:
             product = float(facts.sizes.moved[number]) * _least_stiffness(joint)

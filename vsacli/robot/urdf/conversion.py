@@ -79,7 +79,7 @@ class Conversion:
         return all(joint.actuator.motor_count == 1 for joint in self.robot.joints)
 
     def __str__(self) -> str:
-        """The Denavit-Hartenberg table, how exact it is, what may be wrong, what was left out or changed."""
+        """Return the Denavit-Hartenberg table, its accuracy, doubts, and what was left out or changed."""
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
@@ -169,7 +169,7 @@ def import_urdf(
     srdf: str | os.PathLike[str] | None = None,
     group: str | None = None,
 ) -> Conversion:
-    """A robot from a serial chain of a URDF file.
+    """Return a robot from a serial chain of a URDF file.
 
     Args:
         path: the URDF file.
@@ -282,7 +282,7 @@ def _pose(pose: FloatArray, scale: float) -> Pose:
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """The names with only letters, digits, `_` and `-`, beginning with a letter or `_`, and all different."""
+    """Return different names of letters, digits, `_` and `-` that begin with a letter or `_`."""
     chosen: list[str] = []
     for name in names:
         word = re.sub(r"[^A-Za-z0-9_-]", "_", name)

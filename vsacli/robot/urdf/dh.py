@@ -66,7 +66,7 @@ class Frames:
 
 
 def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Frames:
-    """The frames of a chain whose tip has the pose `tip` at position zero.
+    """Return the frames of a chain whose tip has the pose `tip` at position zero.
 
     Args:
         joints: from the base.
@@ -92,7 +92,7 @@ def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Fra
 
 
 def tidy(numbers: FloatArray, scale: float) -> FloatArray:
-    """The numbers, each replaced by the short one of which it is rounding; `scale` is the largest."""
+    """Return the numbers, each replaced by the short one of which it is rounding; `scale` is the largest."""
     short = np.round(numbers, SHORT_DECIMALS - _exponent(scale))
     return np.where(abs(numbers - short) <= FILE_ROUNDING * scale, short, numbers) + 0.0  # no negative zero
 
@@ -102,14 +102,14 @@ def _exponent(scale: float) -> int:
 
 
 def tidy_angle(angle: float) -> float:
-    """The angle, or the multiple of pi/2 of which it is rounding."""
+    """Return the angle, or the multiple of pi/2 of which it is rounding."""
     right_angles = round(angle / (math.pi / 2))
     nearest = right_angles * (math.pi / 2)
     return nearest if abs(angle - nearest) <= FILE_ROUNDING else angle
 
 
 def _axes(joints: Sequence[ChainJoint]) -> list[Axis]:
-    """The axes; along which line a prismatic joint slides is free, so it passes through the next joint."""
+    """Return the axes; the free line of a prismatic joint passes through the next joint."""
     axes: list[Axis] = []
     for joint in reversed(joints):
         point = axes[-1].point if axes and not joint.is_revolute else joint.origin
@@ -120,7 +120,7 @@ def _axes(joints: Sequence[ChainJoint]) -> list[Axis]:
 def _parallelled(
     joints: Sequence[ChainJoint], axes: Sequence[Axis], snap: float
 ) -> tuple[list[Axis], tuple[Snap, ...]]:
-    """The axes, those nearly parallel to the one before turned about their own point."""
+    """Return the axes, those nearly parallel to the one before turned about their own point."""
     result, snaps = [axes[0]], []
     for joint, axis in zip(joints[1:], axes[1:], strict=True):
         before = result[-1]
@@ -149,7 +149,7 @@ def _feet(first: Axis, second: Axis) -> tuple[float, float]:
 
 
 def _first_frame(axis: Axis) -> FloatArray:
-    """The frame on the first axis that is closest to the base's own."""
+    """Return the frame on the first axis that is closest to the base's own."""
     origin = axis.point - (axis.point @ axis.direction) * axis.direction
     x, y, _ = np.eye(3)
     reference = x if abs(axis.direction[0]) < math.sqrt(0.5) else y
@@ -157,7 +157,7 @@ def _first_frame(axis: Axis) -> FloatArray:
 
 
 def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
-    """The frame on an axis, by the common normal with the z axis of the frame before."""
+    """Return the frame on an axis, by the common normal with the z axis of the frame before."""
     before = Axis(frame[:3, 3], frame[:3, 2])
     normal = np.cross(before.direction, axis.direction)
     if np.linalg.norm(normal) <= FILE_ROUNDING:
@@ -183,7 +183,7 @@ def _parallel_frame(frame: FloatArray, axis: Axis) -> FloatArray:
 
 
 def _turns_back(x: FloatArray, frame: FloatArray) -> bool:
-    """Whether -x is closer to the x axis before, or to its y axis if x is at right angles to that."""
+    """Return whether -x is closer to the x axis before, or to its y axis if x is at right angles to that."""
     along_x, along_y = float(x @ frame[:3, 0]), float(x @ frame[:3, 1])
     return along_x < -FILE_ROUNDING or (abs(along_x) <= FILE_ROUNDING and along_y < 0)
 
@@ -194,7 +194,7 @@ def _negligible(point: FloatArray) -> float:
 
 
 def _last_frame(frame: FloatArray, tip: FloatArray) -> FloatArray:
-    """The frame on the last axis beside the tip, turned as the tip if that needs no tilt."""
+    """Return the frame on the last axis beside the tip, turned as the tip if that needs no tilt."""
     axis = frame[:3, 2]
     origin = frame[:3, 3] + (axis @ (tip[:3, 3] - frame[:3, 3])) * axis
     along = abs(float(axis @ tip[:3, 0]))
@@ -203,7 +203,7 @@ def _last_frame(frame: FloatArray, tip: FloatArray) -> FloatArray:
 
 
 def _across(vector: FloatArray, axis: FloatArray) -> FloatArray:
-    """The unit vector along the part of a vector at right angles to an axis."""
+    """Return the unit vector along the part of a vector at right angles to an axis."""
     part = vector - (vector @ axis) * axis
     result: FloatArray = part / np.linalg.norm(part)
     return result
@@ -214,7 +214,7 @@ def _frame(z: FloatArray, x: FloatArray, origin: FloatArray) -> FloatArray:
 
 
 def _row(step: FloatArray, scale: float) -> DenavitHartenberg:
-    """The row of the transform between two frames that obey the convention."""
+    """Return the row of the transform between two frames that obey the convention."""
     theta = tidy_angle(math.atan2(step[1, 0], step[0, 0]))
     alpha = tidy_angle(math.atan2(step[2, 1], step[2, 2]))
     along_x = math.cos(theta) * step[0, 3] + math.sin(theta) * step[1, 3]
@@ -255,7 +255,7 @@ def _positions(joints: Sequence[ChainJoint]) -> FloatArray:
 
 
 def _chain_tips(chain: SerialChain, q: FloatArray) -> FloatArray:
-    """The tip's poses, (samples, 4, 4), by moving every joint in its own URDF frame."""
+    """Return the tip's poses, (samples, 4, 4), by moving every joint in its own URDF frame."""
     poses = np.broadcast_to(np.eye(4), (len(q), 4, 4))
     before = np.eye(4)
     for joint, positions in zip(chain.joints, q.T, strict=True):

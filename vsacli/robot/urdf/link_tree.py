@@ -17,14 +17,14 @@ from vsacli.documents.tree import quoted
 
 
 def transform(rotation: FloatArray, origin: FloatArray) -> FloatArray:
-    """The pose of a frame with these axes (columns) and this origin."""
+    """Return the pose of a frame with these axes (columns) and this origin."""
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = rotation, origin
     return pose
 
 
 def pose_matrix(xyz: Iterable[float], rpy: Iterable[float]) -> FloatArray:
-    """The pose of an `origin`: at xyz, with the axes of Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Return the pose of an `origin`: at xyz, with the axes of Rz(yaw) Ry(pitch) Rx(roll)."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(angle), math.sin(angle)) for angle in rpy)
     rotation = np.array(
         [
@@ -47,13 +47,13 @@ def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
 
 
 def inverse(pose: FloatArray) -> FloatArray:
-    """The inverse of a rigid motion."""
+    """Return the inverse of a rigid motion."""
     rotation = pose[:3, :3].T
     return transform(rotation, -rotation @ pose[:3, 3])
 
 
 def cross_matrix(vector: FloatArray) -> FloatArray:
-    """The matrix with which a vector multiplies from the left as a cross product."""
+    """Return the matrix with which a vector multiplies from the left as a cross product."""
     x, y, z = vector
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
@@ -66,7 +66,7 @@ class Body(NamedTuple):
     inertia: FloatArray
 
     def moved(self, pose: FloatArray) -> Body:
-        """The body in the frame in which its own frame has this pose."""
+        """Return the body in the frame in which its own frame has this pose."""
         rotation = pose[:3, :3]
         return Body(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
 
@@ -194,7 +194,7 @@ class Urdf:
     root: str
 
     def above(self, link: str) -> list[UrdfJoint]:
-        """The joints between the root and a link, from the root."""
+        """Return the joints between the root and a link, from the root."""
         parents = {joint.child: joint for joint in self.joints.values()}
         path = []
         while link in parents:
@@ -203,7 +203,7 @@ class Urdf:
         return path[::-1]
 
     def followed(self, joint: UrdfJoint) -> Mimic:
-        """The joint that a joint follows in the end, itself if it follows none that there is."""
+        """Return the joint that a joint follows in the end, itself if it follows none that there is."""
         mimic = Mimic(joint.name)
         while (further := self.joints[mimic.leader].mimic) is not None and further.leader in self.joints:
             multiplier, offset = mimic.multiplier, mimic.offset
@@ -243,7 +243,7 @@ class ChainPath(NamedTuple):
 
 
 def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
-    """The path from a base link (the root if None) to a tip link (the only one there can be if None).
+    """Return the path from a base link (the root if None) to a tip link (the only one there can be if None).
 
     Raises:
         InputError: there is no such link or path, or no joint moves on it.
@@ -272,7 +272,7 @@ def _path(urdf: Urdf, base: str, tip: str) -> ChainPath:
 
 
 def _only_tip(urdf: Urdf, base: str) -> str:
-    """The end of the only branch that moves, if only one link could be meant by that."""
+    """Return the end of the only branch that moves, if only one link could be meant by that."""
     leaves = {leaf: _path(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
     longest = max(leaves.values(), key=len, default=())
     tips = [leaf for leaf, moving in leaves.items() if moving and moving == longest]

@@ -77,7 +77,7 @@ def _transmissions(root: Element) -> Iterator[Element]:
 
 
 def _is_simple(transmission: Element) -> bool:
-    """Whether it says to be of that type, of one motor, with one reduction at most."""
+    """Return whether it says to be of that type, of one motor, with one reduction at most."""
     types = [child.text for tag in ("type", "plugin") for child in transmission.all(tag)]
     says_so = [transmission.attributes.get("type", ""), *types]
     motors = list(transmission.all("actuator"))
@@ -89,7 +89,7 @@ def _found(transmission: Element) -> list[Element]:
 
 
 def _reduction(transmission: Element, problems: Problems) -> float:
-    """The reduction of a simple transmission, 1 if it has none."""
+    """Return the reduction of a simple transmission, 1 if it has none."""
     for element in _found(transmission):
         try:
             ratio = float(element.text.replace("_", "?"))
@@ -200,7 +200,7 @@ def _leaders(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
 
 
 def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> str:
-    """The one link without a parent, from which every other hangs."""
+    """Return the one link without a parent, from which every other hangs."""
     children = {joint.child for joint in joints.values()}
     roots = [name for name in links if name not in children]
     if len(roots) != 1:
@@ -310,7 +310,7 @@ class _Reader:
         )
 
     def _bound(self, element: Element, name: str) -> float:
-        """A limit, which may be infinite or, for want of one, very large."""
+        """Return a limit, which may be infinite or, for want of one, very large."""
         return max(-LARGEST_NUMBER, min(LARGEST_NUMBER, self._float(element, name, 0.0, math.inf)))
 
     def _origin(self, element: Element) -> FloatArray:
@@ -355,7 +355,7 @@ class _Reader:
         return 0.0
 
     def word(self, element: Element, name: str, default: str = "") -> str:
-        """An attribute that is shown to people."""
+        """Return an attribute that is shown to people."""
         word = element.attributes.get(name, "").strip()
         if not word:
             self._problems.add(element.line, f"{element.tag}: there is no attribute {name}")
@@ -364,7 +364,7 @@ class _Reader:
         return word or default
 
     def _child(self, element: Element, tag: str) -> Element | None:
-        """The only child of a tag, if there is one."""
+        """Return the only child of a tag, if there is one."""
         found = list(element.all(tag))
         if len(found) > 1:
             self._problems.add(found[1].line, f"{element.tag}: a second <{tag}>; one is expected")

@@ -21,7 +21,7 @@ MAX_LINKS = 4
 
 
 def robot_text(conversion: Conversion) -> str:
-    """The robot file; `load_robot` gives the same robot again."""
+    """Return the robot file; `load_robot` gives the same robot again."""
     robot = conversion.robot
     lines = [
         "# From a URDF, by vsacli import-urdf: frames, masses, inertias, damping and limits of the joints.",
@@ -97,7 +97,7 @@ def _known(joint: UrdfJoint) -> Iterator[str]:
 
 
 def _written(record: Any) -> dict[str, str]:
-    """The fields of a record as they are written on one line, but for those that have their default."""
+    """Return the fields of a record on one line, without those at their default."""
     values = {name: getattr(record, name) for name in declared(type(record))}
     return {
         name: _value(field.kind, values[name])
@@ -145,12 +145,12 @@ def _numbers(numbers: Iterable[float]) -> str:
 
 
 def _number(number: float) -> str:
-    """The fewest digits that give the same number again, without a superfluous zero."""
+    """Return the fewest digits that give the same number again, without a superfluous zero."""
     return repr(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(number)
 
 
 def _angle(angle: float) -> str:
-    """The angle in rad; a multiple of pi/2 as an expression."""
+    """Return the angle in rad; a multiple of pi/2 as an expression."""
     quarters = round(angle / (math.pi / 2))
     if quarters == 0 or quarters * (math.pi / 2) != angle:
         return _number(angle)

@@ -72,7 +72,7 @@ class HeldJoint(NamedTuple):
 def held_joints(
     urdf: Urdf, standing: Iterable[UrdfJoint], moving: Collection[str], hold: Hold
 ) -> list[HeldJoint]:
-    """The joints that stand still, each where it is held or follows another one to, else at zero.
+    """Return the joints that stand still, each where it is held or follows another one to, else at zero.
 
     Args:
         urdf: the robot.
@@ -114,7 +114,7 @@ def _given(
     moving: Collection[str],
     problems: Problems,
 ) -> float:
-    """The position at which a joint is to be held; 0 if a problem was noted."""
+    """Return the position at which a joint is to be held; 0 if a problem was noted."""
     reason = _reason_against(urdf, name, leaders, moving)
     if reason:
         problems.add(0, f"hold: {reason}")
@@ -214,7 +214,7 @@ class SerialChain:
 def serial_chain(
     urdf: Urdf, base: str | None = None, tip: str | None = None, hold: Hold | None = None
 ) -> SerialChain:
-    """The chain from a base link (the root if None) to a tip link (the only one there is if None).
+    """Return the chain from a base link (the root if None) to a tip link (the only one there is if None).
 
     Args:
         urdf: the robot.
@@ -288,7 +288,7 @@ def _check_links(urdf: Urdf, carried: Iterable[Iterable[UrdfLink]]) -> None:
 
 
 def _poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
-    """The pose of every link in the root, where some joints are held and all others stand at zero."""
+    """Return the pose of every link in the root, where some joints are held and all others stand at zero."""
     positions = {each.urdf.name: each.position for each in held}
     poses = {urdf.root: np.eye(4)}
     for joint in below(urdf.root, urdf.joints.values()):
@@ -298,7 +298,7 @@ def _poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
 
 
 def _carried(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
-    """The links that each moving joint of the chain carries, side branches included."""
+    """Return the links that each moving joint of the chain carries, side branches included."""
     number = {joint.name: index for index, joint in enumerate(path.moving)}
     owner = {path.base: -1}
     carried: list[list[UrdfLink]] = [[] for _ in number]

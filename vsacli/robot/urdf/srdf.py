@@ -82,7 +82,7 @@ class _Groups:
         return Ends(first.parent if chain is None else chain.attributes["base_link"], tip)
 
     def _joints(self, name: str, around: tuple[str, ...]) -> dict[str, UrdfJoint]:
-        """The joints of a group by name: its own, those above its links, of its chains and its groups."""
+        """Return the joints of a group by name: its own, those of its links, chains and groups."""
         group = self._groups[name]
         if name in around:
             self._problems.fail(group.line, f"the group {quoted(name)} contains itself")

@@ -35,7 +35,7 @@ class Element:
             yield from child.everything()
 
     def all(self, tag: str) -> Iterator[Element]:
-        """The children of this tag."""
+        """Return the children of this tag."""
         return (child for child in self.children if child.tag == tag)
 
 
