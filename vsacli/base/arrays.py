@@ -60,7 +60,7 @@ def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:
 
 
 def evenly(length: int, count: int) -> IndexArray:
-    """At most `count` indices of `length`, evenly chosen, both ends included."""
+    """Return at most `count` evenly spaced indices of `length`, both ends included."""
     return np.linspace(0, length - 1, min(length, count)).round().astype(np.intp)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 MOST_NEAR = 3
-"""Of words that begin as the one that was typed, so many are a help."""
+"""Largest number of proposals: more words with the same beginning are no help."""
 
 
 def nearest(word: str, valid: Iterable[str]) -> str | None:

@@ -1,4 +1,4 @@
-"""What can go wrong, as exceptions that carry data and build their own sentence."""
+"""Exceptions that carry their data and write their own sentence."""
 
 from __future__ import annotations
 

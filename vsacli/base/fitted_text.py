@@ -16,14 +16,14 @@ INDENT = "  "
 """Before what goes on from the line above."""
 
 WIDEST_INDENT = 3
-"""What fraction of the width may stand before lines that go on as wide as their beginning."""
+"""Denominator of the largest indent, as a fraction of the width, that continuation lines repeat."""
 
 BEFORE_UNIT = re.compile(r"(?<=\d) (?=[A-Za-z%])|(?<=\bN) (?=m\b)| (?=[+-]\d)")
 """Blanks at which a line is not broken: between a number and its unit, within newton metres, and before a
 number with a sign, which belongs to the joint before it."""
 
 HARD_BLANK = "\N{NO-BREAK SPACE}"
-"""What stands for them while it is broken."""
+"""Placeholder for blanks that must not break while a text is wrapped."""
 
 
 def fitted(text: str, width: int) -> str:

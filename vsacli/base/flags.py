@@ -73,7 +73,7 @@ class Flag(enum.IntFlag):
         return str(self.name).lower()
 
     def quantity_of(self, motor: int | None) -> str:
-        """What is beyond the limit, of motor 1 or 2 if it is one of a motor."""
+        """Return the quantity over the limit in words, with the number of its motor, if any."""
         return f"{self.quantity}" if motor is None else f"{self.quantity} {motor}"
 
     @classmethod
@@ -87,7 +87,7 @@ LIMITS = reduce(or_, (flag for flag in Flag if flag.quantity is not None))
 
 
 def has(flags: FlagArray, bits: Flag) -> BoolArray:
-    """Where any of the bits is set."""
+    """Return where any of the bits is set."""
     hit: BoolArray = (flags & np.uint16(bits)) != 0
     return hit
 
@@ -98,7 +98,7 @@ def marked(flag: Flag, where: BoolArray) -> FlagArray:
 
 
 def finite(arrays: Iterable[FloatArray]) -> BoolArray:
-    """Where every one of some arrays of a shape is a finite number; an infinity is none."""
+    """Return where all arrays are finite numbers; they have one shape."""
     whole: BoolArray = reduce(and_, map(np.isfinite, arrays))
     return whole
 

@@ -47,7 +47,7 @@ class Stored(Published):
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
-        """From what `as_json` gave, and `further` fields; None for a float is NaN.
+        """Return a record from the result of `as_json` and `further` fields; None for a float is NaN.
 
         What was added to a format later has a default, since it is missing in what was written before.
 

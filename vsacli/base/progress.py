@@ -1,4 +1,4 @@
-"""How long work shows its progress and passes sentences to the user, if anybody listens."""
+"""Receivers of progress and of sentences for the user, with silent ones as defaults."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol, TypeAlias
 
 
 class Bar(Protocol):
-    """What steps are counted on, as those of click and tqdm."""
+    """A counter of steps, as the progress bars of click and tqdm are."""
 
     def update(self, steps: int, /) -> object:
         """Count steps that are done."""

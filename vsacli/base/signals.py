@@ -1,4 +1,4 @@
-"""What is commanded over time: the motion, further signals of joints such as their stiffness, the wrench.
+"""Signals that are commanded over time: the motion, others of joints such as stiffness, the wrench.
 
 Each signal is declared once; from that follow keys and columns of trajectory files, variables of results with
 their attributes, rows of kernels, and what commands carry. A further signal that joints can be commanded by
@@ -110,7 +110,7 @@ WRENCH = Signal(
 )
 
 COMMANDED: dict[str, Signal] = {signal.key: signal for signal in (STIFFNESS, DAMPING)}
-"""What joints can be commanded by besides their position, by key; its value bears the name of the key."""
+"""Signals besides the position that joints can be commanded by, by key."""
 
 
 def commanded_names() -> tuple[str, ...]:
@@ -119,6 +119,6 @@ def commanded_names() -> tuple[str, ...]:
 
 
 def orders_of_derivation() -> dict[str, int]:
-    """For each variable of the joints that is commanded, which derivative of its signal it is."""
+    """Return the order of derivation of each commanded variable of the joints."""
     signals = (POSITION, *COMMANDED.values())
     return {name: order for signal in signals for order, name in enumerate(signal.names)}

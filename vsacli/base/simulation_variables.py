@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from vsacli.base.variables import VARIABLES, Variable
 
 TRACKED = ("q", "dq", "ddq", "stiffness", "dstiffness")
-"""What is commanded and comes out otherwise."""
+"""Commanded variables from which a simulation deviates."""
 
 ACTUAL = (
     *TRACKED,
@@ -18,7 +18,7 @@ ACTUAL = (
 )
 ERRORS = ("q", "dq", "stiffness", "dstiffness")
 MEASURED = ("q", "theta", "tau_motor")
-"""What sensors read."""
+"""Variables that sensors read."""
 
 
 def actual(name: str) -> str:

@@ -92,11 +92,11 @@ def check_free_space(path: str | Path, size: int) -> None:
 _NAME = re.compile(r"\.vsacli-(?P<host>[0-9a-f]{12})-(?P<process>\d+)-(?P<start>\d+)-[0-9a-f]{16}\.tmp")
 
 UNKNOWN_START = 0
-"""Of a process, where the system does not say when it began."""
+"""Start of a process on systems that do not tell it."""
 
 
 class Owner(enum.StrEnum):
-    """Who works on a file that is not finished: a process of this host or another one."""
+    """The owner of an unfinished file: a process of this host or another one."""
 
     ENDED = "ended"
     RUNNING = "running"

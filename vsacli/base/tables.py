@@ -7,7 +7,7 @@ from html import escape
 from typing import NamedTuple
 
 BETWEEN_CELLS = "   "
-"""What no other text of a report has between words, so that tables can be told from it."""
+"""Separator of cells, which no other text of a report contains: tables are recognized by it."""
 
 
 def aligned(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:

@@ -11,7 +11,7 @@ _MARKDOWN = re.compile(r"([\\`*_{}\[\]<>()#+\-!|~&$])")
 
 
 MOST_LETTERS = 200
-"""Of a name."""
+"""Longest name."""
 
 
 def one_line(text: str) -> str:
@@ -22,7 +22,7 @@ def one_line(text: str) -> str:
 
 
 def as_name(text: str) -> str:
-    """What becomes a name although it was not chosen as one, such as that of a file."""
+    """Return a text that was not chosen as a name, such as a file name, in the form of one."""
     return one_line(text)[:MOST_LETTERS]
 
 
@@ -32,23 +32,23 @@ def for_terminal(text: str) -> str:
 
 
 def for_comment(text: str) -> str:
-    """For a comment in C, which it neither ends nor begins."""
+    """Return a text for a comment in C, without anything that begins or ends one."""
     return one_line(text).replace("*/", "* /").replace("/*", "/ *")
 
 
 def for_yaml(text: str) -> str:
-    """In double quotes, letters as they are if they can be printed; YAML knows no surrogates as JSON does."""
+    """Return a text in double quotes for YAML, printable letters as they are; YAML has no surrogate pairs."""
     quoted = json.dumps(text, ensure_ascii=False)
     return "".join(each if each.isprintable() else f"\\U{ord(each):08x}" for each in quoted)
 
 
 def for_markdown(text: str) -> str:
-    """For a paragraph or heading in Markdown, where it means nothing but itself."""
+    """Return a text for Markdown, in which no character is markup."""
     return _MARKDOWN.sub(r"\\\1", one_line(text))
 
 
 def sentence(clause: str) -> str:
-    """With a full stop, unless it ends as a question."""
+    """Return a clause as a sentence: with a full stop, unless it ends as a question."""
     return clause if clause.endswith(("?", ".")) else f"{clause}."
 
 

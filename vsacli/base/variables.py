@@ -18,21 +18,21 @@ from vsacli.base.wrench import wrench_columns
 
 MOTORS = (1, 2)
 SPRINGS = "springs"
-"""What a joint must have to have a variable, unless that is to take a commanded signal."""
+"""Requirement of variables that only joints with springs have, commanded signals apart."""
 
 MOTOR_CONSTANTS = ("torque_constant", "resistance")
 """Constants of a motor that it must have to have a variable."""
 
 LOSSES = "friction"
-"""What the robot must have for the variables on what its joints lose."""
+"""Requirement of the variables of losses: friction or damping anywhere in the robot."""
 
 OF_ANY_ROBOT = (None, SPRINGS, STIFFNESS.key)
-"""What variables require that every result has, NaN where a joint does not have them. Those that require
-something else are left out of results of robots no joint of which has it."""
+"""Requirements of variables that every result has, NaN where a joint does not meet them. Variables with other
+requirements are left out of a result if no joint of the robot meets them."""
 
 
 class Variable(NamedTuple):
-    """What is declared of a result variable.
+    """A result variable as declared.
 
     Attributes:
         name: as in the file and in Python.

@@ -27,7 +27,7 @@ WRENCH_FRAMES = ("end_effector", "base")
 
 @dataclass(frozen=True, eq=False)
 class Wrench:
-    """What the environment exerts on the end effector.
+    """The force and moment that the environment exerts on the end effector.
 
     Attributes:
         wrench: force and moment about the origin of the tool frame, (samples, 6), or (6,) at one instant, by

@@ -1,4 +1,4 @@
-"""What several commands share: arguments and options, reading inputs, running, showing the report."""
+"""Parts that commands share: arguments and options, reading inputs, running, showing the report."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class Inputs(NamedTuple):
-    """What a command computes with."""
+    """The inputs of a computation."""
 
     robot: Robot
     trajectory: Trajectory
@@ -180,7 +180,7 @@ def _naming_option() -> Iterator[None]:
 
 
 def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
-    """Those of the robot and those of the trajectory."""
+    """Return the changes of the robot and those of the trajectory."""
     if not changes:
         return {}, {}
     from vsacli.documents.reading import read_changes
@@ -205,7 +205,7 @@ def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:
 
 
 def run_stem(robot_path: str, trajectory_path: str) -> str:
-    """What the files of a run are called after, unless the user says otherwise."""
+    """Return the beginning of the names of output files, unless the user says otherwise."""
     stems = ("stdin" if path == STANDARD else Path(path).stem for path in (robot_path, trajectory_path))
     return "-".join(stems)
 

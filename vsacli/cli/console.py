@@ -63,7 +63,7 @@ class Exit(enum.IntEnum):
 
 GREEN, YELLOW, RED = ("\x1b[1;32m", "\x1b[1;33m", "\x1b[1;31m")
 PLAIN = "\x1b[0m"
-"""What turns the colour of a terminal, each bold, so that it is seen without colours, too; and back."""
+"""Escape sequence that ends colors; each color is bold, too, to be seen without them."""
 
 COLORS = {"ok": GREEN, **dict.fromkeys(("over_limit", "doubtful", "strayed", "untold"), YELLOW)}
 """Colour of a verdict; every other is red."""
@@ -98,10 +98,10 @@ def tell(message: str) -> None:
 
 
 class Reported(Protocol):
-    """What a command has found: a text for people, and JSON values for programs."""
+    """A finding of a command: a text for people, and JSON values for programs."""
 
     def as_json(self) -> dict[str, Any]:
-        """As JSON values."""
+        """Return JSON values."""
 
 
 def say(found: Reported, as_json: bool) -> None:
@@ -150,7 +150,7 @@ def _read_enough() -> Iterator[None]:
 
 
 def headline_end(text: str, verdict: str) -> slice | None:
-    """Where the verdict stands at the end of a line, with what is added to it in parentheses, if it does."""
+    """Return where the verdict stands at the end of a line, with its parenthesis; None without one."""
     words = re.escape(verdict.upper().replace("_", " "))
     found = re.search(rf"(?<!\S){words}( \([^()\n]*\))?$", text, re.MULTILINE) if verdict else None
     return slice(*found.span()) if found else None
@@ -185,7 +185,7 @@ class Talk:
             tell(message)
 
     def wrote(self, outputs: Outputs) -> None:
-        """What was written."""
+        """Print the files that were written."""
         for path in outputs.paths:
             self.note(f"wrote {path}")
 

@@ -39,7 +39,7 @@ ENDINGS = {
     "urdf": (".urdf", ".xml"),
     "mjcf": (".mjcf", ".xml"),
 }
-"""How the names of files of each format end."""
+"""Endings of file names by format."""
 
 ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
 """Options that say nothing of a robot."""

@@ -46,7 +46,7 @@ ENDINGS = {
     "programs": (".c", ".h", ".py", ".m"),
     "other data": (".npy", ".npz", ".xlsx", ".tsv"),
 }
-"""How names of files end that hold what is meant."""
+"""Endings of file names by content."""
 
 KNOWN = frozenset(ending for endings in ENDINGS.values() for ending in endings)
 

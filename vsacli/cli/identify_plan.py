@@ -70,7 +70,7 @@ def plan(
 
 
 def _noise(given: tuple[float, ...] | None) -> Noise:
-    """Of the sensors."""
+    """Return the noise of the sensors."""
     from vsacli.studies.identification.excitation import USUAL_NOISE, Noise
 
     if given is None:

@@ -145,7 +145,7 @@ def optimize(
 def _draw(
     found: Optimum, best: Trajectory, asked: Trajectory, folder: str, stem: str, outputs: Outputs
 ) -> None:
-    """What changes at each joint, and the pace if that varies."""
+    """Draw the changes at each joint, and the timing if that varies."""
     from vsacli.analysis.run import inverse_dynamics
     from vsacli.results.charts.optimum import JointChange, change_sheet, pace_sheet
     from vsacli.results.plots import FigureFiles
@@ -174,7 +174,7 @@ def _draw(
 
 
 def _moved(result: Result, place: FloatArray, index: int) -> Moved:
-    """What a joint, by index, does at places."""
+    """Return the motion of a joint, by index, at places."""
     from vsacli.results.charts.optimum import Moved
 
     stiffness, lower, upper = (
@@ -184,7 +184,7 @@ def _moved(result: Result, place: FloatArray, index: int) -> Moved:
 
 
 def _torque_limits(joint: Joint) -> FloatArray:
-    """What the torques of all motors of a joint have to lie between, (2,)."""
+    """Return the interval (2,) in which the torques of all motors of a joint have to lie."""
     import numpy as np
 
     ranges = [check.range for check in joint.actuator.limits() if check.variable == "tau_motor"]

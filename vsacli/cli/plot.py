@@ -108,7 +108,7 @@ def plot(
 
 
 class _Target(NamedTuple):
-    """Where figures go."""
+    """The destination of figures."""
 
     folder: Path
     file_format: str
@@ -156,7 +156,7 @@ def _draw_computed(paths: list[Path], shown: _Shown, target: _Target, talk: Talk
 
 
 class _Shown(NamedTuple):
-    """What of files is drawn: of these joints, all if there are none, from one time to another."""
+    """The selection that is drawn: joints (all if empty) and a span of time."""
 
     joints: tuple[str, ...]
     span: tuple[float, float]

@@ -86,7 +86,7 @@ def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
 
 
 def _remedies(files: list[StoredResult], talk: Talk) -> list[RemedyText | None]:
-    """What would mend each file, None where nothing has to be; how far the search is stands on a terminal."""
+    """Return the fix of each file, None where none is needed; show the progress of the search."""
     failed = [each.kind == "result" and each.verdict in MENDABLE for each in files]
     remedies: list[RemedyText | None] = []
     with talk.progress(sum(failed), shown_from=1, label="looking for remedies") as bar:
@@ -97,7 +97,7 @@ def _remedies(files: list[StoredResult], talk: Talk) -> list[RemedyText | None]:
 
 
 def _remedy(result: StoredResult, talk: Talk) -> RemedyText | None:
-    """What `check-feasibility --suggest` says of the inputs of a result; if it cannot, a note says why."""
+    """Return the fixes of `check-feasibility --suggest` for the inputs of a result, or note why not."""
     from vsacli.base.errors import InputError, StorageError
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.files.repetition import rebuilt
@@ -136,7 +136,7 @@ def _check_version(made_by: str, path: Path) -> None:
 
 
 def _command(result: StoredResult, suggestions: Suggestions) -> tuple[str, str]:
-    """What a shell does next: write the first suggestion, or list all again; announced, and as a command."""
+    """Return announcement and command for the next step: write the first fix, or list all again."""
     from vsacli.base.flags import NEAR_SINGULAR_MARGIN
     from vsacli.base.texts import one_line
     from vsacli.documents.reading import written

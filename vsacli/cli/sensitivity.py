@@ -132,7 +132,7 @@ def _analysed(
 
 
 def unheard(_: object) -> None:
-    """What is done with derivatives that are not kept."""
+    """Drop derivatives that are not kept."""
 
 
 def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:

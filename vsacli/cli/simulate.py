@@ -281,7 +281,7 @@ def _run(simulate: Callable[..., Simulation], trajectory: Trajectory, talk: Talk
 
 
 def _computed_by(engine: str, compiler: str, **_further: str) -> str:
-    """What evaluated the equations of motion in the end."""
+    """Return the words for the backend that evaluated the equations of motion."""
     return f"C code computed, compiled by {compiler}" if engine == "c" else "NumPy and Python computed"
 
 

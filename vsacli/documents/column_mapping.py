@@ -1,4 +1,4 @@
-"""Which columns of a table are read, and what they are called here: its header seen through a mapping."""
+"""A mapping of the columns of a table to names of this package, applied to the header of a file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vsacli.documents.csv_file import Header, split_heading
 from vsacli.documents.time_column import TIME, UNIT_WORDS_OF_TIMES
 
 REST = "rest"
-"""Of columns to ignore: all that have no use."""
+"""Value of `ignore` that leaves out every unmapped column."""
 
 UNIT_WORDS = {
     **dict.fromkeys(("deg", "degree", "degrees"), "deg"),
@@ -48,7 +48,7 @@ class MappedColumn:
     place: tuple[str, int] = ("", 0)
 
     def heading(self, target: str, own: str) -> str:
-        """What the column would be called here.
+        """Return the heading under which the column is read.
 
         Args:
             target: what it stands for.
@@ -92,7 +92,7 @@ class ChosenColumns(NamedTuple):
 
 @dataclass(frozen=True)
 class ColumnMapping:
-    """What is said of the columns of a table.
+    """A mapping of columns as declared.
 
     Attributes:
         columns: by the names that are known here; they are renamed so.
@@ -147,7 +147,7 @@ AS_NAMED = ColumnMapping()
 
 
 class _Choice:
-    """Which columns of a header are read, and what is wrong with the mapping."""
+    """The columns chosen from a header, and the problems of the mapping."""
 
     def __init__(
         self, mapping: ColumnMapping, header: Header, known: Collection[str] | None, file: str
@@ -182,7 +182,7 @@ class _Choice:
         return ChosenColumns(places, headings, factors, tuple(others), tuple(ignored), time, nanoseconds)
 
     def _mapped(self) -> Iterator[tuple[int, tuple[str, float]]]:
-        """Of each column that is mapped its place, its heading here, and its factor."""
+        """Yield place, new heading and factor of each mapped column."""
         taken: dict[int, str] = {}
         for name, source in self._mapping.columns.items():
             if self._known is not None and name not in self._known:
@@ -208,7 +208,7 @@ class _Choice:
         return self._place(source.nanoseconds, source)
 
     def _place(self, column: str | int, source: MappedColumn) -> int | None:
-        """Where a column stands; None if that was noted as a problem."""
+        """Return the place of a column; note a problem and return None if it cannot be found."""
         names = self._header.columns
         if isinstance(column, int):
             if column <= len(names):

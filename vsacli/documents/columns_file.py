@@ -1,4 +1,4 @@
-"""What a document says of columns with other people's headers: the keys `columns` and `ignore`.
+"""The keys `columns` and `ignore` of documents, which map columns with other people's headers.
 
 They stand in trajectory files, and in files for recordings alone, `vsacli-columns/1`.
 """

@@ -31,11 +31,11 @@ MAX_BYTES = 10_000_000_000
 MAX_HEADER = 100_000
 """Characters in the header line, or in one before it; binary data often has none or a longer one."""
 SEPARATORS = ("\t", ";", ",")
-"""In the order in which they are looked for in the header line, outside quotes."""
+"""Separators in the order in which a header line is searched for them, outside quotes."""
 COMMENT = "#"
 QUOTE = '"'
 NOT_UTF8 = "\ufffd"
-"""What bytes that are not UTF-8 are read as."""
+"""Replacement for bytes that are not UTF-8."""
 CHUNK = 1_000_000
 """Bytes looked at together."""
 MAX_KINDS = 10
@@ -43,11 +43,11 @@ MAX_KINDS = 10
 MAX_ALIKE = 1000
 """Problems of one kind after which reading is given up."""
 NOTHING = ("", "nan")
-"""What stands in a cell for no number, where that is admitted."""
+"""Cells without a number, where these are admitted."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
 _INDEX = re.compile(r"\d+")
-"""In brackets an index, as in `position[2]`, and no unit."""
+"""Index in brackets, as in `position[2]`, which is no unit."""
 _QUOTED = re.compile(r'"[^"]*"')
 
 
@@ -158,7 +158,7 @@ def _remedy(comment: int) -> str:
 
 
 class Rows(NamedTuple):
-    """What is to be read of a file.
+    """The part of a file to be read.
 
     Attributes:
         path: the file.
@@ -178,7 +178,7 @@ class Rows(NamedTuple):
         return len(self.used) == len(self.header.columns)
 
     def name(self, place: int) -> str:
-        """What messages call a column."""
+        """Return the name of a column in messages."""
         return repr(self.header.columns[place] or place + 1)
 
     def texts(self) -> Iterator[tuple[int, list[str]]]:

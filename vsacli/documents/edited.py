@@ -130,7 +130,7 @@ def _replacement(node: yaml.Node, here: yaml.Node, written: str) -> tuple[int, i
 
 
 def _end(node: yaml.Node) -> int:
-    """Where the text of a node ends: a block that of its last entry, before what follows on that line."""
+    """Return where the text of a node ends; for a block, where its last entry does."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         return _end(last[1] if isinstance(last, tuple) else last)

@@ -30,7 +30,7 @@ _UNIT_TOKEN = re.compile(r"(?P<space>\s+)|(?P<number>[0-9]+)|(?P<name>[A-Za-z]+)
 _EXPONENTS = ("1", "2", "3", "4")
 _POWER = 3
 _BINDING = {"+": 1, "-": 1, "*": 2, "/": 2, "^": _POWER, "**": _POWER}
-"""How tightly operators bind; powers are taken from right to left."""
+"""Precedence of operators; powers associate to the right."""
 
 _OPERATORS: dict[str, Callable[..., Any]] = {
     "+": operator.add,
@@ -59,7 +59,7 @@ class ExpressionError(ValueError):
 
 
 class Grammar(NamedTuple):
-    """What may stand in an expression besides numbers, + - * / and parentheses.
+    """The vocabulary of an expression in addition to numbers, + - * / and parentheses.
 
     Attributes:
         names: words that stand for a value.
@@ -276,7 +276,7 @@ _REFUSED_FORMS = {
     r"[+-]?\d+,\d+": "write a decimal point, not a comma",
     r".*°": "unexpected character '°'; degrees are written as in `90 deg`",
 }
-"""What to advise for forms that are no expressions."""
+"""Advice on forms that are no expressions."""
 
 
 def evaluate(text: str, unit: str) -> float:
@@ -405,7 +405,7 @@ class _Unit:
 
 
 def conversion_factor(text: str, expected: str) -> float:
-    """What a number in a unit is to be multiplied by to be one in another unit.
+    """Return the factor that converts a number from one unit into another.
 
     Args:
         text: the unit found: symbols of `BASES` with `^`, `*`, `/` and parentheses, a blank for a product.

@@ -41,10 +41,10 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 EXPRESSION = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*$"
 ANGLE = r"^[ \t]*[-+(.0-9p][-+*/(). \t0-9eEpi]*(deg)?[ \t]*$"
-"""How expressions look."""
+"""Regular expression of expressions."""
 
 PRINTABLE = r"^[^\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
-"""How names look."""
+"""Regular expression of names."""
 
 
 def json_schema(cls: type, format_name: str, title: str) -> Schema:

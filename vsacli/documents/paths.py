@@ -26,7 +26,7 @@ _Record = TypeVar("_Record")
 
 
 def find(content: Any, path: str) -> Any:
-    """What a path leads to in plain data; a list of what is found where `*` is a word of the path.
+    """Return the value at a path in plain data; a list of values where `*` is a word of the path.
 
     Args:
         content: mappings, lists, numbers and texts, as of JSON.
@@ -126,7 +126,7 @@ def _node(value: Any) -> tree.Node:
 
 
 class _Replacement(NamedTuple):
-    """What is to stand somewhere in a record, and what its meaning depends on there.
+    """A replacement for a value in a record, with all that its meaning depends on there.
 
     Methods return what they are given with this in it. The words lead on from there, the place is the way
     that was gone, for messages.
@@ -209,7 +209,7 @@ class _Replacement(NamedTuple):
 
 
 def _written(record: Any) -> tree.Mapping:
-    """What a file would say in the fields of a record that are texts or numbers."""
+    """Return the fields of a record that are texts or numbers as a file would have them."""
     contents = {name: getattr(record, name) for name in declared(type(record))}
     simple = {name: _node(entry) for name, entry in contents.items() if isinstance(entry, str | int | float)}
     return tree.Mapping(0, simple, dict.fromkeys(simple, 0))

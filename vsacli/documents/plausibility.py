@@ -46,7 +46,7 @@ class Slip(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """What a rule measures of one number.
+    """A measurement of one number by a rule.
 
     Attributes:
         path: to the number.
@@ -139,7 +139,7 @@ Moved: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
 
 
 class Written:
-    """What a YAML file says, and on which line, at the path to a number."""
+    """Values and lines of a YAML file by the path to a number."""
 
     def __init__(self, source: Source, moved: Moved | None = None) -> None:
         """The file, and where it has what stands elsewhere in the record made of it."""

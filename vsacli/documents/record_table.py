@@ -19,13 +19,13 @@ from vsacli.documents.source import Problems, Source, read_source
 from vsacli.documents.tree import INVALID, Scope
 
 MAX_BYTES = 50_000_000
-"""Of a file, whose rows become objects; a hundred thousand rows have some ten million."""
+"""Largest file, B: rows become objects, and a hundred thousand rows have some ten million bytes."""
 
 _Record = TypeVar("_Record")
 
 
 class RecordTable(NamedTuple, Generic[_Record]):
-    """What was read.
+    """A table read as records.
 
     Attributes:
         records: a record for each row.
@@ -41,7 +41,7 @@ class RecordTable(NamedTuple, Generic[_Record]):
 
 
 class _Columns(NamedTuple):
-    """What the columns of a table are.
+    """The columns of a table, assigned to fields.
 
     Attributes:
         width: how many there are.
@@ -95,7 +95,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
 
 
 def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
-    """Where the columns of a header belong; those of no field are left out, unless one is nearly meant."""
+    """Return the columns of a header by field; refuse a name without a field if it nearly is one."""
     fields = declared(cls)
     columns = _Columns(len(header.columns), {}, {}, [])
     meant = set()

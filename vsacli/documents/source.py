@@ -28,10 +28,10 @@ MAX_PROBLEMS = 50
 """A document with more problems is given up on: the reader would drown, and so would the user."""
 
 IN_PACKAGE = "package://"
-"""How ROS names files in its packages, which only ROS finds."""
+"""Beginning of names of files in ROS packages, which only ROS can find."""
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-"""How an HDF5 file begins, which is what results are."""
+"""First bytes of an HDF5 file, the format of results."""
 
 
 class Source(NamedTuple):
@@ -158,7 +158,7 @@ def _too_large(name: str, size: int, max_bytes: int) -> InputError:
 
 
 class Problems:
-    """What is wrong with one file.
+    """The problems of one file.
 
     Every problem of a document is added here while reading goes on; `check` raises them all.
     """
@@ -217,7 +217,7 @@ SIGNATURES = {
     b"PAR1": "parquet",
     b"\x93NUMPY": "npy",
 }
-"""How files begin, with the ending that their names should have."""
+"""First bytes of files, with the ending that their names should have."""
 
 ENDINGS = {"xls": "xlsx", "ods": "xlsx", "npz": "npy", "mjb": "mujoco"}
 """Endings that mean the same as others here."""
@@ -237,7 +237,7 @@ SENTENCES = {
     "npy": "is an array of NumPy; make a CSV file of it, as numpy.savetxt does, then see {look}",
     "xlsx": "is a spreadsheet; save it as CSV, then see {look}",
 }
-"""What each is, and what to do."""
+"""Description of each kind of file, with advice."""
 
 SENTENCES["db3"] = SENTENCES["mcap"]
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 TIME = "time"
-"""What the column of the stamps is called here."""
+"""Name of the column of stamps after reading."""
 
 UNITS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units that stamps without one may be in, and their size in seconds."""
@@ -41,28 +41,28 @@ NAMES = (
     *("time", "__time", "field.header.stamp", "header.stamp", "%time", "rosbagtimestamp"),
     *("timestamp", "stamp", "t", "seconds", "zeit", "clock", "datetime"),
 )
-"""What stamps are called, the best first: those of sensors before those of loggers."""
+"""Names of columns of stamps, the best first: stamps of sensors before stamps of loggers."""
 
 SECONDS = ("sec", "secs")
 REST = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
-"""How names of stamps end that fill two columns, as in messages of ROS."""
+"""Endings of the second column of stamps that fill two, as in ROS messages."""
 
 UNITS_IN_NAMES = ("s", "sec", "secs", "ms", "msec", "us", "usec", "ns", "nsec", "nanosec")
 """Words behind a name that say what it counts."""
 
 SINCE_1970 = {1e8: "s", 1e11: "ms", 1e14: "us", 1e17: "ns"}
-"""From which number on a stamp counts so from 1970: since 1973, for the least."""
+"""Smallest stamps that count from 1970, by unit; the first is in 1973."""
 
 NANOSECONDS = 10**9
-"""In a second."""
+"""Nanoseconds in a second."""
 
 HOUR, DAY = 3600 * NANOSECONDS, 86400 * NANOSECONDS
 
 DIGITS = 9
-"""Of a fraction of a second in nanoseconds; further ones are cut off."""
+"""Digits of a fraction of a second in nanoseconds; further ones are cut off."""
 
 EXPECTED = "a number, a time of day such as 22:30:01.72, or a date and time such as 2024-05-01T22:30:01.72Z"
-"""What a cell of a column of times may hold, for messages."""
+"""Expected content of a cell in a column of times, for messages."""
 
 LARGEST_EXACT = 2.0**53
 """Whole numbers beyond are not told apart in floating point; ns since 1970 are 200 times as large."""

@@ -71,7 +71,7 @@ class Mapping(NamedTuple):
 
 
 Node: TypeAlias = Scalar | Sequence | Mapping
-"""Each prints as what was found, for "expected ..., found ...". Nodes behind aliases are shared."""
+"""A node of a document; prints as "found ..." in messages. Aliases share one node."""
 
 
 def plain(node: Node) -> Any:
@@ -87,11 +87,11 @@ def plain(node: Node) -> Any:
 
 
 INVALID: Final = object()
-"""In place of a value that cannot be used; its problem is noted already."""
+"""Stands for a value that cannot be used, whose problem is noted already."""
 
 
 class Scope(NamedTuple):
-    """What the meaning of a value depends on besides its own text.
+    """The context on which the meaning of a value depends.
 
     Attributes:
         problems: receives everything that is wrong.

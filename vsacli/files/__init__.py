@@ -1,1 +1,1 @@
-"""What a file is, what it holds, and how to begin one."""
+"""Recognition, description and checks of files, and templates to begin with."""

@@ -113,7 +113,7 @@ def example_tables() -> list[Path]:
 
 
 def opening_comment(path: Path) -> str:
-    """What the comment says with which a YAML file begins, in one line."""
+    """Return the opening comment of a YAML file as one line."""
     lines = path.read_text(encoding="utf-8").splitlines()
     return " ".join(line.lstrip("# ") for line in takewhile(lambda line: line.startswith("#"), lines))
 

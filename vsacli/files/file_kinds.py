@@ -61,7 +61,7 @@ class Document:
     title: str
 
     def schema(self) -> dict[str, Any]:
-        """Its JSON Schema, draft 2020-12."""
+        """Return the JSON Schema, draft 2020-12."""
         return json_schema(self.record, self.format, self.title)
 
 
@@ -72,7 +72,7 @@ DOCUMENTS = {
     "study": Document(study_file.FORMAT, study_file.StudyFile, "study of vsacli"),
     "columns": Document(columns_file.FORMAT, columns_file.ColumnsFile, "columns of recordings for vsacli"),
 }
-"""By the word for the kind."""
+"""Kinds of documents by name."""
 
 
 _DOCUMENT_KINDS = {document.format: FileKind(word) for word, document in DOCUMENTS.items()}

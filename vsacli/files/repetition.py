@@ -33,7 +33,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Difference:
-    """How far a variable of a result is from what is computed now.
+    """The difference of a variable of a result from its repetition.
 
     Attributes:
         variable: its name.
@@ -119,7 +119,7 @@ def _reading(inputs: Sequence[StoredInput], path: str | Path) -> Iterator[tuple[
 
 
 class _Comparison:
-    """Of a stored variable with the blocks of a run, in order."""
+    """A comparison of a stored variable with the blocks of a run, in order."""
 
     def __init__(self, result: StoredResult, variable: str) -> None:
         self._result, self._variable = result, variable
@@ -142,7 +142,7 @@ class _Comparison:
 
     @property
     def difference(self) -> Difference:
-        """What there is between them."""
+        """Return the difference found."""
         return Difference(self._variable, self.values, self._largest / (self._peak or 1.0))
 
 

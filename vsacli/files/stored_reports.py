@@ -10,7 +10,7 @@ from vsacli.base.tables import ReportText
 
 
 def stored_report(kind: str, content: Mapping[str, Any]) -> ReportText:
-    """What the command that made the file printed.
+    """Return the report that the command printed when it made the file.
 
     Args:
         kind: of the file, "result" or "simulation".

@@ -58,7 +58,7 @@ def _read(text: str, robot: Robot) -> Trajectory:
 
 
 def _rounded_up(duration: float) -> float:
-    """To two digits."""
+    """Return a duration rounded up to two digits."""
     unit = 10.0 ** (math.floor(math.log10(duration)) - 1)
     return float(f"{math.ceil(duration / unit) * unit:.6g}")
 
@@ -78,7 +78,7 @@ DURATION = 4.0
 
 POSITION_DEGREE = 9
 STIFFNESS_DEGREE = 5
-"""With these, the motors' acceleration vanishes at both ends, and so does the step of their torques."""
+"""Degree of stiffness profiles: motor accelerations, and so torque steps, vanish at both ends."""
 
 TRAJECTORY_HEAD = (
     "A trajectory to begin with. Degrees 9 and 5 are the smallest with which motors behind springs start",
@@ -87,7 +87,7 @@ TRAJECTORY_HEAD = (
 
 ANGLE_OF_MOTION = math.radians(30)
 STROKE_OF_MOTION = 0.1
-"""How far a joint moves where no limit is nearer, rad and m."""
+"""Stroke of a joint where no limit is nearer, rad and m."""
 
 PEAK_TO_MEAN_VELOCITY = 2.5
 """Peak velocity of the motion, relative to its mean, rounded up."""
@@ -201,7 +201,7 @@ def _written(joint: Joint, position: float) -> str:
 
 
 def _way(joint: Joint) -> tuple[float, float]:
-    """From where to where a joint moves: near zero, well within its limits."""
+    """Return start and end of the motion of a joint: near zero, well within its limits."""
     low, high = joint.limits.position
     slowest = min(abs(bound) for bound in joint.limits.velocity)
     length = min(
@@ -231,7 +231,7 @@ def _stiffness(robot: Robot) -> Values:
 
 
 def first_stiffnesses(robot: Robot) -> dict[str, float]:
-    """For each joint whose stiffness is commanded one that it can have while it carries its load."""
+    """Return for each joint with commanded stiffness one that it can have under its load."""
     return dict(_stiffness(robot).get("start", {}))
 
 
@@ -247,7 +247,7 @@ def _stiffnesses(joint: Joint, load: float, q: float) -> tuple[float, float]:
 
 
 def _damping(robot: Robot) -> Values:
-    """In the middle of what each damper can have."""
+    """Return the middle of the range of each damper."""
     return {joint.name: sum(joint.damper.range) / 2 for joint in robot.joints if joint.damper is not None}
 
 

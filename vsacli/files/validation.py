@@ -162,7 +162,7 @@ def _gains(path: str, robot: Robot) -> Any:
 
 
 def _fitting(path: str, read: Callable[[Robot], Any], robots: Robots) -> tuple[list[Any], str]:
-    """What is read for each robot that it fits, and a note on these robots.
+    """Return the content for each robot that it fits, and a note on these robots.
 
     Raises:
         InputError: it fits none; the problems are those with the robot that it fits best.

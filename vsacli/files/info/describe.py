@@ -101,7 +101,7 @@ def describe_study(path: str) -> dict[str, Any]:
 
 
 def _parameter(table: StoredStudy, path: str) -> dict[str, Any]:
-    """What varies: its values if they are few, else their range."""
+    """Return the values of a parameter if they are few, else their range."""
     if table.parameter_is_text(path):
         return {"path": path, "values": sorted(set(table.texts(path)))}
     values = table.read(path)
@@ -135,7 +135,7 @@ BLOCK_SAMPLES = 8192
 def describe_file(
     path: str, robot_path: str | None = None, progress: Progress = unseen, rate: float | None = None
 ) -> dict[str, Any]:
-    """What a robot, trajectory, recording, result or simulation file holds, as JSON values in SI units.
+    """Return the content of a robot, trajectory, recording, result or simulation file, JSON values in SI.
 
     Args:
         path: the file.

@@ -95,7 +95,7 @@ def _searched(objective: Objective, q: FloatArray, robot: Robot) -> FloatArray:
 
 
 def _own_values(objective: Objective, q: FloatArray) -> FloatArray:
-    """Of each goal the values at its own configurations, (..., goals, starts, joints)."""
+    """Return the values of each goal at its own configurations, (..., goals, starts, joints)."""
     everything = objective(q.reshape(-1, q.shape[-1])).reshape(*q.shape[:-1], q.shape[-3])
     own: FloatArray = np.einsum("...gsg->...gs", everything)
     return own
@@ -115,7 +115,7 @@ def _best_end(objective: Objective, q: FloatArray, index: int, ends: FloatArray)
 
 
 def _best_angle(objective: Objective, q: FloatArray, index: int, ends: FloatArray) -> FloatArray:
-    """Where |a + b cos q + c sin q| is largest between the ends; three values say what it is."""
+    """Return where |a + b cos q + c sin q| is largest between the ends, from three values of it."""
     thirds = _at(objective, q, index, _ANGLES)
     a = thirds.mean(axis=0)
     b, c = (np.tensordot(wave(_ANGLES), thirds, 1) * 2 / len(_ANGLES) for wave in (np.cos, np.sin))

@@ -20,7 +20,7 @@ from vsacli.files.info.describe import KIND, study_lines
 from vsacli.files.stored_reports import stored_report
 
 Values = Mapping[str, Any]
-"""Of a record, by field, as JSON has them."""
+"""Values of a record by field, as in JSON."""
 
 
 def device_lines(joints: Sequence[Values]) -> Iterator[str]:
@@ -156,7 +156,7 @@ def _drives(joints: Sequence[Description]) -> Iterator[tuple[str, ...]]:
 
 
 def _dampers(joints: Sequence[Description]) -> Iterator[str]:
-    """Where they are and what they can do, in one line if there are any."""
+    """Yield one line with the places and ranges of dampers, if there are any."""
     words = [
         f"{joint['name']} {PLACES[damper['location']]}, {_span(damper['range'], DAMPING.unit(joint['type']))}"
         for joint in joints

@@ -48,16 +48,16 @@ INDICES = (
     "seq",
     "id",
 )
-"""What columns are called that count rows, if they have a name."""
+"""Names of columns that count rows."""
 
 RISING_SHARE = 0.9
-"""Of the steps of stamps, how many must be positive: in a log with faults some are not."""
+"""Share of steps between stamps that must be positive: in a log with faults some are not."""
 
 GUESSED = "guessed"
-"""How the reason begins why a column is taken for times that nothing calls so."""
+"""Beginning of the reason for which a column without a telling name is taken for times."""
 
 EVEN = 0.5
-"""By how much of the median step nearly all others may differ in a column that nothing calls a time."""
+"""Largest deviation of nearly all steps from the median, as a share of it, in columns guessed as times."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class FirstRows:
         return len(values) > 1 and all(after - before == 1 for before, after in pairwise(values))
 
     def text(self, place: int) -> str:
-        """What each row says in a column; nothing if these are numbers, or not always the same."""
+        """Return the text that every row has in a column; "" for numbers, or for several texts."""
         texts = set(self.filled(place))
         return texts.pop() if len(texts) == 1 and not self.numbers(place) else ""
 
@@ -189,7 +189,7 @@ def time_column(rows: FirstRows) -> TimeColumn | None:
 
 
 def unread_times(rows: FirstRows) -> Iterator[str]:
-    """What is wrong with columns that are called times, if none of them can be one."""
+    """Yield the problems of columns named as times if none of them can be one."""
     if time_column(rows) is not None:
         return
     for place in _called(rows):

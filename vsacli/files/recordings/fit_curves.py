@@ -33,8 +33,8 @@ FEWEST_POINTS = 1000
 """Points that a spline is drawn with at least: lines between fewer samples would look like corners."""
 
 WINDOW_POWER = 8
-"""Of the sine that samples are weighted by. Leakage falls by the ninth power of the frequency, so that motion
-of 1 rad hides no noise of 1e-9 rad ten lines away; with a Hann window it would hide 1e-5 rad."""
+"""Power of the sine window. Leakage falls by the ninth power of the frequency, so that motion of 1 rad hides
+no noise of 1e-9 rad ten lines away; with a Hann window it would hide 1e-5 rad."""
 
 FIRST_LINE = 4
 """Lowest frequency that is shown, in cycles of the recording: the window mixes slower ones with the mean."""
@@ -52,7 +52,7 @@ FITS = {
     LEAST_SQUARES: "least squares",
     SMOOTH: "smoothed",
 }
-"""By the method in the report."""
+"""Words for each method of the report."""
 
 
 def table_profiles(path: str, robot: Robot, progress: Progress = unseen) -> list[SampledProfile]:

@@ -1,4 +1,4 @@
-"""What the columns of a recording may stand for, by their names: guesses, each with its reason."""
+"""Guesses at the meaning of the columns of a recording, each with its reason."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from vsacli.files.recordings.names import AXES, GENERIC, POSES, QUANTITIES, WORD
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE
 
 TAKEN = ("q", "stiffness")
-"""Of the quantities, what is proposed; the others stand beside it as comments."""
+"""Quantities that are proposed; others become comments next to them."""
 
 ARRAYS = ("q", "dq", "tau_motor_1")
-"""What the arrays of `sensor_msgs/JointState` hold: position, velocity, effort."""
+"""Content of the arrays of `sensor_msgs/JointState`: position, velocity, effort."""
 
 OTHER_THAN_MEASURED = (
     *("desired", "command", "commanded", "target", "reference", "ref", "goal", "error", "setpoint"),
@@ -34,7 +34,7 @@ _SEPARATORS = re.compile(r"[./\s]")
 
 
 class Guess(NamedTuple):
-    """What a column may stand for.
+    """A possible meaning of a column.
 
     Attributes:
         place: of the column, from 0.
@@ -54,7 +54,7 @@ class Guess(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What the column is called here."""
+        """Return the name of the column in this package."""
         return f"{self.joint}.{self.quantity}"
 
 
@@ -84,7 +84,7 @@ class _Column(NamedTuple):
 
 
 class _Joint(NamedTuple):
-    """Which joint a column is of, why, and whether its name says so."""
+    """The joint of a column, the reason, and whether the name says so."""
 
     name: str
     reason: str = ""
@@ -92,7 +92,7 @@ class _Joint(NamedTuple):
 
 
 def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]) -> list[Guess]:
-    """What the columns may stand for, each name once.
+    """Return possible meanings of the columns, each name once.
 
     Args:
         rows: the first rows.
@@ -123,7 +123,7 @@ def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
 
 
 def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
-    """What the name of a column says; of one without a word for a quantity, that it may be a position."""
+    """Yield the meanings of a column by its name; without a word for a quantity it may be a position."""
     name = split_heading(rows.columns[place])[0]
     for match in reversed(list(WORDS.finditer(name))):
         quantity = next((key for key, known in QUANTITIES.items() if match[0].lower() in known), None)
@@ -244,7 +244,7 @@ def _is_no_joint(column: _Column) -> bool:
 
 
 def _source(rows: FirstRows, column: _Column) -> tuple[MappedColumn, str]:
-    """What a mapping says of a column, and what is doubtful about its unit."""
+    """Return the mapping of a column, and doubts about its unit."""
     heading = rows.columns[column.place]
     own = split_heading(heading)[1]
     source = MappedColumn(column=rows.called(column.place), unit=own)

@@ -125,7 +125,7 @@ def _stands_in(part: Sequence[str], words: Sequence[str]) -> bool:
 
 
 def _common(names: Sequence[Sequence[str]]) -> tuple[int, int]:
-    """How many words all names have in common at their beginning, and at their end."""
+    """Return how many words all names have in common at their beginning, and at their end."""
     if len(names) < 2:  # a single one would have nothing left
         return 0, 0
     shortest = min(map(len, names))

@@ -1,4 +1,4 @@
-"""What a CSV file from elsewhere holds, as JSON values: columns, rate, health, a mapping to begin with."""
+"""Description of a CSV file from elsewhere: columns, rate, health, and a mapping to begin with."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ TOGETHER = 16
 """Columns that are read at a time: a million rows of them take 128 MB, however wide the table is."""
 
 AS_WRITTEN = "-"
-"""In place of a unit: numbers are shown as they stand."""
+"""Stands for a unit where numbers are shown as written."""
 
 JITTERS = "jitters"
-"""How the fault of stamps begins that equal steps mend."""
+"""Beginning of the fault of stamps that equal steps would fix."""
 
 FEWEST_ROWS = 10
 """Numbers of a column below which nothing is said of its health."""
@@ -58,7 +58,7 @@ def describe_recording(
     progress: Progress = unseen,
     rate: float | None = None,
 ) -> dict[str, Any]:
-    """What a CSV file holds, whatever its columns are called, as JSON values.
+    """Return the content of a CSV file, with columns of any names, as JSON values.
 
     Args:
         path: the file.

@@ -38,7 +38,7 @@ FEASIBILITY = "feasibility"
 """Name of the figure of `check-feasibility`; its file is called `<stem>-feasibility`."""
 
 FEASIBILITY_VARIABLES = ("stiffness", "stiffness_lower", "stiffness_upper", "flags")
-"""What it is drawn from."""
+"""Variables of the figure."""
 
 Part: TypeAlias = tuple[str, str]
 """A variable and the label of its axis; `{force}` moves the joint, `{motor}` numbers the motor."""
@@ -185,7 +185,7 @@ _OF_SIMULATIONS: dict[str, Part] = {
 }
 
 _FOLLOWED = {"q": "$q$", "stiffness": r"$\sigma$"}
-"""What simulations command, a column of panels each, and the label of its axes."""
+"""Commanded variables of simulations, a column of panels each, with the axis label."""
 
 _ROLES = {"commanded": 0, "actual": 1}
 

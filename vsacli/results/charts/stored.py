@@ -27,7 +27,7 @@ from vsacli.robot.joint import existing
 BOUNDS = ("stiffness_lower", "stiffness_upper")
 
 By: TypeAlias = Literal["joint", "file", "role"]
-"""What the looks of the lines of a chart tell apart."""
+"""Property that colors and dashes of the lines of a chart distinguish."""
 
 
 class Difference:

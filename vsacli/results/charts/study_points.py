@@ -91,7 +91,7 @@ class StudyPoints:
 
     @property
     def exceedance(self) -> tuple[FloatArray, FloatArray]:
-        """Each margin, ascending, and the share of all runs that have at least this one."""
+        """Return the margins, ascending, and for each the share of runs that have at least this margin."""
         margins = np.sort(self.margin[np.isfinite(self.margin)])
         return margins, np.arange(len(margins), 0, -1) / len(self.margin)
 

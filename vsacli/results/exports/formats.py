@@ -188,10 +188,10 @@ FIELDS = {"positions": "q", "velocities": "dq", "accelerations": "ddq", "effort"
 while motors may be two, whose torques depend on springs that the message does not know."""
 
 WITHOUT_POINT = re.compile(r"(?<![\d.])(\d+)e")
-"""In 1e-05, which JSON takes for a number, and YAML for a text."""
+"""A number such as 1e-05, which is a number in JSON but a text in YAML."""
 
 NANOSECONDS = 10**9
-"""In a second: times of messages are whole seconds and nanoseconds."""
+"""Nanoseconds in a second: times of messages are whole seconds and nanoseconds."""
 
 LONGEST = 2**31 - 1
 """Seconds of a message: builtin_interfaces/msg/Duration has 32 bits for them, with a sign."""

@@ -18,7 +18,7 @@ from vsacli.base.variables import VARIABLES, Variable, column_names, select_vari
 from vsacli.results.store.reader import StoredResult
 
 Side: TypeAlias = Literal["joint", "motor"]
-"""Of the gear of a motor."""
+"""Side of the gear of a motor."""
 
 CELLS = 2**18
 """Values of a variable held in memory at a time."""
@@ -56,7 +56,7 @@ class Chosen:
 
     @property
     def name(self) -> str:
-        """Its name in the export."""
+        """Return the name in the export."""
         return self.variable.name
 
     def columns(self, joint_names: Iterable[str]) -> Iterator[str]:
@@ -64,7 +64,7 @@ class Chosen:
         return compress(column_names(self.variable, joint_names), self.there.flat)
 
     def units(self, joint_types: Iterable[str]) -> list[str]:
-        """Its unit at each joint, or along each axis of the wrench."""
+        """Return the unit at each joint, or along each axis of the wrench."""
         quantity = self.variable.quantity
         if isinstance(quantity, WrenchQuantity):
             return [quantity.of_axis(axis) for axis in range(len(self.there))]
@@ -98,7 +98,7 @@ class Samples(NamedTuple):
 
 
 class Selection:
-    """What an export takes of a result.
+    """A selection of variables of a result for an export.
 
     Args:
         result: an open result or simulation file.

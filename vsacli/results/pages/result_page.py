@@ -50,7 +50,7 @@ TROUBLES = {
     "near-singular": Flag.NEAR_SINGULAR,
     "over a limit": LIMITS,
 }
-"""What may be wrong with a sample, by the bits that say so."""
+"""Findings about a sample by the bits of its flags."""
 
 
 class Section(NamedTuple):

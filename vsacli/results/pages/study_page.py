@@ -43,7 +43,7 @@ def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> 
 
 
 def _study(points: StudyPoints, table: StoredStudy, label: str, packed: Packed) -> dict[str, Any]:
-    """What scripts have to know of a study; arrays are of the runs that are drawn."""
+    """Return the values of a study that scripts need, with arrays of the runs that are drawn."""
     drawn = _drawn(points)
     verdicts = table.texts("verdict")
     margins, shares = points.exceedance

@@ -31,7 +31,7 @@ full of circles, and the collector, which counts objects, does not see that its 
 FORMATS = ("png", "pdf", "svg")
 
 MOST_PIXELS = 24e6
-"""Of a picture: some 60 joints at the usual resolution. Matplotlib holds it twice, with 4 bytes each."""
+"""Largest picture, pixels: some 60 joints at the usual resolution, held twice by Matplotlib (4 B each)."""
 
 # Without dates, so that equal results give equal files.
 _METADATA: dict[str, dict[str, str | None]] = {

@@ -25,16 +25,16 @@ TITLE_LENGTH = 32
 """Characters of each of its two lines that a panel is wide."""
 
 MOST_ROWS = 6
-"""Of two panels, before the next begin beside them."""
+"""Rows of two panels before further ones begin to the right."""
 
 SIGHT = 6.0
 """Limits beyond what is used by this factor are out of sight, so that the motion stays in sight."""
 
 ROOM = 1.08
-"""By which axes go beyond what they show."""
+"""Factor by which axes extend beyond their content."""
 
 POINTS = 400
-"""Of the edge of what a motor can give."""
+"""Points on the edge of the operating range of a motor."""
 
 PEAK_LOOK: dict[str, Any] = {"facecolor": "#e8eef9", "linewidth": 0.0}
 CONTINUOUS_LOOK: dict[str, Any] = {"facecolor": "#c3d4f1", "linewidth": 0.0}

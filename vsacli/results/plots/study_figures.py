@@ -31,7 +31,7 @@ PANEL_HEIGHT = 2.4
 """Inches."""
 
 MOST_LETTERS = 30
-"""Of a label in one line, along a panel."""
+"""Longest label in one line along a panel."""
 
 MOST_PANELS = 6
 """Numbers that vary whose panels one figure holds: those that the margin follows most."""

@@ -25,7 +25,7 @@ from vsacli.documents.source import HDF5_SIGNATURE
 from vsacli.trajectory.curves.closed_form import LONGEST
 
 SCALES = "DIMENSION_LIST"
-"""What HDF5 calls the attribute of a dataset that has coordinates."""
+"""Attribute of HDF5 datasets with coordinates."""
 
 EXPECTED = "expected a result file, as invdyn or simulate writes it"
 

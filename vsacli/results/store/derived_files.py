@@ -24,7 +24,7 @@ _COMPUTED = ("q", "dq", "ddq", "tau_e", "theta", "tau_motor", "motor_power", "fl
 """Variables beside their derivatives."""
 
 _SLOPE = "_slope"
-"""What the name of a derivative ends with."""
+"""Ending of the names of derivatives."""
 
 
 class SimulationWriter(ResultWriter):

@@ -55,23 +55,23 @@ class Excerpt(StoredResult):
         return values[:, self._joints] if "joint" in self.declared[name].dims else values
 
     def whole_span(self) -> tuple[float, float]:
-        """As of the whole file."""
+        """See `StoredResult.whole_span`."""
         return self._original.whole_span()
 
     def provenance(self) -> dict[str, Any]:
-        """As of the whole file."""
+        """See `StoredResult.provenance`."""
         return self._original.provenance()
 
     def motor_constant(self, name: str) -> FloatArray:
-        """As of the whole file, of these joints."""
+        """See `StoredResult.motor_constant`."""
         return self._original.motor_constant(name)[self._joints]
 
     def limits(self, name: str) -> FloatArray:
-        """As of the whole file, of these joints."""
+        """See `StoredResult.limits`."""
         return self._original.limits(name)[self._joints]
 
     def existing(self, variable: Variable) -> BoolArray:
-        """As of the whole file, of these joints."""
+        """See `StoredResult.existing`."""
         return self._original.existing(variable)[self._joints]
 
     def has(self, variable: Variable) -> bool:

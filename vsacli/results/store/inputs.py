@@ -21,7 +21,7 @@ LARGEST_STORED = 256 * 2**20
 
 CHUNK = 2**20
 COMPRESSION = 1
-"""Of gzip, the quickest."""
+"""Level of gzip, the fastest."""
 
 
 class StoredInput(NamedTuple):

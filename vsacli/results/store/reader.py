@@ -46,7 +46,7 @@ from vsacli.results.store.schema import (
 from vsacli.robot.joint import DenavitHartenberg, Pose, existing
 
 OF_JOINTS = "inputs/robot/joints/{}"
-"""Where a number of the joints stands, by the path to it in the robot file, its dots as underscores."""
+"""Group of a number of all joints: path in the robot file with underscores for dots."""
 
 BLOCK_SAMPLES = 8192
 """Samples that are read at a time to see whether they can be."""
@@ -76,7 +76,7 @@ SIZES = {
 """Largest size of a variable of motors, by its name."""
 
 ACHIEVED = {**{actual(name): name for name in ACTUAL}, **{measured(name): name for name in MEASURED}}
-"""What simulations add, by name: bounded as what was commanded."""
+"""Variables that only simulations have; bounded as the commanded ones."""
 
 DH = ("a", "alpha", "d", "theta")
 """The numbers of a Denavit-Hartenberg row, in the order of its fields."""

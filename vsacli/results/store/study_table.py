@@ -35,20 +35,20 @@ TEXTS = {
 
 
 ROWS_AT_ONCE = 8192
-"""That are written together, or as many as have so many steps over time."""
+"""Rows that are written together, or as many as have this number of samples over time."""
 
 
 def rows_at_once(steps: int) -> int:
-    """How many rows are written together, if each has so many steps over time."""
+    """Return the number of rows written together if each has this many samples over time."""
     return 1 + ROWS_AT_ONCE // (1 + steps)
 
 
 class Column(Protocol):
-    """What is kept of each run: its name, dimensions after `run`, unit, and a few words."""
+    """A column of a study: name, dimensions after `run`, unit, and a few words."""
 
     @property
     def name(self) -> str:
-        """In the table."""
+        """Return the name in the table."""
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ class Column(Protocol):
 
     @property
     def quantity(self) -> Quantity:
-        """Its unit."""
+        """Return the unit."""
 
     @property
     def long_name(self) -> str:
@@ -64,7 +64,7 @@ class Column(Protocol):
 
 
 class Parameter(NamedTuple):
-    """What varies: the path to it, its unit, and whether its values are numbers rather than texts."""
+    """A parameter that varies: path, unit, and whether its values are numbers rather than texts."""
 
     path: str
     unit: str
@@ -72,7 +72,7 @@ class Parameter(NamedTuple):
 
 
 class Head(NamedTuple):
-    """What a table says beside its rows.
+    """The head of a table, in addition to its rows.
 
     Attributes:
         study, robot: names.
@@ -313,7 +313,7 @@ class StoredStudy(StoredFile):
         return values
 
     def column(self, name: str) -> StoredColumn:
-        """What is known of a column.
+        """Return the column of this name.
 
         Raises:
             InputError: it is damaged, or not there.
@@ -326,7 +326,7 @@ class StoredStudy(StoredFile):
             return StoredColumn(name, dims[1:], Quantity(*per_type), str(dataset.attrs["long_name"]))
 
     def shape(self, name: str, steps: int) -> tuple[int, ...]:
-        """Of a column's values in one row, if columns over time have so many steps."""
+        """Return the shape of a column's values in one row, with this many samples over time."""
         with reporting_damage(self.path, name):
             shape = tuple(map(int, self._dataset(name).shape[1:]))
         return (steps, *shape[1:]) if name in self.columns and "step" in self.column(name).dims else shape
@@ -342,7 +342,7 @@ class StoredStudy(StoredFile):
         return bool(self._dataset(path).dtype.kind != "f")
 
     def provenance(self) -> dict[str, str]:
-        """What is known of how it was computed: method, seed and engine, and what was typed.
+        """Return how it was computed: method, seed, engine and command line.
 
         Raises:
             InputError: some of it is missing.
