@@ -15,7 +15,7 @@ def nearest(word: str, valid: Iterable[str]) -> str | None:
 
 
 def did_you_mean(word: str, valid: Iterable[str]) -> str:
-    """Return a clause to append to an error: `; did you mean 'x'?`, or the list of what is valid."""
+    """Return a clause to append to an error: `; did you mean 'x'?`, or the list of valid words."""
     options = list(valid)
     if 0 < len(near := _near(word, options)) <= MOST_NEAR:
         return f"; did you mean {' or '.join(map(repr, near))}?"

@@ -15,12 +15,12 @@ class VsacliError(Exception):
 
 
 class Problem(NamedTuple):
-    """One thing wrong with an input: where it stands and what is expected there.
+    """A problem of an input, with its place.
 
     Attributes:
         file: path as the user gave it, or "" for values that came from Python.
         line: line number from 1, or 0 if the problem concerns the whole file.
-        message: what is wrong, what was expected, how to mend it; no full stop at the end.
+        message: the problem, what was expected, how to fix it; no full stop at the end.
     """
 
     file: str
@@ -50,7 +50,7 @@ def check_type(argument: str, value: object, expected: type, remedy: str) -> Non
 
     Args:
         argument: its name.
-        value: what was given.
+        value: the argument.
         expected: the type.
         remedy: a clause with the call that would do; `{}` stands for a path.
 
@@ -67,7 +67,7 @@ def check_type(argument: str, value: object, expected: type, remedy: str) -> Non
 
 
 def check_path(value: object, call: str) -> None:
-    """Refuse what is no path of a file.
+    """Refuse an argument that is no path of a file.
 
     Raises:
         TypeError: with the call that would do.

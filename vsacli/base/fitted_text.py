@@ -13,7 +13,7 @@ LEAST_WIDTH = 20
 """Columns of a terminal below which a line may be too long for it."""
 
 INDENT = "  "
-"""Before what goes on from the line above."""
+"""Indent of continuation lines."""
 
 WIDEST_INDENT = 3
 """Denominator of the largest indent, as a fraction of the width, that continuation lines repeat."""
@@ -64,7 +64,7 @@ def _joined(lines: Sequence[str]) -> list[str]:
 
 
 def _broken(line: str, width: int) -> list[str]:
-    """Return a line between its words; what is set to the right of it, as a verdict, in a line of its own."""
+    """Return a line broken between words; text aligned right, such as a verdict, gets a line of its own."""
     if len(line) <= width:
         return [line]
     if _has_cells(line):

@@ -21,12 +21,12 @@ NEAR_SINGULAR_MARGIN = 0.01
 
 
 class Flag(enum.IntFlag):
-    """Bits of the variable `flags`, each with its meaning and, if it marks a limit, what that bounds.
+    """Bits of the variable `flags`, each with its meaning and, if it marks a limit, the bounded quantity.
 
     Attributes:
-        meaning: what the bit says, for people: a sentence that fits after "this step is"/"has".
-        quantity: what is beyond the limit, followed by the number of the motor if it is one of a motor; None
-            if the bit does not mean "over a limit".
+        meaning: words for people that complete a sentence beginning with "this step is"/"has".
+        quantity: the quantity over the limit, followed by the number of the motor if it is one of a motor;
+            None if the bit does not mean "over a limit".
     """
 
     meaning: str

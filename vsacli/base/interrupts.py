@@ -72,7 +72,7 @@ class Deferred:
     """Signals that wait.
 
     Attributes:
-        handlers: what they do afterwards.
+        handlers: actions afterwards, by signal.
         arrived: those that came meanwhile.
     """
 
@@ -82,7 +82,7 @@ class Deferred:
         self.arrived: list[int] = []
 
     def disregard(self) -> None:
-        """Ignore those that would unwind the run, now and later: what it is to do is done."""
+        """Ignore signals that would unwind the run, now and later: its work is done."""
         for number, handler in self.handlers.items():
             if handler is _unwind:
                 self.handlers[number] = signal.SIG_IGN

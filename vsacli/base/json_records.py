@@ -1,4 +1,4 @@
-"""Records as JSON under published keys, and back; JSON has no numbers that are not finite."""
+"""Conversion of records to JSON under published keys, and back; JSON has no numbers that are not finite."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Stored(Published):
     def from_json(cls, content: JsonObject, **further: Any) -> Self:
         """Return a record from the result of `as_json` and `further` fields; None for a float is NaN.
 
-        What was added to a format later has a default, since it is missing in what was written before.
+        Fields added to a format later have defaults, since earlier files lack them.
 
         Raises:
             LookupError, TypeError, AttributeError, ValueError: it is no such record.

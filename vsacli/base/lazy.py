@@ -1,4 +1,4 @@
-"""Things that are imported when they are first asked for, so that a command waits only for what it needs."""
+"""Imports at first use, so that a command waits only for the modules it needs."""
 
 from __future__ import annotations
 
@@ -46,10 +46,10 @@ class LazyRegistry(Mapping[str, Any]):
 
 
 def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """`__getattr__` and `__dir__` of a package that imports what it exports at its first use (PEP 562).
+    """Return `__getattr__` and `__dir__` of a package that imports its exports at first use (PEP 562).
 
-    What it exports, and from where, is what its `__init__.py` imports under `if TYPE_CHECKING:`, so that type
-    checkers and the running program are told in one place; `import *` stands for all that a room exports.
+    Its `__init__.py` lists the exports as imports under `if TYPE_CHECKING:`, in one place for type checkers
+    and the running program; `import *` stands for all that a package exports.
 
     Args:
         package: its name.

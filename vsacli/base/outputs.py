@@ -22,9 +22,9 @@ class Staged:
     """A file to be, or a folder of them. A full or failing disk raises a StorageError.
 
     Attributes:
-        path: what it is called by the user.
-        target: what that means, links followed.
-        temporary: what to write meanwhile; it exists and obeys the umask.
+        path: its name as given by the user.
+        target: the file it refers to, links followed.
+        temporary: the file to write meanwhile; it exists and obeys the umask.
     """
 
     path: Path
@@ -95,7 +95,7 @@ class Outputs:
         return self._files[-1]
 
     def check(self, path: str | Path) -> Path:
-        """Refuse what cannot be staged; return the file that is meant, links followed.
+        """Refuse a path that cannot be staged; return the file it refers to, links followed.
 
         Raises:
             StorageError, InputError: as `file`.

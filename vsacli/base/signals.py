@@ -1,8 +1,8 @@
 """Signals that are commanded over time: the motion, others of joints such as stiffness, the wrench.
 
-Each signal is declared once; from that follow keys and columns of trajectory files, variables of results with
-their attributes, rows of kernels, and what commands carry. A further signal that joints can be commanded by
-is an entry of `COMMANDED`.
+Each signal is declared once. Keys and columns of trajectory files, variables of results with their
+attributes, rows of kernels and fields of commands follow from that. A further signal of joints is an entry of
+`COMMANDED`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class Signal(NamedTuple):
         names: of the value and its derivatives, as in tables of samples and in results.
         quantities: their units.
         long_names: a few words on each.
-        meaning: what it is, for the documentation of trajectory files.
+        meaning: a few words, for the documentation of trajectory files.
         spline_degree: odd degree of the spline through recorded values.
         positive: whether the value must be positive.
         optional: whether a component may have no value, so that it is NaN all the time.

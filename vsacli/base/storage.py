@@ -1,7 +1,7 @@
-"""Files on the way: unfinished ones and their names, folders for temporary ones, standard input.
+"""Unfinished files and their names, temporary folders, and standard input.
 
-What is not finished has a hidden name that tells its process, from which a later run knows whether somebody
-still works on it. What the system refuses becomes a `StorageError` with a sentence about the file.
+The hidden name of an unfinished file tells its process, so that a later run knows whether somebody still
+works on it. An error of the operating system becomes a `StorageError` with a sentence about the file.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def reporting_temporary_errors() -> Iterator[None]:
 
 
 def reason(error: OSError) -> str:
-    """Return what an operating system error says, a clause."""
+    """Return an operating system error as a clause."""
     return _REASON.get(error.errno or 0, error.strerror or str(error))
 
 
@@ -124,10 +124,10 @@ def staging_name() -> str:
 
 
 def sweep(folder: Path) -> None:
-    """Remove what processes of this host left in a folder when they were killed.
+    """Remove unfinished files in a folder that killed processes of this host left there.
 
-    What belongs to a living process stays, and what comes from another host, whose processes nobody here
-    can see: the folder may be on a network share.
+    Files of living processes stay, and files from other hosts, whose processes cannot be seen from here: the
+    folder may be on a network share.
     """
     for path, owner in _staged(folder):
         if owner is Owner.ENDED:
@@ -135,7 +135,7 @@ def sweep(folder: Path) -> None:
 
 
 def unfinished(folder: Path) -> list[Unfinished]:
-    """Return what is not finished in a folder, or was left there."""
+    """Return the unfinished files of a folder, also those of killed processes."""
     return [Unfinished(path, owner, size_of(path)) for path, owner in sorted(_staged(folder))]
 
 
@@ -191,7 +191,7 @@ def remove(path: Path) -> None:
 
 @cache
 def _host() -> str:
-    """Return this host, and what its numbers of processes refer to: containers may share a name."""
+    """Return a digest of the host and its namespace of process numbers: containers may share a host name."""
     import hashlib
 
     try:
@@ -212,10 +212,10 @@ def _start(process: int) -> int:
 
 @contextlib.contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """Make a folder, which goes with all that is in it at the end of the context.
+    """Make a folder that is removed with its content at the end of the context.
 
-    Those of killed processes are removed. What the disk refuses to take in it is told as a fault of the
-    folder for temporary files, whatever the file there is called.
+    Folders of killed processes are removed. An error of the disk is reported as one of the folder for
+    temporary files, whatever the file in it is called.
 
     Raises:
         StorageError: there is no place for one, or not enough of it.
@@ -244,9 +244,9 @@ _copies: ContextVar[Mapping[str, str]] = ContextVar("copies", default={})  # noq
 
 
 def place_of(path: str | os.PathLike[str]) -> str:
-    """Return where to find what a file holds: at its path, or in a copy.
+    """Return where the content of a file can be read: at its path, or in a copy.
 
-    Standard input has one, since it can be read only once, and whatever `reading_copies` says.
+    Standard input has a copy, since it can be read only once, and so have files of `reading_copies`.
 
     Raises:
         OSError: standard input is closed, or cannot be read.

@@ -25,9 +25,9 @@ class ReportText(NamedTuple):
     """A report as people read it, in its parts; as a text, its lines without a final newline.
 
     Attributes:
-        headline: what was run, and the verdict.
+        headline: robot and trajectory of the run, and the verdict.
         rows: a table, its header first; none if there is no table.
-        lines: what else there is to say, a line or more each.
+        lines: further findings, a line or more each.
     """
 
     headline: str

@@ -1,4 +1,4 @@
-"""Texts from files, as each way out can bear them: what one shows must not act on what reads it."""
+"""Texts from files, escaped for each output format, so that they cannot act on its reader."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_LETTERS = 200
 
 
 def one_line(text: str) -> str:
-    r"""A text in one line: what moves a cursor, or turns letters round, stands as in "\x1b"."""
+    r"""Return a text in one line; characters that move a cursor or turn letters round are escaped ("\x1b")."""
     if text.isprintable():
         return text
     return "".join(each if each.isprintable() else _escaped(each) for each in text)

@@ -40,7 +40,7 @@ class Variable(NamedTuple):
         quantity: unit at revolute and prismatic joints, or of moments and forces.
         long_name: a few words.
         equation: number in Buondonno & De Luca (2016), or where the value comes from.
-        requires: what a joint must have to have it, `SPRINGS`, a commanded signal by key, one of
+        requires: condition on the joint, `SPRINGS`, a commanded signal by key, one of
             `MOTOR_CONSTANTS`; else it is NaN. `LOSSES` all joints have if any has friction.
         geared: the power of a motor's gear ratio by which the value is larger on the motor's shaft.
     """
@@ -209,9 +209,9 @@ class Block:
     """Variables over a block of consecutive steps, each an attribute of the shape (samples, joints[, 2]).
 
     A value that cannot be computed is NaN, and `flags` says why; one that the joint's actuator does not have
-    is NaN throughout. What a block does not have is None: the wrench, (samples, 6), if the trajectory has
-    none; until the block has its place in a run, `motor_energy`, which sums over the steps before, and the
-    standard deviations; those of what no recorded signal has a part in.
+    is NaN throughout. Variables missing from a block are None: the wrench, (samples, 6), if the trajectory
+    has none; `motor_energy`, which sums over the samples before, and the standard deviations until the block
+    has its place in a run; standard deviations without a recorded signal behind them.
 
     Attributes:
         declared: the variables that it may have, by name.

@@ -58,7 +58,7 @@ class Wrench:
 
 
 def check_frame(frame: str, of: str = "wrench") -> None:
-    """Refuse a word that is no frame of a wrench, or of what acts like one.
+    """Refuse a word that is no frame of a wrench, or of a similar quantity `of`.
 
     Raises:
         InputError: naming the nearest one that is.

@@ -31,12 +31,12 @@ _CAMEL = re.compile(r"[a-z](Deg|Degrees|Degree)$")
 
 @dataclass(frozen=True, kw_only=True)
 class MappedColumn:
-    """A column of a table, and what its numbers are.
+    """A column of a table, with unit and factor of its numbers.
 
     Attributes:
         column: its heading in the file, or its number from 1.
-        unit: of its numbers; None: that in brackets in the header, else that of what it stands for.
-        factor: what its numbers are multiplied by.
+        unit: of its numbers; None: that in brackets in the header, else that of the target.
+        factor: multiplies its numbers.
         nanoseconds: of times in whole seconds, the column of the nanoseconds beside them.
         place: file and line where all that is said.
     """
@@ -51,7 +51,7 @@ class MappedColumn:
         """Return the heading under which the column is read.
 
         Args:
-            target: what it stands for.
+            target: name of the quantity it holds.
             own: its heading in the file.
         """
         if self.nanoseconds is not None:
@@ -73,8 +73,8 @@ class ChosenColumns(NamedTuple):
 
     Attributes:
         places: where they stand, ascending, from 0.
-        headings: what they are called here, each with its unit in brackets if one is known.
-        factors: what their numbers are multiplied by.
+        headings: names in this package, each with its unit in brackets if one is known.
+        factors: multiply their numbers.
         others: names of columns that are not known.
         ignored: names of those to leave out.
         time: place of the stamps, if they are read.
@@ -143,7 +143,7 @@ class ColumnMapping:
 
 
 AS_NAMED = ColumnMapping()
-"""Columns are what their names say."""
+"""A mapping that takes each column by its own name."""
 
 
 class _Choice:

@@ -49,7 +49,7 @@ class ColumnName(OwnKind):
 
 @dataclass(frozen=True, kw_only=True)
 class ColumnSource(MappedColumn):
-    """A column of a table, and what its numbers are."""
+    """A column of a table, with unit and factor of its numbers."""
 
     column: str | int = value(ColumnName(), "the column")
     unit: str | None = text(
@@ -138,7 +138,7 @@ class Ignored(OwnKind):
 
 
 def columns_field() -> Any:
-    """Declare a field that says what columns stand for."""
+    """Declare a field that maps columns."""
     doc = "what columns with other names stand for, e.g. {time: __time, elbow.q: '/joint_states/position[2]'}"
     return value(Columns(), doc, default=None)
 
@@ -150,7 +150,7 @@ def ignore_field() -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class ColumnsFile:
-    """The content of such a file: what a trajectory file says of its recordings, for recordings alone."""
+    """The content of such a file: the keys of a trajectory file that concern its recordings."""
 
     columns: Mapping[str, MappedColumn] | None = columns_field()
     ignore: str | tuple[str | int, ...] | None = ignore_field()
@@ -164,7 +164,7 @@ class ColumnsFile:
 
 
 def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
-    """Return what a file says of the columns of recordings; without one, columns are what their names say.
+    """Return the mapping of a file; without a file, each column is taken by its own name.
 
     Raises:
         InputError: with every problem of the file, each with its line.

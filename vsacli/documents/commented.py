@@ -33,7 +33,7 @@ def commented_document(format_name: str, cls: type, values: Values, head: Iterab
     """Return a document of the record class `cls`.
 
     Args:
-        format_name: what its key `format` says.
+        format_name: value of its key `format`.
         cls: the record class of the whole document.
         values: of every required field, and of the optional ones that shall be set.
         head: lines of comment before it.
@@ -95,7 +95,7 @@ def _field(kind: Kind, name: str, value: Any, comment: str, variant: str) -> Ite
 
 
 def _entries(kind: Items, values: Any, variant: str) -> Iterator[_Line]:
-    """Yield lists a line; of records the first with all keys and comments, the others with what is set."""
+    """Yield lists as a line; of records the first with all keys and comments, the others with their set keys."""
     if not kind.records:
         yield from (_Line(f"- {on_one_line(entry)}").inside() for entry in values)
         return
@@ -116,7 +116,7 @@ def _default(default: Any) -> str:
 
 
 def _comment(field: Field, variant: str) -> str:
-    """Return what a field is, with its unit, and its forms where they cannot be guessed."""
+    """Return the meaning of a field, its unit, and its forms where they cannot be guessed."""
     unit = field.quantity.unit(variant) if variant else str(field.quantity)
     match field.kind:
         case Choice(options=options):

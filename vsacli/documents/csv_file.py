@@ -1,8 +1,8 @@
-"""CSV files: the header, and the rows as texts or numbers. Knows columns by place, not what they mean.
+"""CSV files: the header, and the rows as texts or numbers. Columns are places here, without a meaning.
 
 A tab, semicolon or comma in the header separates the cells; where that is no comma, numbers may have decimal
 commas. Cells may be in double quotes, and a comment goes from `#` to the end of a line. Numbers are read by
-NumPy; each line is looked at only where something is unusual, and to say what is wrong.
+NumPy; single lines are parsed only where something is unusual, and to report problems.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Header(NamedTuple):
 
     Attributes:
         line: its line, from 1; 0 if the table has none and the first line is a row.
-        separator: what stands between the cells of a line.
+        separator: character between the cells of a line.
         columns: names of the columns as written, without quotes; empty texts if there is no header.
     """
 
@@ -212,10 +212,10 @@ def filled_lines(file: Iterable[str], header_line: int) -> Iterator[tuple[int, s
 def read_numbers(rows: Rows) -> FloatArray:
     """Return the numbers of the columns that are used, (rows, columns).
 
-    NumPy's C reader; only if it fails, or has met anything unusual, each line is looked at.
+    Use NumPy's C reader; only if it fails, or has met anything unusual, parse each line.
 
     Raises:
-        InputError: with file and line of what is no number, or no row of this table.
+        InputError: a cell is no number, or a line is no row of this table; with file and line.
     """
     values, reason = np.empty((0, 0)), None
     if rows.all_used or _is_regular(rows):
@@ -260,7 +260,7 @@ def _loaded(
 def _is_regular(rows: Rows) -> bool:
     """Return whether each line has as many cells as the header, so that columns can be picked by place.
 
-    NumPy's reader does not count what it leaves out. Quotes and comments are left to a look at each line.
+    NumPy's reader does not count the cells it skips. Lines with quotes or comments are parsed one by one.
     """
     expected, separator = len(rows.header.columns) - 1, ord(rows.header.separator)
     rest = b""
@@ -347,7 +347,7 @@ def _summary(found: list[Problem]) -> Problem:
 
 
 def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> Iterator[tuple[str, str]]:
-    """Yield kind and sentence of what is wrong with a row."""
+    """Yield kind and sentence of each problem of a row."""
     separator, count = rows.header.separator, len(rows.header.columns)
     cells = cells_of(line, separator)
     if len(cells) != count:

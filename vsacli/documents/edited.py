@@ -59,7 +59,7 @@ def moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, st
 
 
 def node_at(root: yaml.Node, path: str) -> yaml.Node | None:
-    """Return what stands at a path; None if it leads nowhere."""
+    """Return the node at a path; None if it leads nowhere."""
     words = path.split(".")
     nodes = list(_along(root, words))
     return nodes[-1] if len(nodes) == len(words) else None
@@ -102,7 +102,7 @@ def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
 
 
 def _edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
-    """Return the start and the end of a piece of the text, and what replaces it."""
+    """Return start and end of a piece of the text, and its replacement."""
     *way, key = words
     node = root
     for word in way:

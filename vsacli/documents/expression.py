@@ -47,9 +47,9 @@ class ExpressionError(ValueError):
     """A text is no expression.
 
     Attributes:
-        reason: what is wrong.
-        place: number of the character where it is, from 1; 0 if it is everywhere.
-        remedy: a clause on what would do, beginning with `;`, or nothing.
+        reason: the problem.
+        place: number of the character, from 1; 0 if the whole text is meant.
+        remedy: a clause with advice, beginning with `;`, or nothing.
     """
 
     def __init__(self, reason: str, place: int = 0, remedy: str = "") -> None:
@@ -92,7 +92,7 @@ class Step(NamedTuple):
 class Expression(NamedTuple):
     """An expression as steps, each after those that it needs; the last one gives the value.
 
-    What stands in the text several times is one step.
+    Equal parts of the text are one step.
     """
 
     steps: tuple[Step, ...]
@@ -177,7 +177,7 @@ class _Parser:
         return Expression(tuple(self._steps))  # type: ignore[arg-type]
 
     def _expression(self, binding: int) -> int:
-        """Return the step of what operators join that bind at least as tightly."""
+        """Return the step of operands joined by operators of at least this precedence."""
         self._nesting += 1
         if self._nesting > MAX_NESTING:
             raise ExpressionError(f"nested deeper than {MAX_NESTING} levels", self._next.place)
@@ -215,7 +215,7 @@ class _Parser:
         return self._parentheses("a number, a word or (")
 
     def _unit(self) -> int:
-        """Return the step of a unit or of what is in parentheses, with an exponent if one follows."""
+        """Return the step of a unit or a parenthesis, with an exponent if one follows."""
         unit = self._word() if self._next.kind == "name" else self._parentheses("a unit or (")
         if self._next.text == "^":
             self._take()

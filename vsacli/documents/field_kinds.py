@@ -76,7 +76,7 @@ class Kind(ABC):
     """The kind of a declared value.
 
     Attributes:
-        unit: what its numbers measure; None if it is none, or each has a unit of its own.
+        unit: quantity of its numbers; None if it has none, or each has a unit of its own.
         item: the kind of the entries, if a value has several.
         records: classes of the records in a value, by the word that selects each, "" for the only one.
         per_joint: whether the last index of the path to a problem is that of a joint.
@@ -94,11 +94,11 @@ class Kind(ABC):
         """Return the value of a node, which messages call `label`; INVALID if its problem was noted."""
 
     def fault(self, _content: Any) -> str | None:
-        """Return what is wrong with a value as a whole, besides the condition on its numbers."""
+        """Return the problem of a value as a whole, apart from the condition on its numbers."""
         return None
 
     def problems(self, path: FieldPath, check: Check | None, content: Any) -> Iterator[FieldProblem]:
-        """Yield what is wrong with a value at a path, whose numbers must meet a condition."""
+        """Yield the problems of a value at a path, whose numbers must meet a condition."""
         fault = self.fault(content)
         if fault is not None:
             yield FieldProblem(path, fault)
@@ -150,11 +150,11 @@ class Field(NamedTuple):
 
     @property
     def quantity(self) -> Quantity:
-        """Return what its numbers measure."""
+        """Return the quantity of its numbers."""
         return self.kind.unit or DIMENSIONLESS
 
     def problems(self, name: str, content: Any) -> Iterator[FieldProblem]:
-        """Yield what is wrong with the content of the field, whose name is given."""
+        """Yield the problems of the content of the field of this name."""
         return self.kind.problems((name,), self.check, content)
 
 
@@ -335,7 +335,7 @@ class TableFile(Kind):
         self.columns = columns
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
-        """Return the table in the file; what is wrong with that is noted under its own name."""
+        """Return the table in the file; its problems are noted under its own name."""
         name = Text().read(node, label, scope)
         if name is INVALID:
             return INVALID

@@ -1,7 +1,7 @@
-"""Declaring the fields of a record once, for the file reader, the constructor checks and the documentation.
+"""Declaration of the fields of a record, once for file reader, constructor checks and documentation.
 
 Record classes take all they need from here: the functions that make attributes, the kinds of nested values,
-and conditions; `field_kinds` says what else a record class may have.
+and conditions; `field_kinds` lists further attributes of record classes.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """JSON Schema (draft 2020-12) of a declared document, with which editors complete and check YAML.
 
-A schema accepts whatever the reader accepts. It cannot know what only the reader does: the value of an
+A schema accepts whatever the reader accepts. It cannot know the value of an
 expression, conditions between fields, the joints of a robot.
 """
 
@@ -98,7 +98,7 @@ class _Builder:
         return _single(kind, check) or _of_numbers(kind, check)
 
     def _selected(self, variants: Mapping[str, type]) -> Schema:
-        """Return the schema of a mapping whose `type` decides what else it has."""
+        """Return the schema of a mapping whose `type` selects its other keys."""
         return {
             "type": "object",
             "properties": {"type": {"enum": list(variants)}},

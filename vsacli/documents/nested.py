@@ -1,7 +1,7 @@
 """Kinds of nested values: lists, pairs of sides, values by joint, and records, with the reading of a record.
 
-A record is read field by field. What a field cannot hold is noted with its line, and reading goes on, so that
-all problems of a file are reported together.
+A record is read field by field. Problems are noted with their lines, and reading goes on, so that all
+problems of a file are reported together.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class OneOrMore(Items):
 class Pair(Kind):
     """One value for both of two, the sides of a joint say, or a list of two, read as a pair.
 
-    `dim` is what the arrays of both lie along.
+    `dim` is the dimension along which arrays hold both.
     """
 
     __match_args__ = ("item", "dim")
@@ -165,7 +165,7 @@ def _no_number(node: Node | None, name: str, reason: str, label: str, scope: Sco
 
 
 def _by_joint(node: Node, label: str, scope: Scope, exempt: Mapping[str, str]) -> Mapping[str, Node] | None:
-    """Return what is written for each joint, a scalar for all but exempt ones; None if joints are wrong."""
+    """Return the node for each joint, a scalar for all but exempt ones; None if joints are wrong."""
     names = scope.members
     match node:
         case tree.Scalar():

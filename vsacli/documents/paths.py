@@ -1,4 +1,4 @@
-"""Paths into files, such as `joints.elbow.actuator.spring.k`: what they lead to, and another value there.
+"""Paths into files, such as `joints.elbow.actuator.spring.k`, to find values and to replace them.
 
 The words of a path are keys of mappings. An entry of a list goes by its index, from 0, or by the name that it
 has, and `*` stands for all entries.
@@ -128,8 +128,8 @@ def _node(value: Any) -> tree.Node:
 class _Replacement(NamedTuple):
     """A replacement for a value in a record, with all that its meaning depends on there.
 
-    Methods return what they are given with this in it. The words lead on from there, the place is the way
-    that was gone, for messages.
+    Methods return their argument with the replacement in it. The words are the rest of the path, the place is
+    its beginning, for messages.
     """
 
     node: tree.Node

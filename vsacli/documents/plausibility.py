@@ -71,8 +71,8 @@ class Rule(NamedTuple, Generic[_Subject]):
         fields: keys of the file, for the documentation.
         measure: yields values of a robot or trajectory with their sizes.
         size: the size in words, for the documentation.
-        reason: why sizes outside the bounds are not what is meant, a sentence.
-        finding: what is said of the value: a verb, `{size}`, and words from `Measured.beside` in braces.
+        reason: why sizes outside the bounds are hardly meant, a sentence.
+        finding: words about the value: a verb, `{size}`, and words from `Measured.beside` in braces.
         low: least size that passes.
         high: sizes from here on do not pass.
         usual: a common size, towards which another unit is looked for.
@@ -111,7 +111,7 @@ class Rule(NamedTuple, Generic[_Subject]):
         return min(fitting, key=lambda slip: abs(math.log(sizes[slip] / self.usual)), default=None)
 
     def sentence(self, measured: Measured, slip: Slip | None) -> str:
-        """Return the warning: field and value, what it is, and what it looks like."""
+        """Return the warning: field, value, finding, and the likely slip."""
         path = _of_slip(measured.path, slip)
         known = path == measured.path and not math.isnan(measured.value)
         value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if known else ""
@@ -142,7 +142,7 @@ class Written:
     """Values and lines of a YAML file by the path to a number."""
 
     def __init__(self, source: Source, moved: Moved | None = None) -> None:
-        """The file, and where it has what stands elsewhere in the record made of it."""
+        """Take the file, and the paths that differ between it and the record made of it."""
         self.path = source.path
         self._text = source.text or ""
         self._moved = moved
@@ -205,11 +205,11 @@ def strange(
     written: Written | None = None,
     known: Collection[str] = (),
 ) -> dict[str, list[Measured]]:
-    """Return the numbers that rules find, by name of the rule; of rules that find nothing there is no entry.
+    """Return the numbers found by rules, by name of the rule; rules without findings have no entry.
 
     Args:
-        rules: a rule comes after those that explain what it finds.
-        subject: what they measure.
+        rules: a rule comes after those that explain its findings.
+        subject: the robot or trajectory.
         written: the file it is from, if there is one.
         known: names of rules that found something elsewhere.
     """

@@ -19,10 +19,10 @@ from vsacli.documents.tree import Scope, parse_yaml
 _Document = TypeVar("_Document")
 
 Changes: TypeAlias = Mapping[str, Any]
-"""Values by paths into a file, made in turn: what the file could hold there, in lists, mappings and texts."""
+"""Replacements by path into a file, made in turn: values as in the file, as lists, mappings and texts."""
 
 KEPT = ("format", "name", "description")
-"""Keys of a document that no change reaches: they say what the file is, which a change does not."""
+"""Keys of a document that no change reaches: they identify the file."""
 
 _NUMBER = re.compile(r'"([-+]?\.?\d[-+.\w ]*)"')
 
@@ -39,7 +39,7 @@ def read_document(
     Args:
         path: the file.
         cls: the record class of the whole document.
-        format_name: what its key `format` has to say.
+        format_name: value required of its key `format`.
         members: name and unit variant of every joint, where the document has PerJoint values.
         exempt: for a purpose of PerJoint values the joints that have none, each with a clause about it.
 
@@ -66,7 +66,7 @@ def survey_document(
 
     Args:
         path: the file.
-        cls: the record class of the whole document; what is wrong with it is not looked at.
+        cls: the record class of the whole document; its problems are not reported.
 
     Raises:
         InputError: the file is no YAML mapping.
@@ -95,7 +95,7 @@ class ChangeError(InputError):
 
 
 def read_changes(texts: Iterable[str]) -> dict[str, Any]:
-    """Return changes from texts such as `joints.elbow.link.mass=2.5`; what is set twice counts as set last.
+    """Return changes from texts such as `joints.elbow.link.mass=2.5`; the last one of a path counts.
 
     Raises:
         ChangeError: a text has no `=`, a path is one of those that are kept, or a value is no YAML.
@@ -131,7 +131,7 @@ def _value(path: str, text: str) -> Any:
 
 
 def check_path_of_change(path: str) -> None:
-    """Refuse a path into what is kept.
+    """Refuse a path into keys that no change reaches.
 
     Raises:
         ChangeError: it is one.

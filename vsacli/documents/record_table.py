@@ -46,7 +46,7 @@ class _Columns(NamedTuple):
     Attributes:
         width: how many there are.
         places: index of the column of each field that has one.
-        factors: what numbers of a field are multiplied by to be in SI units.
+        factors: convert numbers of a field to SI units.
         others: names of the columns that belong to no field.
     """
 
@@ -157,7 +157,7 @@ def _record(
 
 
 def _in_si(cell: str, factor: float) -> str:
-    """Return the text of a number, converted; what is none stays, and is told of by who reads it."""
+    """Return the text of a number, converted; any other text stays, and its reader reports it."""
     if factor == 1:
         return cell
     try:

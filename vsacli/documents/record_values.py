@@ -147,9 +147,9 @@ class Number(NamedTuple):
 
     Attributes:
         path: to it.
-        quantity: what it measures.
+        quantity: its quantity.
         value: in SI units.
-        requirement: what it must be, as in "must be positive"; "" if it may be any number.
+        requirement: words such as "must be positive"; "" if it may be any number.
     """
 
     path: NumberPath

@@ -41,7 +41,7 @@ class Source(NamedTuple):
         path: as given.
         sha256: of its content, in hex.
         text: its text; None if it is too large to keep.
-        changes: what was changed after reading: JSON of values by path, empty if nothing was.
+        changes: changes after reading: JSON of values by path, empty without any.
     """
 
     path: str
@@ -90,10 +90,10 @@ def is_table(path: str | os.PathLike[str]) -> bool:
 
 
 def check_input_file(path: str | os.PathLike[str], max_bytes: int = sys.maxsize) -> None:
-    """Refuse, before it is opened, what is no regular file of at most `max_bytes`.
+    """Refuse a path, before it is opened, unless it is a regular file of at most `max_bytes`.
 
     Raises:
-        InputError: saying what stands at the path instead.
+        InputError: with the kind of the object at the path.
     """
     name = os.fspath(path)
     with _refusing(name):
@@ -189,7 +189,7 @@ class Problems:
         raise InputError(self._in_order(Problem(self.file, line, message)))
 
     def check(self) -> None:
-        """Raise what was found.
+        """Raise the problems found.
 
         Raises:
             InputError: with every problem once, in the order of the lines.
@@ -244,10 +244,10 @@ SENTENCES["db3"] = SENTENCES["mcap"]
 
 @contextmanager
 def recognising_other_formats(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Within this context, a file that cannot be read is looked at: whether it is one of another program.
+    """Look, when a file cannot be read within this context, whether it is one of another program.
 
     Raises:
-        InputError: what it is and which command leads on, in place of what is wrong with it.
+        InputError: kind of the file, and the command for it, in place of its problems.
     """
     try:
         yield
@@ -260,7 +260,7 @@ def refuse_other_formats(path: str | os.PathLike[str]) -> None:
     """Refuse a file if it is known to be one of another program.
 
     Raises:
-        InputError: what it is, and which command leads on.
+        InputError: kind of the file, and the command for it.
     """
     name = os.fspath(path)
     sentence = SENTENCES.get(_format(name))

@@ -48,7 +48,7 @@ REST = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
 """Endings of the second column of stamps that fill two, as in ROS messages."""
 
 UNITS_IN_NAMES = ("s", "sec", "secs", "ms", "msec", "us", "usec", "ns", "nsec", "nanosec")
-"""Words behind a name that say what it counts."""
+"""Units at the end of a name."""
 
 SINCE_1970 = {1e8: "s", 1e11: "ms", 1e14: "us", 1e17: "ns"}
 """Smallest stamps that count from 1970, by unit; the first is in 1973."""

@@ -1,4 +1,4 @@
-"""The tree of a YAML document: texts, lists and mappings, each with its line; what their meaning depends on.
+"""The tree of a YAML document: texts, lists and mappings with their lines, and the context of their meaning.
 
 This is the only place that knows how YAML is read, and it is read without YAML's surprises. The tree is built
 from parser events without recursion, and every scalar stays a text, so nothing is resolved by the rules of
@@ -20,7 +20,7 @@ from vsacli.documents.source import Problems
 MAX_SHOWN = 40
 MAX_LEVELS = 20
 MAX_NODES = 100_000
-"""Keys and values after each alias was replaced by what it stands for."""
+"""Keys and values after each alias was replaced by its content."""
 
 _LOADER: type = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _PLAIN = re.compile("[\t\n\r -~]*")
@@ -133,11 +133,11 @@ def parse_yaml(text: str, problems: Problems) -> Node:
 
     Args:
         text: the YAML text.
-        problems: receives what can be read past: tags, merge keys, duplicate keys, unknown aliases.
+        problems: receives problems that reading survives: tags, merge keys, duplicate keys, unknown aliases.
 
     Raises:
-        InputError: what cannot be read past (broken syntax, beyond the limits, no document), with everything
-            found before it.
+        InputError: reading ended (broken syntax, beyond the limits, no document); with all problems found
+            before.
     """
     unprintable = None if _PLAIN.fullmatch(text) else re.search(_UNPRINTABLE, text)
     if unprintable:
