@@ -15,7 +15,7 @@ MOST_LETTERS = 200
 
 
 def one_line(text: str) -> str:
-    r"""Return a text in one line; characters that move a cursor or turn letters round are escaped ("\x1b")."""
+    r"""Return a text in one line; those that move a cursor or turn letters are escaped ("\x1b")."""
     if text.isprintable():
         return text
     return "".join(each if each.isprintable() else _escaped(each) for each in text)

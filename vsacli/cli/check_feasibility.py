@@ -159,7 +159,7 @@ def _compute_and_draw(run: Run, folder: str, stem: str, outputs: Outputs, talk: 
 
 
 def _write_fixed(suggestions: Suggestions, number: int, path: str, outputs: Outputs, talk: Talk) -> None:
-    """Write one of the suggestions, if there is one, and say what was written."""
+    """Write one of the fixes, if there is one, and print the name of the file."""
     from vsacli.studies.search import write_fixed
 
     remedies = suggestions.remedies

@@ -217,7 +217,7 @@ def result_line(result: StoredResult) -> str:
 
 
 def show_report(report: Report, as_json: bool, suggestions: Suggestions | None = None) -> Exit:
-    """Print the report, and suggestions if there are; the exit code says what the report says."""
+    """Print the report, with fixes if there are any; the exit code follows from the verdict."""
     if as_json:
         extra = {} if suggestions is None else {"suggestions": suggestions.as_json()}
         say_json({**report.as_json(), **extra})

@@ -54,7 +54,7 @@ class Exit(enum.IntEnum):
     TERMINATED = 143, "ended by SIGTERM, as batch systems do; the target is untouched"
 
     def __new__(cls, code: int, meaning: str) -> Self:
-        """Return a code with what it means, which cannot be left out."""
+        """Return a code with its meaning."""
         member = int.__new__(cls, code)
         member._value_ = code
         member.meaning = meaning
@@ -105,7 +105,7 @@ class Reported(Protocol):
 
 
 def say(found: Reported, as_json: bool) -> None:
-    """Print what a command has found, as JSON or as a text."""
+    """Print the findings of a command, as JSON or as a text."""
     if as_json:
         say_json(found.as_json())
     else:
@@ -142,7 +142,7 @@ def for_width(text: str) -> str:
 
 @contextmanager
 def _read_enough() -> Iterator[None]:
-    """Within, a reader that has gone has read enough: the exit code says what is wrong as well."""
+    """Treat a reader that has gone as one that has read enough, within this context; keep the exit code."""
     try:
         yield
     except OutputClosedError:
@@ -242,7 +242,7 @@ def _refuse_empty_texts(context: click.Context) -> None:
 
 @contextmanager
 def reporting_stdout_errors() -> Iterator[None]:
-    """Within this context, what cannot be written to standard output raises an OutputError."""
+    """Raise an OutputError, within this context, if standard output cannot be written."""
     stream: Any = sys.stdout or _ClosedOutput()
     try:
         with redirect_stdout(cast("TextIO", _CheckedOutput(stream))):
@@ -254,7 +254,7 @@ def reporting_stdout_errors() -> Iterator[None]:
 
 
 class _ClosedOutput(io.TextIOBase):
-    """Standard output that was closed before the start, as by `>&-`: what is written to it is lost."""
+    """Standard output that was closed before the start, as by `>&-`: everything written to it is lost."""
 
     def write(self, _text: str) -> int:
         """Refuse it, as the system does."""
@@ -298,7 +298,7 @@ def _raising_output_errors() -> Iterator[None]:
 
 
 def _discard_buffer(stream: TextIO) -> None:
-    """Lead a stream nowhere: what is still buffered would fail once more when the interpreter ends."""
+    """Lead a stream nowhere: its buffer would fail once more when the interpreter ends."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)

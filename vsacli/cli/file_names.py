@@ -1,7 +1,7 @@
 """Names of files and folders on the command line, which shells complete.
 
 The ending of a name says what the file holds: an output whose name promises another format is refused, since
-whoever opens it, a program or a later command, goes by that name.
+programs and later commands go by that name.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class NameType(StringParamType):
-    """A name that shells complete; unlike `click.Path` it leaves to commands what is wrong on the disk."""
+    """A name that shells complete; unlike `click.Path` it leaves problems of the disk to commands."""
 
     def __init__(self, name: str, completion: str) -> None:
         self.name = name
@@ -52,7 +52,7 @@ KNOWN = frozenset(ending for endings in ENDINGS.values() for ending in endings)
 
 
 def ending_of(name: str) -> str:
-    """Return the ending of a name in small letters, if it is one that says what a file holds; else empty."""
+    """Return the ending of a name in lower case if it names the content of a file; else ""."""
     ending = PurePath(name).suffix.lower()
     return ending if ending in KNOWN else ""
 

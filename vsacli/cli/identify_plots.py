@@ -33,11 +33,11 @@ def identification_page(found: Identification, columns: str | None) -> str:
     """Return a page of the report and all records, as HTML.
 
     Args:
-        found: what is shown.
-        columns: the file that said what columns stand for, if one did.
+        found: the identification.
+        columns: the file with the mapping of columns, if there is one.
 
     Raises:
-        InputError: what a page needs is not installed.
+        InputError: a library that pages need is not installed.
     """
     from vsacli.base.texts import one_line
     from vsacli.base.version import __version__

@@ -1,4 +1,4 @@
-"""The command group, and what becomes of its errors."""
+"""The command group, and the exit codes of its errors."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def main() -> NoReturn:
 def _hold_closed_streams() -> None:
     """Open what the caller closed of the three standard streams, as by `>&-`.
 
-    Else the first file that is opened gets the number of one, and what a library prints goes into it.
+    Otherwise the first opened file gets the number of one, and prints of a library end up in it.
     """
     while (number := os.open(os.devnull, os.O_RDWR)) < FIRST_OWN:
         os.set_inheritable(number, True)

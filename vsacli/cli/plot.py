@@ -122,7 +122,7 @@ class _Target(NamedTuple):
 
 
 def _check_recording(files: tuple[str, ...], shown: _Shown, file_format: str) -> None:
-    """Refuse what is not drawn of recordings.
+    """Refuse options that figures of recordings do not have.
 
     Raises:
         click.UsageError: naming it.

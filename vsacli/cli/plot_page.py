@@ -39,7 +39,7 @@ def write_page(
 
 
 def staged_page(folder: str | Path, stem: str, outputs: Outputs) -> Staged:
-    """Return the file of a page, before anything is computed for it.
+    """Stage the file of a page, before anything is computed for it.
 
     Raises:
         InputError: what a page needs is not installed.

@@ -44,7 +44,7 @@ FEEDBACK = "feedback-linearization"
 
 
 class Options(NamedTuple):
-    """Options that say what is simulated, as the command line has them."""
+    """Options of the simulation, as on the command line."""
 
     controller: str
     poles: str | None

@@ -121,7 +121,7 @@ def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json:
 
 
 def _shown(table: StoredStudy, as_json: bool, talk: Talk) -> int:
-    """Say what a table that was written has found; 3 if a run in it failed."""
+    """Print the findings of a written table; return 3 if a run in it failed."""
     from vsacli.studies.sweeps import StudySummary
 
     summary = StudySummary.of(table)

@@ -95,7 +95,7 @@ def _field(kind: Kind, name: str, value: Any, comment: str, variant: str) -> Ite
 
 
 def _entries(kind: Items, values: Any, variant: str) -> Iterator[_Line]:
-    """Yield lists as a line; of records the first with all keys and comments, the others with their set keys."""
+    """Yield lists as a line; of records the first with all keys, the others with those set."""
     if not kind.records:
         yield from (_Line(f"- {on_one_line(entry)}").inside() for entry in values)
         return

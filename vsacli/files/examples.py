@@ -20,12 +20,12 @@ from vsacli.trajectory.file import load_trajectory
 
 @dataclass(frozen=True)
 class ExampleTrajectory:
-    """A trajectory that is shipped.
+    """A bundled trajectory.
 
     Attributes:
         path: its file.
         robots: names of the robots it is made for.
-        description: what it does, a clause.
+        description: of the motion, a clause.
     """
 
     path: Path
@@ -86,9 +86,9 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
 
     Args:
         names: of the robots, copied with their trajectories and the tables these need; if there are none,
-            everything that is shipped is copied, files to import too.
+            all bundled files are copied, also those to import.
         folder: where to; it is made if it does not exist.
-        outputs: what the copies belong to.
+        outputs: stages the copies.
 
     Returns:
         The copies.

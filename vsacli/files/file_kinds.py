@@ -51,7 +51,7 @@ class Document:
     """A kind of YAML file.
 
     Attributes:
-        format: what its key `format` says.
+        format: value of its key `format`.
         record: the record class of the whole document.
         title: a few words.
     """

@@ -1,4 +1,4 @@
-"""A robot in place of the one that a trajectory is for, made of what the trajectory says about its joints."""
+"""A robot that stands in for the one of a trajectory, made from the joints of the trajectory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A result computed once more from what it holds: compared with what it says, or at another rate."""
+"""Repetition of a result from its own inputs, to compare it or to export it at another rate."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Difference:
 
 
 class Repetition(NamedTuple):
-    """A result beside what is computed now.
+    """A result compared with its repetition.
 
     Attributes:
         differences: the variables that are not equal bit for bit, once rounded to the precision of the file.
@@ -155,8 +155,8 @@ class Extracted(NamedTuple):
     """The inputs of a result.
 
     Attributes:
-        files: contents as they were read, by where they stood, relative to what they have in common.
-        changes: what was changed then, values by path.
+        files: contents as they were read, by path relative to their common folder.
+        changes: made after reading, values by path.
     """
 
     files: dict[Path, bytes]

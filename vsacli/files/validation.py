@@ -35,13 +35,13 @@ ERROR, WARNING, NOTE = "error", "warning", "note"
 
 @dataclass(frozen=True)
 class Message:
-    """One thing to say about a file.
+    """A message about a file.
 
     Attributes:
-        severity: ERROR if the file cannot be used, WARNING if it may not say what was meant, NOTE otherwise.
+        severity: ERROR if the file cannot be used, WARNING if a value is hardly meant, NOTE otherwise.
         file: path as given.
         line: line number from 1, or 0 if the whole file is concerned.
-        text: what there is to say, a clause.
+        text: a clause.
     """
 
     severity: str
@@ -69,7 +69,7 @@ class Checked:
 
     Attributes:
         path: as given.
-        summary: what it is, a few words; empty if it cannot be used.
+        summary: its kind in a few words; empty if it cannot be used.
         messages: all there is to say.
     """
 
@@ -89,7 +89,7 @@ def _failed(path: str, error: InputError) -> Checked:
 
 
 def _usable(path: str, summary: str, warnings: Iterable[Problem] = (), notes: Iterable[str] = ()) -> Checked:
-    """Return a file that can be used, with what is to be known about it."""
+    """Return a usable file with warnings and notes on it."""
     messages = [Message(WARNING, path, warning.line, warning.message) for warning in warnings]
     return Checked(path, summary, (*messages, *(Message(NOTE, path, 0, text) for text in notes)))
 

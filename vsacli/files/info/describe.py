@@ -171,7 +171,7 @@ def described_value(description: dict[str, Any], field: str) -> Any:
     """Return the value at a path into a description, as plain JSON values.
 
     Raises:
-        InputError: nothing is there; says what is, and the nearest name.
+        InputError: nothing is there; with the keys that exist, and the nearest name.
     """
     return find(json_value(description), field)
 
@@ -204,8 +204,8 @@ def _described_trajectory(path: str, robot_path: str | None) -> dict[str, Any]:
 def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> dict[str, Any]:
     """Return a trajectory as JSON values: times, and of each joint the range and the peak of each quantity.
 
-    `min`, `max` and `peak`, the largest absolute value, are those at the steps. What a joint does not have,
-    such as the stiffness of a rigid one, is NaN.
+    `min`, `max` and `peak`, the largest absolute value, are those at the steps. Values that a joint does not
+    have, such as the stiffness of a rigid one, are NaN.
     """
     ranges = _Ranges()
     for start in range(0, trajectory.samples, BLOCK_SAMPLES):

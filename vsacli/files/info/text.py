@@ -1,4 +1,4 @@
-"""Descriptions as text: headline, tables, what drives the joints, and what is to be known."""
+"""Descriptions as text: headline, tables, actuators, and notes."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def _record(field: Field, values: Values, joint_type: str) -> str:
 
 
 def _words(name: str, quantity: Quantity, value: Any, joint_type: str) -> str:
-    """Return a field and what it is, with its unit."""
+    """Return name and value of a field, with its unit."""
     written = quantity.unit(joint_type)
     unit = "" if written == str(DIMENSIONLESS) else f" {written}"
     match value:

@@ -1,6 +1,6 @@
-"""The first rows of a table as texts, from which one sees what its columns are.
+"""The first rows of a table as texts, and the kinds of its columns.
 
-That is foremost which column holds the stamps, and what these count.
+The column of stamps is the first to be found, with its unit.
 """
 
 from __future__ import annotations
@@ -154,9 +154,9 @@ class TimeColumn(NamedTuple):
 
     Attributes:
         place: of the column, from 0.
-        source: what a mapping says of it.
+        source: its entry in a mapping.
         reason: why it is taken for that, a clause.
-        nanoseconds: place of the column of nanoseconds beside it, if there is one.
+        nanoseconds: place of its column of nanoseconds, if there is one.
         clock: whether it is written as a clock shows times.
     """
 

@@ -1,6 +1,6 @@
-"""Recorded signals of a trajectory next to their splines: what a figure needs to show how noise was judged.
+"""Recorded signals of a trajectory next to their splines, for figures that show how noise was judged.
 
-Everything that is stated of a fit is taken from its summary, which is what reports contain. Spectra are
+All statements on a fit come from its summary, as in reports. Spectra are
 computed here, from the samples and the spline alone.
 """
 

@@ -24,7 +24,7 @@ ARRAYS = ("q", "dq", "tau_motor_1")
 OTHER_THAN_MEASURED = (
     *("desired", "command", "commanded", "target", "reference", "ref", "goal", "error", "setpoint"),
 )
-"""Words that speak of something else than what a joint did."""
+"""Words of columns that are no measurement of a joint."""
 
 _BARE = re.compile(r"(joint|axis|j)[_-]?\d+", re.IGNORECASE)
 """A joint's name that needs no robot to be recognized."""
@@ -39,8 +39,8 @@ class Guess(NamedTuple):
     Attributes:
         place: of the column, from 0.
         joint: name of the joint.
-        quantity: what of it.
-        source: what a mapping says of the column.
+        quantity: of the joint.
+        source: entry of the column in a mapping.
         reason: why, a clause.
         sure: whether the names themselves say so.
     """
@@ -63,7 +63,7 @@ class _Column(NamedTuple):
 
     Attributes:
         place: of the column, from 0.
-        quantity: what of a joint.
+        quantity: of a joint.
         before: its name before the word for the quantity.
         words: of its name, without that for the quantity.
         entry: index in an array.
@@ -115,7 +115,7 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
 
 
 def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
-    """Columns of joints by their names: those of a quantity first, and what was measured before all else."""
+    """Return columns of joints by their names: those with a quantity first, then measured ones."""
     places = [place for place in rows.of_numbers if time is None or place != time.place]
     columns = [column for place in places if not rows.is_index(place) for column in _of_name(rows, place)]
     columns.sort(key=lambda column: (column.bare, any(word in OTHER_THAN_MEASURED for word in column.words)))

@@ -71,7 +71,7 @@ class Match(NamedTuple):
 
     Attributes:
         joint: its name.
-        whole: whether all of its name is there, not only what tells it from the other joints.
+        whole: whether all of its name is there, not only the part that distinguishes it from other joints.
     """
 
     joint: str

@@ -140,8 +140,8 @@ class _Survey:
 
     Attributes:
         rows: how many there are.
-        time: what is known of the stamps; None without any.
-        columns: what is known of each.
+        time: findings on the stamps; None without any.
+        columns: findings on each.
         warnings: on their health.
         rate: 1/s, in a few digits; empty unless stamps jitter.
     """

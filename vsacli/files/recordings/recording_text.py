@@ -28,7 +28,7 @@ _PLAIN = re.compile(r"[A-Za-z_/][A-Za-z0-9_./]*")
 
 
 def recording_lines(recording: Mapping[str, Any]) -> Iterator[str]:
-    """Rows and rate, the columns, what is wrong with them, and what to paste."""
+    """Yield rows and rate, the columns, their faults, and a mapping to paste."""
     time = recording["time"]
     yield f"recording {recording['name']}: {recording['rows']} rows{_timing(time)}"
     yield from aligned([("column", "number", "holds", "smallest", "largest"), *_columns(recording)])
@@ -77,7 +77,7 @@ def mapping_lines(
 
     Args:
         time: the stamps.
-        guesses: what the columns may stand for.
+        guesses: possible meanings of the columns.
         joint_names: of the robot, empty if it is not known.
         leaves_out: whether there are further columns.
         rate: rows per second, which is said in place of times.

@@ -1,4 +1,4 @@
-"""A chart: curves over time with what surrounds, bounds and interrupts them; and sheets of charts.
+"""A chart: curves over time with their bands, bounds and interruptions; and sheets of charts.
 
 Charts hold arrays and words, no colors: a curve has a number from which figures and pages derive its look.
 A page shows charts one by one, a figure as the panels of a sheet, in blocks side by side.

@@ -91,7 +91,7 @@ _COMPARED = {
 
 
 def comparison_names(variables: Sequence[str] | None) -> list[str]:
-    """Return the names of the figures that compare these variables, or what is compared by default."""
+    """Return the names of the figures that compare these variables, or the default figures."""
     return [COMPARISON] if variables is None else [f"{COMPARISON}-{variable}" for variable in variables]
 
 
@@ -128,7 +128,7 @@ def comparison_sheets(
 
 
 def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
-    """Return for each joint the curves of all files, and below what the others differ by from the first."""
+    """Return the curves of all files for each joint, and below their differences from the first file."""
     there = charts.existing(charts.first.declared[compared.variable])
     there = there[:, : int(np.count_nonzero(np.any(there, axis=0)))]
     signals = charts.signals({compared.variable: "computed"}, uncertain=False)

@@ -124,7 +124,7 @@ def _legend(charts: StoredCharts) -> dict[str, int]:
 
 
 def _corridors(charts: StoredCharts, most_rows: int) -> Block:
-    """Return the stiffness of each joint inside what its load allows."""
+    """Return the stiffness of each joint within its attainable range."""
     rows = [
         [replace(chart, failures=[(each, [joint]) for each in charts.failures])]
         for joint, chart in zip(charts.compliant, charts.corridors(), strict=True)
@@ -133,7 +133,7 @@ def _corridors(charts: StoredCharts, most_rows: int) -> Block:
 
 
 def feasibility(charts: StoredCharts) -> Sheet:
-    """Return the figure of the commanded stiffness inside what the load allows."""
+    """Return the figure of the commanded stiffness within the attainable range."""
     block = _corridors(charts, CORRIDOR_ROWS)
     rows, folds = block.folding
     size = (PANEL_WIDTH * (2 if folds == 1 else folds), CORRIDOR_HEIGHT * rows + 1)

@@ -1,4 +1,4 @@
-"""Charts of what an optimization changes, and of motor torques within the tolerances of a robot."""
+"""Charts of the changes by an optimization, and of motor torques within the tolerances of a robot."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ROW_HEIGHT, PACE_HEIGHT = 1.7, 3.0
 """Inches."""
 
 BEFORE, AFTER, UNIFORM = 1, 0, 3
-"""Looks: what was found is the solid line."""
+"""Line styles: the optimum is the solid line."""
 
 PATH = f"place on the path, as the time at which it was commanded [{TIME}]"
 

@@ -1,9 +1,9 @@
-"""Long runs reduced to what can be seen: curves, their envelopes, stretches of samples, ranges of axes.
+"""Reduction of long runs to visible detail: curves, their envelopes, stretches of samples, ranges of axes.
 
 Figures and pages show the same reduction, so that a peak of one sample is seen everywhere. A run is divided
 into columns of equal time, as wide as a pixel; each keeps its first and last sample, its extremes and a gap.
-Ranges of axes follow from what has to be seen: attainable stiffness near the command, and everything but
-the peaks of nearly singular samples.
+Ranges of axes follow from the parts that have to be seen: attainable stiffness near the command, and
+    everything but the peaks of nearly singular samples.
 """
 
 from __future__ import annotations
@@ -242,7 +242,7 @@ REACH = 0.25
 """Distance from the command up to which a bound is shown, relative to the command."""
 
 MARGIN = 0.06
-"""Free space above and below, relative to what is shown."""
+"""Free space above and below, relative to the visible range."""
 
 
 def visible_range(command: FloatArray, *bounds: FloatArray) -> tuple[float, float]:
@@ -282,7 +282,7 @@ TOLERATED = 0.5
 """Share of the range of all other samples by which near-singular ones may exceed it uncut."""
 
 ROOM = 0.08
-"""Free space above and below, relative to that range; marks of what is cut off stand in it."""
+"""Free space above and below, relative to that range; marks of cut peaks stand in it."""
 
 
 def calm_range(curves: Sequence[FloatArray], calm: Sequence[BoolArray]) -> tuple[float, float] | None:

@@ -188,7 +188,7 @@ class StoredCharts:
         return calm_range([line.curve.values for line in lines], calm)
 
     def corridors(self) -> Iterator[Chart]:
-        """Yield the stiffness of each joint inside what its load allows, as far as that is stored."""
+        """Yield the stiffness of each joint within its attainable range, as far as that is stored."""
         bounds = BOUNDS if set(BOUNDS) <= set(self.common) else ()
         curves = read_curves(self.first, ["stiffness", *bounds])
         quantity = VARIABLES["stiffness"].quantity

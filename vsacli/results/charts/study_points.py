@@ -1,4 +1,4 @@
-"""Points of the table of a study: margin and cost of each run, over what varies."""
+"""Points of the table of a study: margin and cost of each run, over the parameters."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class StudyPoints:
 
     @property
     def shown(self) -> list[tuple[str, FloatArray]]:
-        """Columns drawn over what varies: margin and cost, or of optima the costs before and after."""
+        """Columns drawn over the parameters: margin and cost, or for optima the costs before and after."""
         cost = [] if self.cost is None else [self.cost]
         first = self._cost("cost_before") if self.optimised else ("smallest margin [%]", 100 * self.margin)
         return [first, *cost]

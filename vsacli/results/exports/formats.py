@@ -58,7 +58,7 @@ CSV = ResultFormat(write_csv, missing="empty cells")
 
 
 MAX_VARIABLE_BYTES = 2**31 - 2**16
-"""The format counts the bytes of a variable in 32 bits, of which readers take 31; less what stands before."""
+"""The format counts the bytes of a variable in 32 bits, of which readers take 31; less the header."""
 
 
 def write_mat(selection: Selection, stream: IO[bytes], done: Callable[[int], object]) -> None:
@@ -184,8 +184,9 @@ PARQUET = ResultFormat(write_parquet, binary=True, missing="nulls", check=check_
 
 
 FIELDS = {"positions": "q", "velocities": "dq", "accelerations": "ddq", "effort": "tau_e"}
-"""The variable in each field of a point. The effort is what the joint exerts on the link: there is one of it,
-while motors may be two, whose torques depend on springs that the message does not know."""
+"""The variable in each field of a point. The effort is the torque of the joint on the link: motors may be
+two,
+and their torques depend on springs that the message does not know."""
 
 WITHOUT_POINT = re.compile(r"(?<![\d.])(\d+)e")
 """A number such as 1e-05, which is a number in JSON but a text in YAML."""
@@ -198,7 +199,7 @@ LONGEST = 2**31 - 1
 
 
 def check_fields(selection: Selection) -> None:
-    """Refuse what no field of a message holds, a selection without positions, and times that are too long."""
+    """Refuse variables without a field, a selection without positions, and times that are too long."""
     names, fields = {each.name for each in selection.chosen}, _fields(selection)
     strange = sorted(names - set(fields.values()))
     if strange:

@@ -16,7 +16,7 @@ from vsacli.results.exports.selection import FAULTS, INFINITE, MISSING, Chosen, 
 from vsacli.results.store.reader import StoredResult
 
 TORQUES = {"result": ("tau_motor",), "simulation": ("q_actual", "stiffness_actual", "tau_motor_actual")}
-"""Variables by the kind of the file: the torques to send, or what happened."""
+"""Variables by the kind of the file: the torques to send, or the simulated motion."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class ResultFormat:
         write: writes a selection to a stream of text, or of bytes, and tells how many steps are done.
         binary: whether the stream is one of bytes.
         missing: how it shows a value that is missing; None if it cannot.
-        variables: what is exported by default, by the kind of the file.
+        variables: exported by default, by the kind of the file.
         check: refuses variables that the format has no place for, by name.
     """
 
@@ -91,7 +91,7 @@ def export_result(
         result: an open result or simulation file.
         stream: where to write, text or bytes as the format says; of text, its lines end as they are written.
         form: the format.
-        variables: names, exported in declared order; by default what the format says.
+        variables: names, exported in declared order; by default those of the format.
         rate: samples per second, the stored rate or a whole fraction of it; all samples by default.
         allow_nan: show that samples are missing, and infinite ones as they are, instead of refusing.
         side: of the gear on which motion and torque of the motors are given; see `Selection`.

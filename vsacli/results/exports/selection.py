@@ -76,7 +76,7 @@ class Chosen:
         return flat
 
     def places(self, joint_names: Iterable[str]) -> list[str]:
-        """Names of what has rows in `there`: the variable at each joint, or the columns of the wrench."""
+        """Return names of the rows of `there`: the variable at each joint, or the columns of the wrench."""
         if "joint" not in self.variable.dims:
             return column_names(self.variable, ())
         return [f"{joint}.{self.name}" for joint in joint_names]
@@ -178,7 +178,7 @@ def _existing(result: StoredResult, variable: Variable) -> BoolArray:
 
 
 def _check_geared(result: StoredResult) -> None:
-    """Refuse to guess what happens in a gear of unknown ratio."""
+    """Refuse values on the motor side of a gear with unknown ratio."""
     there = _existing(result, VARIABLES["tau_motor"])
     unknown = np.any(np.isnan(result.gear_ratio) & there, axis=1).tolist()
     if any(unknown):

@@ -1,7 +1,7 @@
-"""Pages of results and of what was measured: one HTML file each, with everything in it that it needs.
+"""Pages of results and of measurements: one self-contained HTML file each.
 
 Charts are packed here, the same as in figures; their look and behavior are in `page.html`, `page.css` and
-the scripts beside them.
+the scripts next to them.
 """
 
 from vsacli.results.pages.document import RemedyText

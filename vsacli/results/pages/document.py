@@ -1,7 +1,7 @@
 """One HTML file: the template of the project around texts, numbers and scripts, closed to the network.
 
 A page carries BokehJS, which draws its plots, as the Python package `bokeh` brings it. Texts are `Facts` of
-each file: its report, how it was made, and what it was made from.
+each file: its report, its provenance, and its inputs.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LARGEST_SHOWN = 200_000
 """Letters of an input up to which a page shows all of it; tables of samples are longer."""
 
 FAIR = ("over_limit", "doubtful", "strayed", "untold")
-"""Verdicts on what was computed all the same."""
+"""Verdicts on complete runs with findings."""
 
 TOO_LONG = "too long for a page"
 
@@ -44,7 +44,7 @@ class Library(NamedTuple):
 
     Attributes:
         name: with its version.
-        scripts: what a page runs, in this order.
+        scripts: run by a page in this order.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Library(NamedTuple):
 
 
 def plotting_library() -> Library:
-    """Return what is installed; found by its files, since to import Bokeh takes a second.
+    """Return the installed library, found by its files, since importing Bokeh takes a second.
 
     Raises:
         InputError: it is not installed.
@@ -83,12 +83,12 @@ class Facts(NamedTuple):
     """The texts on a page about a file.
 
     Attributes:
-        title: what was run.
+        title: robot and trajectory.
         label: short, to tell it from the others on the page.
         verdict: as in the report; empty without one.
         tone: "good", "fair" or "bad".
-        report: what the command printed that made it.
-        provenance: pairs of a word and what it says.
+        report: printed by the command that made it.
+        provenance: pairs of a word and its value.
         inputs: the files that were read.
         remedy: what would mend it; None if it needs none, or none was looked for.
         table: what the report has beside the table in it; header first, empty if there is nothing.
@@ -111,8 +111,8 @@ class InputText(NamedTuple):
     Attributes:
         path: of it.
         sha256: of its content, in hex.
-        content: what it held; None if a page does not show it.
-        instead: what is said then.
+        content: its text; None if a page does not show it.
+        instead: sentence in place of the content.
     """
 
     path: str
@@ -129,7 +129,7 @@ def rendered(
     Args:
         library: that draws its plots.
         title: of the page.
-        facts: what is said of each file.
+        facts: texts on each file.
         data: JSON values for the scripts.
         packed: arrays for the scripts.
     """
@@ -151,7 +151,7 @@ def rendered(
 
 
 def _hash(script: str) -> str:
-    """Return what names a script in a Content Security Policy: no other one runs, wherever it came from."""
+    """Return the hash of a script for the Content Security Policy, which lets no other script run."""
     digest = hashlib.sha256(script.encode("utf-8")).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
 
@@ -162,7 +162,7 @@ def tone_of(verdict: str) -> str:
 
 
 def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return pairs of a word and what it says of how a file was made; inputs are left out."""
+    """Return the provenance of a file as pairs of a word and its value; inputs are left out."""
     rows = []
     for name, value in provenance.items():
         if name != "inputs" and value not in ("", {}):

@@ -21,14 +21,14 @@ CUT_OFF = "peaks of near-singular steps are cut off; Ctrl and the wheel show the
 class Packed:
     """Arrays that a page holds, each once and known by its number.
 
-    Single precision is what can be seen: a screen shows four digits of a curve, a cursor six.
+    Single precision is enough to see: a screen shows four digits of a curve, a cursor six.
     """
 
     def __init__(self) -> None:
         self._numbers: dict[bytes, int] = {}
 
     def add(self, values: ArrayLike) -> int:
-        """Return the number of an array, of any shape; what is not finite, or too large, becomes NaN."""
+        """Return the number of an array, of any shape; values not finite, or too large, become NaN."""
         with np.errstate(over="ignore"):
             single = np.asarray(values, dtype="<f4")
         content = np.where(np.isfinite(single), single, np.float32(np.nan)).astype("<f4").tobytes()

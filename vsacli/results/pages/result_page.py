@@ -80,7 +80,7 @@ SECTIONS = (
     Section("Wrench", ("wrench", "dwrench", "ddwrench")),
     Section("Derivatives", ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness", "dtau_e", "ddtau_e")),
 )
-"""Sections of a page; what is in none of them follows at its end."""
+"""Sections of a page; other variables follow at its end."""
 
 
 def result_page(
@@ -93,7 +93,7 @@ def result_page(
 
     Args:
         files: open; the differences are those to the first.
-        reports: what each file says of itself.
+        reports: of each file.
         remedies: the fix of each, where something would be worth saying.
         progress: called with the number of variables that are drawn.
 
@@ -134,7 +134,7 @@ def result_page(
 def sections_of(variables: Collection[str]) -> Iterator[Section]:
     """Yield the sections of a file with these variables, each with those that have plots of their own.
 
-    Standard deviations and the bounds of stiffness are drawn beside what they belong to, flags as stretches.
+    Standard deviations and the bounds of stiffness are drawn with their variable, flags as stretches.
     """
     with_others = {"flags", *BOUNDS, *map(deviation, variables)}
     own = dict.fromkeys(ACHIEVED.get(name, name) for name in variables if name not in with_others)
@@ -148,7 +148,7 @@ def sections_of(variables: Collection[str]) -> Iterator[Section]:
 
 
 def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[str, Any]:
-    """Return what scripts have to know of a file."""
+    """Return the values of a file that scripts need."""
 
     def after(spans: Sequence[Sequence[float]]) -> list[list[float]]:
         return [[time - start for time in span] for span in spans]
@@ -251,12 +251,12 @@ def measured_page(
     """Return the page of measured signals, as HTML.
 
     Args:
-        facts: what is said of them; the page is called as its label says.
+        facts: texts on them; the label is the title of the page.
         curves: by the headings of their sections; all share an axis of time.
-        computed: what the curves beside the measured ones are called.
+        computed: name of the curves compared with the measured ones.
 
     Raises:
-        InputError: what a page needs is not installed.
+        InputError: a library that pages need is not installed.
     """
     library, packed = plotting_library(), Packed()
     every = [curve for section in curves.values() for curve in section]

@@ -1,4 +1,4 @@
-"""The page of the table of a study, or of several: margin and cost of each run, over what varies."""
+"""The page of the table of a study, or of several: margin and cost of each run, over the parameters."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ def study_page(tables: Sequence[StoredStudy], reports: Sequence[ReportText]) -> 
 
     Args:
         tables: open.
-        reports: what each study found.
+        reports: of each study.
 
     Raises:
-        InputError: a table has no margins, or no rows, or is damaged; or what a page needs is not installed.
+        InputError: a table has no margins, or no rows, or is damaged; or a library that pages need is not
+            installed.
     """
     library, packed = plotting_library(), Packed()
     labels = [table.study_name for table in tables]

@@ -60,7 +60,7 @@ def plot_stored(stored: StoredResult, variables: Sequence[str] | None = None) ->
         variables: names of those to draw instead, each in a figure that is called after it.
 
     Raises:
-        InputError: nothing can be drawn from what is stored, or there is no curve of one of the variables.
+        InputError: the file has nothing to draw, or there is no curve of one of the variables.
     """
     return dict(draw_stored(stored, variables))
 

@@ -28,7 +28,7 @@ LIMIT_ROOM = 0.05
 """Free space behind a limit, as a share of that sight."""
 
 ZERO: dict[str, Any] = {"color": "0.6", "linewidth": 0.8}
-"""Line of what differences and margins are seen against."""
+"""Zero line of differences and margins."""
 
 _LIMIT: dict[str, Any] = {"linewidth": 0.8, "linestyle": (0, (1, 2))}
 _ENVELOPE: dict[str, Any] = {"alpha": 0.3, "linewidth": 0.5}
@@ -45,7 +45,7 @@ _BACKGROUND: dict[str, Any] = {"facecolor": "white", "alpha": 0.7, "linewidth": 
 
 
 def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
-    """Draw a chart into an empty panel; return what a legend shows besides its lines."""
+    """Draw a chart into an empty panel; return the artists of the legend besides its lines."""
     if chart.zero:
         axes.axhline(0.0, **ZERO)
     corridors = _draw_corridors(axes, chart) if chart.band == REACHABLE else None

@@ -57,7 +57,7 @@ def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
 
 
 def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) -> None:
-    """Let the panels of a column share a time axis, and name what is at their lower ends."""
+    """Let the panels of a column share a time axis, and label it at their lower ends."""
     times = [time for curve in curves for time in curve.recorded.time[[0, -1]].tolist()]
     span = np.array([min(times), max(times)])
     for first in range(0, len(panels), rows):
@@ -80,7 +80,7 @@ def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
 
 
 def _draw_residual(axes: Axes, curve: RecordedCurve) -> list[Artist]:
-    """Draw what the spline leaves, the noise that is stated, and the ends whose derivatives mean little."""
+    """Draw the residual of the spline, the stated noise, and the ends with poor derivatives."""
     axes.axhline(0.0, **ZERO)
     handles = draw_curve(axes, curve.residual, line_style(DIFFERENCE))
     if curve.rms > 0:

@@ -54,7 +54,7 @@ def line_handles(lines: charts.Legend) -> list[Artist]:
 
 
 def _draw_block(place: SubplotSpec, block: Block) -> list[Artist]:
-    """Draw charts into panels of their own; return what a legend shows besides the lines."""
+    """Draw charts into panels of their own; return the artists of the legend besides the lines."""
     handles: list[Artist] = []
     panels = _panels(place, block)
     for of_row, row in zip(panels, block.rows, strict=True):

@@ -1,4 +1,4 @@
-"""Torque over speed of each motor, within what it can give for a moment and on average."""
+"""Torque over speed of each motor, within its peak and continuous limits."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_ROWS = 6
 """Rows of two panels before further ones begin to the right."""
 
 SIGHT = 6.0
-"""Limits beyond what is used by this factor are out of sight, so that the motion stays in sight."""
+"""Limits beyond the motion by this factor are not shown, so that the motion remains visible."""
 
 ROOM = 1.08
 """Factor by which axes extend beyond their content."""
@@ -85,7 +85,7 @@ class TorqueSpeed(NamedTuple):
     Attributes:
         name: whose motor it is.
         drive: which motor, with which gear.
-        torque_unit, velocity_unit: of what follows.
+        torque_unit, velocity_unit: of the values below.
         bounds: of the motor.
         runs: by trajectory its velocities and torques, each (samples,).
         rms: root mean squares of velocity and torque over all of them.
@@ -122,7 +122,7 @@ def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
 
 
 def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
-    """Draw a panel; return what a legend shows for it."""
+    """Draw a panel; return its artists for the legend."""
     speeds, torques = (np.concatenate([np.abs(run[part]) for run in motor.runs.values()]) for part in (0, 1))
     right = _end(float(speeds.max()), [min(motor.bounds.max_velocity, _fastest(motor.bounds))])
     top = _end(float(torques.max()), [motor.bounds.max_torque, motor.bounds.continuous_torque])
@@ -143,7 +143,7 @@ def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
 
 
 def _end(used: float, bounds: Sequence[float]) -> float:
-    """Return the end of an axis: beyond what is used, and beyond bounds that are in sight."""
+    """Return the end of an axis: beyond the motion, and beyond visible bounds."""
     seen = [bound for bound in bounds if bound <= SIGHT * used]
     return ROOM * max([used, *seen]) or 1.0
 

@@ -1,4 +1,4 @@
-"""Figures of studies: margin and cost over what varies, the Pareto front, the probability of success.
+"""Figures of studies: margin and cost over the parameters, the Pareto front, the probability of success.
 
 And the ranking of a sensitivity analysis: a bar for each parameter.
 """

@@ -123,9 +123,9 @@ REGULAR = 400
 
 
 def make_legible(figure: Figure) -> None:
-    """Give texts a further font for what is missing in the usual one; letters that no font has become codes.
+    """Give texts a further font for letters missing in the usual one; letters that no font has become codes.
 
-    Two names in a script that is nowhere installed would else be two rows of equal boxes.
+    Otherwise two names in a script without installed font would be two rows of equal boxes.
     """
     for text in figure.findobj(Text):
         assert isinstance(text, Text)
@@ -146,7 +146,7 @@ def _mend(text: Text, missing: frozenset[str]) -> None:
 
 @cache
 def usual_letters() -> frozenset[str]:
-    """Return what the usual font can draw, and the end of a line."""
+    """Return the letters of the usual font, and the end of a line."""
     return _letters(findfont(USUAL)) | {"\n"}
 
 
@@ -175,7 +175,7 @@ def installed_fonts() -> Iterator[FontEntry]:
 
 @cache
 def _letters(path: str) -> frozenset[str]:
-    """Return what a font can draw; nothing if it has no outlines, as those of colored pictures."""
+    """Return the letters of a font; none for fonts of colored pictures, which have no outlines."""
     try:
         font = get_font(path)
         font.set_size(10, 72)

@@ -1,4 +1,4 @@
-"""Damaged and hostile HDF5 files: what the library itself would not survive never reaches it.
+"""Checks of damaged and hostile HDF5 files, which keep from the library what it would not survive.
 
 HDF5 reports most damage by exceptions. It loops without end on one kind, an object of size zero in a heap of
 texts, and it allocates whatever a damaged shape asks for. Nothing is looked at before it is needed: opening

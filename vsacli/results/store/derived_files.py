@@ -130,7 +130,7 @@ class SensitivityWriter(ResultWriter):
         return dataset
 
     def _values(self, block: Any, name: str) -> AnyArray:
-        """Return what a block, as `Sloped`, has for a dataset."""
+        """Return the values of a block, as `Sloped`, for a dataset."""
         variable = name.removesuffix(_SLOPE)
         return super()._values(block.block, name) if variable == name else block.over_time(variable)
 

@@ -31,8 +31,8 @@ class StoredInput(NamedTuple):
         path: as the command was given it.
         sha256: of its content, in hex.
         role: "robot" or "trajectory" of the file that describes one, else empty.
-        content: what it held; None if it was too large to be stored.
-        changes: what was changed after reading, values by path.
+        content: its text; None if it was too large to be stored.
+        changes: changes after reading, values by path.
     """
 
     path: str
@@ -43,11 +43,11 @@ class StoredInput(NamedTuple):
 
 
 def write_sources(inputs: h5py.Group, sources: Mapping[str, tuple[Source, ...]]) -> None:
-    """A subgroup `file_1`, `file_2`, ... for each file that was read, once even if it served twice.
+    """Write a subgroup `file_1`, `file_2`, ... for each file that was read, once even if it served twice.
 
     Args:
         inputs: the group.
-        sources: by what they describe; the first file of each leads to the others.
+        sources: by the thing they describe; the first file of each leads to the others.
     """
     roles = {files[0]: role for role, files in sources.items() if files}
     every = dict.fromkeys(source for files in sources.values() for source in files)

@@ -64,7 +64,7 @@ def create_layout(
         robot: the robot.
         trajectory: the trajectory.
         variables: those that are stored.
-        provenance: what else is known of how they are computed; root attributes.
+        provenance: further root attributes on how they are computed.
         precision: of the values, one of `FLOATS`.
 
     Returns:

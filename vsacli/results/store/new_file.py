@@ -3,7 +3,7 @@
 HDF5 cannot be unwound from a failed write, and crashes if an exception crosses its code. So it is given a
 `Sink`, which raises none, and signals that end the run wait until a piece is written. Chunks are put together
 here in the order in which they are stored, with one copy, and written whole: the library would copy each
-block into chunks of its own, look every chunk up, and keep in its cache what is not full.
+block into chunks of its own, look every chunk up, and keep those in its cache that are not full.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ BEHIND = 2**25
 """Bytes that may wait to be written: some more than a block of seven joints with all variables."""
 
 SYNCED = 2**26
-"""Bytes after which the disk begins to store what was written, so that little is left of that at the end."""
+"""Bytes after which the disk begins to store them, so that little is left for the end."""
 
 CHUNK_BYTES = 2**19
 """Size of a chunk, at most. Of 64 kB to 1 MB tried, those from 256 kB on take the same time; smaller ones
@@ -108,7 +108,7 @@ class NewFile:
 
     @contextlib.contextmanager
     def used(self) -> Iterator[None]:
-        """Surround any use of HDF5; an error of the disk counts more than what HDF5 makes of it.
+        """Surround any use of HDF5; an error of the disk takes precedence over the one of HDF5 that follows.
 
         Raises:
             StorageError: the disk is full or fails.
@@ -126,7 +126,7 @@ class NewFile:
         """Use the file in a task that holds so many bytes: now, or of a long file in a thread.
 
         Within `used`, as the task itself is; tasks are done in their order. Signals never reach the thread,
-        and what it raises comes from a later call here or of `wait`. While too many bytes wait, so does the
+        and its exceptions are raised by a later call or by `wait`. While too many bytes wait, so does the
         caller.
         """
         self._bytes += size
@@ -156,13 +156,13 @@ class NewFile:
         done.result()
 
     def _close(self) -> None:
-        """Write what is left; within `used`."""
+        """Write remaining chunks; within `used`."""
         assert self._sink is not None, "it is open"
         self._file.close()
         self._sink.close()
 
     def discard(self) -> None:
-        """Close what is open; what is not written is lost."""
+        """Close the file without writing the rest."""
         with interrupts_deferred():
             if self._thread is not None:
                 self._thread.shutdown(cancel_futures=True)
@@ -173,7 +173,7 @@ class Sink(io.RawIOBase):
     """A file object for h5py whose writing never fails in HDF5's sight.
 
     HDF5 cannot be unwound from a failed write: closing its file fails as well, and the process then crashes
-    at exit. So the first error is kept here, what follows it is dropped, and the caller looks at `error`
+    at exit. So the first error is kept here, later writes are dropped, and the caller looks at `error`
     after each step.
     """
 
@@ -213,7 +213,7 @@ class Sink(io.RawIOBase):
             return 0
 
     def begin_sync(self) -> None:
-        """Have the disk store what was written, in a thread, unless it is still at that."""
+        """Have the disk store the bytes written so far, in a thread, unless it is still busy with that."""
         if self._syncing is None or not self._syncing.is_alive():
             self._syncing = threading.Thread(target=self._sync, name="vsacli-syncing")
             self._syncing.start()
@@ -225,7 +225,7 @@ class Sink(io.RawIOBase):
             self.error = self.error or error
 
     def close(self) -> None:
-        """Close the file, or note what the file system reports only now."""
+        """Close the file, or note an error that the file system reports only now."""
         if self._syncing is not None:
             self._syncing.join()
         try:

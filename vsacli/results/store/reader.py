@@ -170,8 +170,8 @@ class StoredResult(StoredFile):
     """An open result file; a context manager that closes it. A subclass reads another format.
 
     Attributes:
-        kind: what the file is called in sentences.
-        command: what writes such files.
+        kind: name of such files in sentences.
+        command: command that writes such files.
         path: the file, as given.
         attributes: the root attributes, e.g. `created`, `command_line`, `versions`.
         robot_name, trajectory_name, verdict: as in the report.
@@ -233,7 +233,7 @@ class StoredResult(StoredFile):
             return self._of_motors(f"actuator_motor_{name}")
 
     def _of_motors(self, name: str) -> FloatArray:
-        """Return what is stored, which has no second axis if no joint has two motors."""
+        """Return the stored values, without second axis if no joint has two motors."""
         constants = np.full((len(self.actuators), len(MOTORS)), np.nan)
         if OF_JOINTS.format(name) in self._file:
             stored = self._dataset(OF_JOINTS.format(name))

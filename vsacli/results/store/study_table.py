@@ -79,11 +79,11 @@ class Head(NamedTuple):
         fingerprint: of the whole study, which its parts have in common.
         runs: how many the study has; the table may have some of them.
         joint_names, joint_types: base to tip.
-        parameters: what varies.
-        columns: what is kept.
+        parameters: paths that vary, with units.
+        columns: stored for each run.
         steps: how many steps columns over time have, at most.
-        sources: files that were read, by what they describe.
-        provenance: further root attributes: what computed it, and how.
+        sources: files that were read, by the thing they describe.
+        provenance: further root attributes: engine, method, command line.
     """
 
     study: str
@@ -111,7 +111,7 @@ class StudyWriter(NewFile):
 
     Args:
         file: where it is staged.
-        head: what it says beside its rows.
+        head: of the table.
         rows: how many it will have.
     """
 
@@ -247,8 +247,8 @@ class StoredStudy(StoredFile):
         attributes: the root attributes.
         study_name, robot_name: as in the files.
         joint_names, joint_types: base to tip.
-        parameters: paths of what varies.
-        columns: names of what is kept.
+        parameters: paths that vary.
+        columns: names.
         rows: how many runs it has.
         steps: how many steps columns over time have; 0 if there are none.
         runs: how many the study has.
@@ -338,7 +338,7 @@ class StoredStudy(StoredFile):
             return str(attributes.get("units_revolute", attributes.get("units", "")))
 
     def parameter_is_text(self, path: str) -> bool:
-        """Return whether the values of what varies are texts rather than numbers."""
+        """Return whether the values of a parameter are texts rather than numbers."""
         return bool(self._dataset(path).dtype.kind != "f")
 
     def provenance(self) -> dict[str, str]:

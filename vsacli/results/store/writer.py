@@ -126,7 +126,7 @@ class ResultWriter(NewFile):
         self._fillers = {name: ChunkFiller(dataset, self.do) for name, dataset in stored.items()}
 
     def _values(self, block: Any, name: str) -> AnyArray:
-        """Return what a block has for a dataset."""
+        """Return the values of a block for a dataset."""
         values: AnyArray = getattr(block, name)
         return values
 
@@ -182,7 +182,7 @@ class ResultWriter(NewFile):
 
 
 def _not_given(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
-    """Return the variables that a robot does not have, since its file lacks what they need."""
+    """Return the variables missing for a robot, each with the key that its file lacks."""
     return {
         name: f"no joint of {robot.name} has {_requirement(variable)}"
         for name, variable in declared.items()
