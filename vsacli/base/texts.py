@@ -15,10 +15,11 @@ MOST_LETTERS = 200
 
 
 def one_line(text: str) -> str:
-    r"""Return a text in one line; those that move a cursor or turn letters are escaped ("\x1b")."""
+    r"""Return a text in one line; characters such as "\x1b", which move a cursor, are escaped."""
     if text.isprintable():
         return text
-    return "".join(each if each.isprintable() else _escaped(each) for each in text)
+    letters = (each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
+    return "".join(letters)
 
 
 def as_name(text: str) -> str:
@@ -81,7 +82,3 @@ def shown(content: Any) -> Any:
         case Sequence():
             return [shown(value) for value in content]
     return content
-
-
-def _escaped(letter: str) -> str:
-    return letter.encode("unicode_escape").decode("ascii")

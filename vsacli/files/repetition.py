@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
 from vsacli.base.progress import Tell, unheard
@@ -134,7 +133,8 @@ class _Comparison:
         self._at += len(computed)
         if stored.shape != computed.shape:
             raise InputError.one(f"holds {self._variable} for other steps", self._result.path)
-        differing = ~_equal(stored, computed)
+        undefined = (stored != stored) & (computed != computed)  # NaN in both
+        differing = (stored != computed) & ~undefined
         self.values += int(np.count_nonzero(differing))
         self._peak = float(np.fmax(self._peak, np.fmax.reduce(np.abs(stored), axis=None, initial=0.0)))
         distances = np.abs(stored[differing].astype(float) - computed[differing])
@@ -144,11 +144,6 @@ class _Comparison:
     def difference(self) -> Difference:
         """Return the difference found."""
         return Difference(self._variable, self.values, self._largest / (self._peak or 1.0))
-
-
-def _equal(a: AnyArray, b: AnyArray) -> AnyArray:
-    both: AnyArray = (a == b) | ((a != a) & (b != b))  # NaN is what both have where nothing is defined
-    return both
 
 
 class Extracted(NamedTuple):

@@ -143,23 +143,19 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     both are NaN if the springs cannot carry the load. Of an elastic joint it is the stiffness that its spring
     then has.
     """
+    furthest = reach(robot)
     return {
         "kind": "robot",
         **json_fields(robot),
         "mass": sum(joint.link.mass for joint in robot.joints),
-        "reach": _described_reach(robot),
+        "reach": {
+            "bound": reach_bound(robot),
+            "found": float(furthest.values[0]),
+            "at": furthest.configurations[0].tolist(),
+        },
         "joints": _joints(robot),
         "held_at_zero": held_at_zero(robot),
         "warnings": list(robot.warnings),
-    }
-
-
-def _described_reach(robot: Robot) -> dict[str, Any]:
-    found = reach(robot)
-    return {
-        "bound": reach_bound(robot),
-        "found": float(found.values[0]),
-        "at": found.configurations[0].tolist(),
     }
 
 

@@ -93,8 +93,9 @@ class JointNames:
 
     def in_words(self, words: Sequence[str]) -> Match | None:
         """Return the joint with the longest name found in these words; None for none or for a tie."""
+        phrase = f" {' '.join(words)} "
         for whole, of_joints in ((True, self._words), (False, self._cores)):
-            there = [name for name, own in of_joints.items() if own and _stands_in(own, words)]
+            there = [name for name, own in of_joints.items() if own and f" {' '.join(own)} " in phrase]
             longest = max((len(of_joints[name]) for name in there), default=0)
             found = [name for name in there if len(of_joints[name]) == longest]
             if len(found) == 1 and (whole or self._tells(of_joints[found[0]], words)):
@@ -118,10 +119,6 @@ class JointNames:
         return not all(word.isdecimal() for word in core) or all(
             word in GENERIC or word in common for word in others
         )
-
-
-def _stands_in(part: Sequence[str], words: Sequence[str]) -> bool:
-    return f" {' '.join(part)} " in f" {' '.join(words)} "
 
 
 def _common(names: Sequence[Sequence[str]]) -> tuple[int, int]:

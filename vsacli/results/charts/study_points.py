@@ -74,10 +74,10 @@ class StudyPoints:
         return [first, *cost]
 
     def _cost(self, name: str) -> tuple[str, FloatArray]:
-        values, column = self._table.read(name), self._table.column(name)
+        values, column = _there(self._table.read(name)), self._table.column(name)
         unit = column.quantity.revolute
         words = COSTS.get(name, "{}").format(column.long_name)
-        return f"{words} [{unit}]", _sum(values) if unit == ADDED else _most(values)
+        return f"{words} [{unit}]", values.sum(axis=1) if unit == ADDED else values.max(axis=1)
 
     @property
     def share(self) -> tuple[float, float, float]:
@@ -121,18 +121,6 @@ def _least(margins: FloatArray) -> FloatArray:
     """Return the least margin of all joints; those without an attainable range have none."""
     least: FloatArray = np.where(np.isnan(margins), np.inf, margins).min(axis=1)
     return np.where(np.isinf(least), np.nan, least)
-
-
-def _sum(costs: FloatArray) -> FloatArray:
-    """Add costs up over joints."""
-    total: FloatArray = _there(costs).sum(axis=1)
-    return total
-
-
-def _most(costs: FloatArray) -> FloatArray:
-    """Return the largest cost of all joints and motors."""
-    most: FloatArray = _there(costs).max(axis=1)
-    return most
 
 
 def _there(costs: FloatArray) -> FloatArray:

@@ -194,19 +194,14 @@ def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str]) -> Figur
         margins, shares = points.exceedance
         style = replace(line_style(index), marker="").words
         axes.step(100 * margins, 100 * shares, where="pre", **style)
-        handles.append(Line2D([], [], **style, label=_share(points, label)))
+        share = "{:.3g} % ({:.3g} to {:.3g} %)".format(*(100 * each for each in points.share))
+        handles.append(Line2D([], [], **style, label=f"{label}: {share}"))
     axes.axvline(0.0, **ZERO)
     axes.set_xlabel("smallest margin [%]")
     axes.set_ylabel("runs with at least this margin [%]")
     axes.set_ylim(0, 103)
     add_title(axes, "feasible runs, with 95 % intervals")
     return complete(figure, labels[0] if len(labels) == 1 else "studies", handles)
-
-
-def _share(points: StudyPoints, label: str) -> str:
-    """Return how many runs are feasible, with the interval."""
-    share, low, high = points.share
-    return f"{label}: {100 * share:.3g} % ({100 * low:.3g} to {100 * high:.3g} %)"
 
 
 def _label(points: StudyPoints, path: str) -> str:
